@@ -4,7 +4,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.complete
-WORKERS ?= 2
+# One more than the two cores that are usual: while a test waits, another one runs.
+WORKERS ?= 3
 
 .PHONY: help demo test page lint types layers unit speed proof siege site clean
 .DEFAULT_GOAL := help
@@ -28,11 +29,10 @@ $(STAMP): lock/dev.txt pyproject.toml
 demo: $(STAMP)
 	$(BIN)/swash demo --out demo
 
-# First what fails fastest; types beside the tests, which wait for browsers now and then; speed alone, for it is timed.
+# First what fails fastest. Then everything at once, for some tests wait for browsers and clocks; short speeds judge nothing.
 test: $(STAMP)
 	$(MAKE) --no-print-directory -j 2 --output-sync page lint layers
-	$(MAKE) --no-print-directory -j 2 types unit
-	$(MAKE) --no-print-directory speed
+	$(MAKE) --no-print-directory -j 3 unit types speed
 
 # three.js and uPlot for `swash live`, by hash; without npm the tests of the page are skipped with the reason.
 page:

@@ -69,11 +69,11 @@ class Punctual:
 
 
 def measure(*, short: bool) -> list[Punctual]:
-    """Both kinds of page for 60 s (5 s in the short form); without Chromium only the first."""
+    """Both kinds of page for 60 s; the first alone for 5 s in the short form and without Chromium."""
     seconds = 5.0 if short else 60.0
     readings = [_reading(seconds)]
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if chromium is not None:
+    if chromium is not None and not short:
         readings.append(_drawn(seconds, chromium))
     return readings
 

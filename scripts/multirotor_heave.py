@@ -55,6 +55,21 @@ class Heave:
         return (f"`{self.name.split('.')[0]}`", f"{self.spread:.2f}", *(f"{value:.2f}" for value in told))
 
 
+@dataclass(frozen=True)
+class Acting:
+    """What a filter saw beside the equations [m/s^2] (n,): a drift that stays, a gust that fades with `time` [s]."""
+
+    drift: Array
+    gust: Array
+    time: float
+
+    def later(self, seconds: float, dt: float) -> Array:
+        """What was to be expected some seconds before, as predictions expect it (n,)."""
+        held = self.drift + self.gust * np.exp(-seconds / self.time)
+        k = round(seconds / dt)
+        return np.concatenate([np.full(k, held[0]), held[:-k]])
+
+
 HEADS = ("flight", "spread [m/s²]", "tracking and accelerometer agree", "regression of its own", "model on commands",
          "without its constant error", *(f"known {seconds:g} s before" for seconds in BEFORE))  # fmt: skip
 
@@ -66,14 +81,14 @@ def measured_force(body: Array, dt: float) -> Array:
 
 
 def heave(
-    vehicle: Vehicle, record: Record, nuisance: Nuisance, body: Array, force: Array, acting: Array, felt: Array,
+    vehicle: Vehicle, record: Record, nuisance: Nuisance, body: Array, force: Array, acting: Acting, felt: Array,
     first: int,
 ) -> Heave:  # fmt: skip
     """The numbers of one record.
 
     Args:
         body: states (n, 12) as tracked. force: along z from the model without the flight's constant (n,).
-        acting: along z, what the filter saw beside the equations (n,). felt: the accelerometer's z (n,).
+        acting: along z, what the filter saw beside the equations. felt: the accelerometer's z (n,).
         first: sample from which on it counts.
     """
     sos = butter(4, SLOW, fs=1.0 / record.dt, output="sos")
@@ -93,7 +108,7 @@ def heave(
     columns = np.stack([np.ones(truth.size), *(slow(column) for column in _columns(vehicle, record, body))], axis=1)
     own = columns @ np.linalg.lstsq(columns, truth, rcond=None)[0]
     push, alone = float(nuisance.push_w), slow(force)
-    later = [np.concatenate([np.full(k, acting[0]), acting[:-k]]) for k in (round(s / record.dt) for s in BEFORE)]
+    later = [acting.later(seconds, record.dt) for seconds in BEFORE]
     return Heave(
         record.name,
         float(np.sqrt(spread)),

@@ -1,14 +1,16 @@
 """Open-loop predictions of multirotor flights that no fit saw, beside rivals trained on the flights of the fit.
 
     python scripts/multirotor_scores.py --model LABEL=MODEL.toml ... --fit FLIGHT ... --on FLIGHT ... [--new FLIGHT ...]
+    python scripts/multirotor_scores.py --heave PART=MODEL.toml ... --on FLIGHT ... [--new FLIGHT ...]
 
 MODEL.toml is what `swash identify --vehicle crazyflie ... --out FOLDER` wrote; a flight may have a window (FILE@8-30).
 Predictions start every 0.1 s, run at 100 Hz on the logged commands and voltage, and are scored by mean absolute errors
 over the axes up to 0.5 s, and by fit % after 0.5, 1 and 2 s. A model starts from its own observer, which has seen the
 flight up to the start; everything else from measured motion. The first five seconds of each flight tell a model that
-flight's constants; nothing is scored there. "Textbook" is the card before the identification. Heave is told of the
-first model (`multirotor_heave`). `--new`: flights of kinds that no fit saw, in tables of their own. `--page FILE` puts
-the tables into a page, each between <!-- scores: NAME --> and <!-- end -->. The trees need scikit-learn.
+flight's constants; nothing is scored there. "Textbook" is the card before the identification. `--heave` tells what a
+model says of the acceleration along body z (`multirotor_heave`), in a table of its name. `--new`: flights of kinds that
+no fit saw, in tables of their own. `--page FILE` puts the tables into a page, each between <!-- scores: NAME --> and
+<!-- end -->. The trees need scikit-learn.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from multirotor_heave import HEADS, Heave, heave
+from multirotor_heave import HEADS, Acting, Heave, heave
 from multirotor_rivals import RIVALS, Motion, Rival, motion
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -35,15 +37,15 @@ from swashplate.filtering.disturbed_model import Nuisance, stochastic_model
 from swashplate.filtering.nuisance import PUSHES
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.records import Record, records
+from swashplate.identification.time.calibration import CALIBRATION, calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import enable_compilation_cache, lengthened
 from swashplate.simulation.dynamics import enable_double_precision, jax_backend
-from swashplate.validation.calibration import CALIBRATION, calibrate
 from swashplate.validation.metrics import fit_percent
-from swashplate.validation.prediction import Predictions, naive, predict
+from swashplate.validation.prediction import naive, observed, predict
 from swashplate.validation.validate import observer_of, started_from
 
 AHEAD, EVERY = 50, 10
@@ -112,7 +114,7 @@ def open_loop(vehicle: Vehicle, record: Record, nuisance: Nuisance, starts: Plac
     told = vehicle.inputs(*(reaching[0][i] for i in range(len(vehicle.input_names))))
     settled = vehicle.traits.settled
     assert settled is not None
-    inside = settled(told, vehicle.values(), record.voltage[0], None)
+    inside = settled(told, vehicle.values(), record.voltage[0], None, float(record.time[0]))
     inner = jnp.stack([jnp.asarray(inside[name]) for name in vehicle.state_names[BODY:]])
     push = jnp.array([float(getattr(nuisance, name)) for name in PUSHES])
     voltage = jnp.asarray(record.voltage)
@@ -168,22 +170,24 @@ def seen(record: Record, *, beyond: int = 0) -> Motion:
     return motion(lengthened(body, len(body) + beyond), inputs, voltage, record.dt, calibration=CALIBRATION)
 
 
-def along_z(vehicle: Vehicle, record: Record, felt: Array, nuisance: Nuisance, told: Predictions, first: int) -> Heave:
+def along_z(vehicle: Vehicle, record: Record, felt: Array) -> Heave:
     """What can be explained of a record's acceleration along body z, and what the model explains."""
+    noise, prior = observer_of(vehicle)
+    nuisance, first = calibrate(vehicle, record, noise=noise, prior=prior), round(CALIBRATION / record.dt)
+    seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=0).filtered
+    acting = Acting(seen.drift[:, 2], seen.gust[:, 2], float(noise.tau_gust_vertical or noise.tau_gust_force))
     body = measured_states(record, nuisance)
     force = open_loop(vehicle, record, nuisance, np.array([first]))[1][:, 2] - float(nuisance.push_w)
-    return heave(vehicle, record, nuisance, body, force, told.disturbances[:, 2], felt, first)
+    return heave(vehicle, record, nuisance, body, force, acting, felt, first)
 
 
 def compare(
     models: dict[str, Vehicle], rivals: dict[str, Rival], pieces: Sequence[tuple[Record, Array]]
-) -> tuple[dict[str, list[Scored]], list[Heave]]:
-    """Every predictor on every record, and heave by the first model."""
-    first = next(iter(models))
-    textbook = {"textbook quadrotor (the card)": started_from(models[first])}
+) -> dict[str, list[Scored]]:
+    """Every predictor on every record."""
+    textbook = {"textbook quadrotor (the card)": started_from(next(iter(models.values())))}
     by_label: dict[str, list[Scored]] = {}
-    slow: list[Heave] = []
-    for record, felt in pieces:
+    for record, _ in pieces:
         starts = np.arange(round(CALIBRATION / record.dt), record.time.size - AHEAD - EDGE, EVERY)
         plain = measured_states(record, Nuisance())
         for kind, label in (("hold", "hold"), ("rates", "constant velocity and rates")):
@@ -197,8 +201,6 @@ def compare(
                 told = predict(vehicle, record, noise=noise, nuisance=nuisance, horizon=FITS[-1] * record.dt,
                                every=EVERY * record.dt, settling=CALIBRATION)  # fmt: skip
                 states = told.states[np.isin(told.starts, starts)]
-                if label == first:
-                    slow.append(along_z(vehicle, record, felt, nuisance, told, int(starts[0])))
             else:
                 states = open_loop(vehicle, record, nuisance, starts)[0]
             by_label.setdefault(label, []).append(scored(states, body, starts))
@@ -206,7 +208,7 @@ def compare(
         for label, rival in rivals.items():
             with np.errstate(over="ignore", invalid="ignore"):
                 by_label.setdefault(label, []).append(scored(rival(motion, starts, FITS[-1]), plain, starts))
-    return by_label, slow
+    return by_label
 
 
 def mean_errors(by_label: dict[str, list[Scored]]) -> str:
@@ -256,6 +258,7 @@ def into_page(text: str, name: str, made: str) -> str:
 
 def main(
     models: dict[str, Vehicle],
+    lifted: dict[str, Vehicle],
     fitted: Sequence[str],
     held_out: Sequence[str],
     new: Sequence[str],
@@ -263,23 +266,22 @@ def main(
 ) -> None:
     enable_double_precision()
     enable_compilation_cache()
-    vehicle = next(iter(models.values()))
-    training = [seen(record) for record, _ in of_files(fitted, vehicle)]
+    training = [seen(record) for record, _ in of_files(fitted, next(iter(models.values())))] if models else []
     rivals: dict[str, Rival] = {}
-    for label, make in RIVALS.items():
+    for label, make in RIVALS.items() if models else ():
         began = time.process_time()
         rivals[label] = make(training)
         print(f"{label}: trained in {time.process_time() - began:.0f} s of processor time", flush=True)
     made: dict[str, str] = {}
-    lifted: list[Heave] = []
     for name, flights in (("known kinds", held_out), ("new kinds", new)):
-        if flights:
-            by_label, slow = compare(models, rivals, of_files(flights, vehicle))
-            lifted += slow
+        if flights and models:
+            by_label = compare(models, rivals, of_files(flights, next(iter(models.values()))))
             starts = sum(len(one.errors) for one in by_label["hold"])
             made[name] = f"{starts} starts.\n\n{mean_errors(by_label)}"
             made[f"{name}, fit"] = mean_fits(by_label)
-    made["heave"] = table(HEADS, [one.cells for one in lifted])
+    for name, vehicle in lifted.items():
+        of = of_files((*held_out, *new), vehicle)
+        made[name] = table(HEADS, [along_z(vehicle, record, felt).cells for record, felt in of])
     for name, part in made.items():
         print(f"\n{name}\n{part}")
     if page is not None:
@@ -291,11 +293,16 @@ def main(
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", action="append", required=True, metavar="LABEL=MODEL.toml")
-    parser.add_argument("--fit", nargs="+", required=True, metavar="FLIGHT")
+    parser.add_argument("--model", action="append", default=[], metavar="LABEL=MODEL.toml")
+    parser.add_argument("--heave", action="append", default=[], metavar="PART=MODEL.toml")
+    parser.add_argument("--fit", nargs="+", default=[], metavar="FLIGHT")
     parser.add_argument("--on", nargs="+", required=True, metavar="FLIGHT")
     parser.add_argument("--new", nargs="+", default=[], metavar="FLIGHT")
     parser.add_argument("--page", type=Path, metavar="FILE")
     given = parser.parse_args()
-    chosen = {m.split("=", 1)[0]: sp.vehicle(m.split("=", 1)[1]) for m in given.model}
-    main(chosen, given.fit, given.on, given.new, given.page)
+    chosen, told = (
+        {m.split("=", 1)[0]: sp.vehicle(m.split("=", 1)[1]) for m in listed} for listed in (given.model, given.heave)
+    )
+    if bool(chosen) != bool(given.fit) or (not chosen and not told):
+        parser.error("give --model with --fit (the rivals are trained on these flights), or --heave, or both.")
+    main(chosen, told, given.fit, given.on, given.new, given.page)

@@ -29,12 +29,12 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import PUSHES, Nuisance
 from swashplate.identification.core.records import Record
+from swashplate.identification.time.calibration import CALIBRATION, calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation.black_box import ceiling
-from swashplate.validation.calibration import CALIBRATION, calibrate
 from swashplate.validation.flight_floors import motion_of
 from swashplate.validation.metrics import fit_percent
 from swashplate.validation.prediction import predict
@@ -134,7 +134,10 @@ def closed(
     speeds = np.zeros((len(starts), 4))
     keep = float(np.exp(-record.dt / vehicle.card.parameters["tau_drive"].value))
     held = np.stack(
-        [list(settled(u, vehicle.values(), v, None).values()) for u, v in zip(reaching, record.voltage, strict=True)]
+        [
+            list(settled(u, vehicle.values(), v, None, 0.0).values())
+            for u, v in zip(reaching, record.voltage, strict=True)
+        ]
     )
     speed = held[0]
     for k in range(int(starts.max()) + 1):

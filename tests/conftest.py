@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,11 +13,24 @@ import pytest
 import typer.main
 import typer.testing
 
-# Tracing makes millions of small objects and no garbage: a sixth of its time went into looking for some.
-gc.set_threshold(50_000, 20, 100)
+# Tracing makes millions of small objects and no garbage: looking for some took a sixth of its time.
+gc.set_threshold(200_000, 50, 1000)
 
 # The runner builds the whole command line anew at every call, a quarter of a second each; it does not change.
 typer.testing._get_command = lru_cache(typer.main.get_command)  # type: ignore[attr-defined]
+
+_MEMORY = 2.5e9
+"""Bytes of a test process above which compiled programs are given back: several such processes share a machine."""
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _bounded_memory() -> Iterator[None]:
+    yield
+    if "jax" in sys.modules and int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE > _MEMORY:
+        sys.modules["jax"].clear_caches()
+        gc.collect()
+
 
 ROOT = Path(__file__).resolve().parent.parent
 

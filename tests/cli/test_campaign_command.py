@@ -53,12 +53,15 @@ def test_from_a_dry_run_to_a_report(file: Path, tmp_path: Path, monkeypatch: pyt
     ran = swash("campaign", "run", file, "-o", tmp_path / "out")
     assert ran.code == 0, ran.err
     assert "fleet: 2 of 2 tasks done\nGood fits: 2 of 2 (100 %;" in ran.out
+    assert f"swash campaign replay {tmp_path / 'out'} 0 -o worst-0.json" in ran.out, "a fit is no .nc"
     looked = json.loads(swash("campaign", "status", tmp_path / "out", "--json").out)
     assert (looked["done"], looked["rows"], looked["failed"]) == (2, 2, {})
     assert swash("campaign", "resume", tmp_path / "out", "-q").code == 0
     for name in ("r.html", "t.csv", "t.nc"):
         assert swash("campaign", "report", tmp_path / "out", "-o", tmp_path / name).code == 0
         assert (tmp_path / name).stat().st_size > 0
+    refused = swash("campaign", "report", tmp_path / "out", "-o", tmp_path / "r.pdf")
+    assert "ends in '.pdf', expected .html, .nc or .csv" in one_message(refused)
     assert (tmp_path / "t.csv").read_text().splitlines()[1].endswith(",a.nc,good,2.5,2.5,2.5,2.5,2.5")
 
 

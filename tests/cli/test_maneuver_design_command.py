@@ -91,6 +91,7 @@ def test_a_sweep_that_is_best_comes_with_ardupilots_parameters(asked: dict[str, 
     [
         (("--limits", "attitude"), "is 'attitude', expected NAME=VALUE"),
         (("--limits", "attitude=steep"), "is 'attitude=steep', expected NAME=VALUE"),
+        (("--limits", "place=2,seconds=9,place=3"), "--limits: says place twice"),
         (("--band", "fast"), "is 'fast', expected LOW-HIGH"),
         (("--out", "design.txt"), "expected .csv"),
         (("--script", "design.txt"), "expected .lua"),

@@ -66,7 +66,8 @@ def design_maneuver(
     Args:
         vehicle: whose numbers are the prior's middle.
         unknown: the parameters.
-        limits: some of `LIMITS`; by default 20 deg, 120 deg/s, 3 m, 30 s, and the usual deflections of each axis.
+        limits: some of `LIMITS`; by default 20 deg, 120 deg/s, 3 m, 30 s, and the usual deflections of each axis
+            (`DEFAULT_AMPLITUDE`). An amplitude above the largest of these enlarges all in proportion.
         band: lowest and highest frequency [Hz].
         axes: that may be moved; all that the vehicle has where None.
         aim: what the flight is to make certain instead of the unknowns themselves: "q/pitch@0.5-3" (how a state
@@ -108,12 +109,13 @@ def design_maneuver(
             f"{seconds:g} s hold {seconds * band[0]:.1f} periods of {band[0]:g} Hz and "
             f"{min(own.size for own in lines)} lines an axis, expected at least 2 of each.",
             channel="seconds",
-            hint=f"Fly at least {max(2.0, 2.0 * len(moved)) / band[0]:.3g} s, or begin at a higher frequency.",
+            hint=f"Fly at least {max(2.0 / band[0], (2.0 * len(moved) + 1.0) / (band[1] - band[0])):.3g} s, "
+            "or in a band that begins at a higher frequency or is wider.",
         )
-    peak = {axis: kept.get("amplitude", DEFAULT_AMPLITUDE.get(axis, 0.1)) for axis in moved}
+    peak = _deflections(moved, kept.get("amplitude"))
     say("linearising the draws of the prior")
     models = _draws(vehicle, unknown, spread, draws, seed)
-    values = np.array([abs(vehicle.card.parameters[n].value) or 1.0 for n in unknown])
+    values = np.array([abs(vehicle.numbers[n].value) or 1.0 for n in unknown])
     known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
     wanted = None if aim is None else aim_of(aim, models, unknown, controller or usual_hold)
     seen = [sensed(one, unknown) for one in models]
@@ -143,6 +145,10 @@ def design_maneuver(
     offers, why = [], []
     for kind, pieces in rivals:
         say(f"flying the {kind} in simulation")
+        whole = sum(piece.duration for piece in pieces) + 2.0 * LEAD * len(pieces)
+        if whole > kept.get("battery", np.inf):
+            why.append(f"{kind}: {len(pieces)} pieces with their hovers take {whole:.3g} s, more than the battery's")
+            continue
         try:
             offers.append(offer_of(kind, pieces, told, table, kept))
         except ManeuverError as trouble:
@@ -213,6 +219,15 @@ def _checked_limits(limits: Mapping[str, float]) -> dict[str, float]:
     return {**_USUAL, **limits}
 
 
+def _deflections(moved: Sequence[str], largest: float | None) -> dict[str, float]:
+    """Largest deflection by axis: the usual ones, all larger in proportion, and none above the limit."""
+    usual = {axis: DEFAULT_AMPLITUDE.get(axis, 0.1) for axis in moved}
+    if largest is None:
+        return usual
+    share = max(1.0, largest / max(usual.values()))
+    return {axis: min(largest, share * one) for axis, one in usual.items()}
+
+
 def _checked(criterion: str, robust: str, spread: float, draws: int, band: tuple[float, float], rate: float) -> None:
     for channel, value, expected in (("criterion", criterion, ("D", "A")), ("robust", robust, ("average", "worst"))):
         if value not in expected:
@@ -243,23 +258,23 @@ def _axes_of(vehicle: Vehicle, axes: Sequence[str] | None) -> tuple[str, ...]:
         raise ManeuverError(
             f"is no axis of '{vehicle.name}'." if strange else f"'{vehicle.name}' has no axes to move.",
             channel=", ".join(strange) or "axes",
-            hint=f"It has {listed(has)}.",
+            hint=f"It has {listed(has)}." if has else f"None of its inputs is {listed(AXES)}.",
         )
     return moved
 
 
 def _draws(vehicle: Vehicle, unknown: Sequence[str], spread: float, draws: int, seed: int) -> list[Vehicle]:
     """The vehicle, and others with the unknowns anywhere within the spread and the bounds of physics."""
-    random, made, card = np.random.default_rng(seed), [vehicle], vehicle.card.parameters
-    absent = [name for name in unknown if name not in card]
+    random, made, numbers = np.random.default_rng(seed), [vehicle], vehicle.numbers
+    absent = [name for name in unknown if name not in numbers]
     if absent:
         sensed(vehicle, absent)  # says what it has
     for _ in range(draws - 1 if spread > 0.0 else 0):
         told = {}
         for name in unknown:
-            low, high = (-np.inf if card[name].lower is None else card[name].lower), card[name].upper
-            value = card[name].value * (1.0 + spread * random.uniform(-1.0, 1.0))
-            told[name] = float(np.clip(value, low, np.inf if high is None else high))
+            value = numbers[name].value * (1.0 + spread * random.uniform(-1.0, 1.0))
+            low, high = numbers[name].lower, numbers[name].upper
+            told[name] = float(np.clip(value, -np.inf if low is None else low, np.inf if high is None else high))
         made.append(vehicle.with_values(told))
     return made
 

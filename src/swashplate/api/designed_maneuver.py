@@ -84,7 +84,7 @@ class DesignedManeuver(Shown):
     @property
     def best(self) -> Offer:
         """The offer whose bounds multiply (D) or add up, in squares, (A) to least."""
-        values = [abs(self.vehicle.card.parameters[n].value) or 1.0 for n in self.unknown]
+        values = [abs(self.vehicle.numbers[n].value) or 1.0 for n in self.unknown]
 
         def size(offer: Offer) -> float:
             if self.units:
@@ -103,9 +103,7 @@ class DesignedManeuver(Shown):
         """Bounds by `columns`."""
         if self.units:
             return [f"{bounds[name]:.3g}" for name in self.units]
-        return [
-            f"{100.0 * bounds[n] / (abs(self.vehicle.card.parameters[n].value) or np.nan):.3g}" for n in self.unknown
-        ]
+        return [f"{100.0 * bounds[n] / (abs(self.vehicle.numbers[n].value) or np.nan):.3g}" for n in self.unknown]
 
     def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Heading and cells: what each way to fly would tell, bounds in percent."""
@@ -130,9 +128,11 @@ class DesignedManeuver(Shown):
     def card(self) -> str:
         """The flight card, to print: what to fly, in which order, when to stop."""
         best, limits = self.best, self.limits
-        bounds = [f"{name} {cell}" for name, cell in zip(self.columns, self.cells(best.bounds), strict=True)]
+        names, unit = (tuple(self.units), "") if self.units else (self.unknown, " %")
+        bounds = [f"{name} {cell}{unit}" for name, cell in zip(names, self.cells(best.bounds), strict=True)]
         lines = [
-            f"FLIGHT CARD   {self.vehicle.name}: {self.aim or ', '.join(self.unknown)}",
+            f"FLIGHT CARD   {self.vehicle.card.title}",
+            f"To find      {self.aim or ', '.join(self.unknown)}",
             "",
             "Before",
             f"  [ ] log at {self.rate:g} Hz or faster: commands, pose, battery voltage"

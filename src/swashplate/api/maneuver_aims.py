@@ -65,7 +65,7 @@ def aim_of(text: str, models: Sequence[Vehicle], unknown: Sequence[str], control
     step = 10.0 * _STEP if of_loop else _STEP
     for model in models:
         numbers = _margin(model, controller) if of_loop else _response(model, text)
-        here, values = 1.0 if of_loop else numbers(model), [model.card.parameters[name].value for name in unknown]
+        here, values = 1.0 if of_loop else numbers(model), [model.numbers[name].value for name in unknown]
         steps = [step * (abs(value) or 1.0) for value in values]
         moved = [
             (numbers(model.with_values({n: v + s})) - numbers(model.with_values({n: v - s}))) / (2.0 * step * here)

@@ -138,7 +138,7 @@ def offer_of(
 
 
 def _fitted(piece: Maneuver, told: DesignDraws, limits: Mapping[str, float]) -> tuple[Maneuver, dict[str, float]]:
-    share, lost = 1.0, ""
+    share, lost, first = 1.0, "", ""
     for _ in range(_TRIES):
         tried = _smaller(piece, share)
         try:
@@ -147,7 +147,8 @@ def _fitted(piece: Maneuver, told: DesignDraws, limits: Mapping[str, float]) -> 
             share, lost = 0.4 * share, f" The last flight that was lost: {trouble.problem}"
             continue
         reached = {name: max(one[name] for one in every) for name in every[0]}
-        over = max(reached[name] / limits[name] for name in reached)
+        first = max(reached, key=lambda name: reached[name] / limits[name])
+        over = reached[first] / limits[first]
         if over <= 1.0:
             return tried, reached
         share *= 0.95 / over
@@ -155,7 +156,8 @@ def _fitted(piece: Maneuver, told: DesignDraws, limits: Mapping[str, float]) -> 
             break
     raise ManeuverError(
         f"not even {100.0 * share:.2g} % of the usual deflection keeps "
-        f"{limits['attitude']:g} deg, {limits['rate']:g} deg/s and {limits['place']:g} m.{lost}",
+        f"{limits['attitude']:g} deg, {limits['rate']:g} deg/s and {limits['place']:g} m"
+        f"{f' (its {first} is the first to go beyond)' if first else ''}.{lost}",
         hint="Widen the limits, or fly a controller that holds better.",
     )
 

@@ -270,6 +270,12 @@ def track(
         strange = [name for name in names_given if not any(name in e.channels for e in texts)]
         if strange:
             raise IdentificationError("stands in no equation.", channel=f"{what} {strange[0]}")
+    if useless := [name for name in instruments if all(name == e.left for e in texts if name in e.channels)]:
+        raise IdentificationError(
+            "is what its equation explains: no instrument.",
+            channel=f"instrument {useless[0]}",
+            hint="Name a command that no controller gives.",
+        )
     tracks = []
     for e in texts:
         say("estimating", note=e.text)

@@ -109,6 +109,8 @@ def report(
     """Distributions, worst rows with the command that shows each again, convergence of the quantiles, and failures."""
     import swashplate as sp
 
+    if out.suffix not in (".html", ".nc", ".csv"):
+        raise SwashError(f"ends in '{out.suffix}', expected .html, .nc or .csv.", where=out, channel="--out")
     study = sp.campaign_results(folder)
     written = sp.report(study, path=out) if out.suffix == ".html" else study.save(out)
     if not quiet:

@@ -162,7 +162,7 @@ def design(
         raise SwashError(f"ends in '{out.suffix}', expected .csv.", where=out, channel="--out")
     if script is not None and script.suffix.lower() != ".lua":
         raise SwashError(f"ends in '{script.suffix}', expected .lua.", where=script, channel="--script")
-    asked = dict(_limit(item) for item in limits.split(",") if item.strip())
+    asked = _limits(limits)
     with progress(quiet=quiet or json) as line:
         made = sp.design_maneuver(
             sp.vehicle(for_),
@@ -216,6 +216,14 @@ def need(
 
     excitation = sp.needed_excitation(validation, fit=fit, horizon=ahead)
     typer.echo(as_json(excitation.to_document()) if json else repr(excitation))
+
+
+def _limits(text: str) -> dict[str, float]:
+    pairs = [_limit(item) for item in text.split(",") if item.strip()]
+    twice = [name for k, (name, _) in enumerate(pairs) if name in dict(pairs[:k])]
+    if twice:
+        raise SwashError(f"says {', '.join(twice)} twice.", channel="--limits")
+    return dict(pairs)
 
 
 def _limit(item: str) -> tuple[str, float]:

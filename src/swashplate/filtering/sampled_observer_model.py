@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering import observer
 from swashplate.filtering.disturbances import DISTURBED
-from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverPlan
-from swashplate.simulation.compilation import RUN_RARELY
+from swashplate.filtering.observer_slopes import linearised_at
 from swashplate.simulation.discretisation import held_late, with_late_inputs
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim import Trim
 
@@ -125,17 +119,8 @@ def _late_readings(F: Array, H: Array, plan: ObserverPlan) -> tuple[Array, Array
 
 def outputs(plan: ObserverPlan, numbers: Numbers, trim: Trim) -> Array:
     """Slopes of all channels by everything estimated, about a trim."""
-    enable_double_precision()
     if not plan.sensors:
         return np.zeros((0, len(plan.names)))
-    e = np.zeros((len(plan.names), 1))
-    e[: plan.n, 0] = trim.state
-    w = np.array([*trim.inputs, float(trim.environment.voltage)])[:, None]
-    made = Numbers(*(None if part is None else jnp.asarray(part) for part in numbers))
-    return np.asarray(_outputs(plan, made, jnp.asarray(e), jnp.asarray(w)), dtype=np.float64)
-
-
-@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
-def _outputs(plan: ObserverPlan, numbers: Numbers, e: Any, w: Any) -> Any:
-    M = JaxMatrices()
-    return M.linearised(lambda e, w: observer.shown(plan, numbers, e, w, M.xp), e, w)[1]
+    e = np.concatenate([trim.state, np.zeros(len(plan.names) - plan.n)])
+    w = np.array([*trim.inputs, trim.environment.voltage], dtype=np.float64)
+    return linearised_at(observer.shown, plan, numbers, e, w)[1]

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
@@ -22,7 +20,9 @@ from swashplate.flights.schema import channel
 from swashplate.public import resolve
 from swashplate.registry import listed
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # a quarter of a second to import, and designs and trims have no flight
+    import pandas as pd
+    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -49,11 +49,8 @@ def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[st
         if data.shape != stamps.shape:
             raise FlightError(f"has {data.shape} values for {stamps.shape} time stamps.", channel=name)
         labels = {"units": unit, "frame": known.frame, "long_name": known.description}
-        # Numbers take xarray's short way: the long one imports dask where that is installed, a second and a half.
-        variables[name] = xr.Variable(("time",), data, labels, fastpath=data.dtype.kind in "biuf")
-    index = pd.Index(stamps, name="time")
-    clock = xr.IndexVariable("time", index, {"units": "s"})  # type: ignore[no-untyped-call]
-    return xr.Dataset(variables, coords={"time": clock})
+        variables[name] = storage.timed(data, labels)
+    return storage.over_time(storage.timed(stamps, {"units": "s"}), variables)
 
 
 def did_you_mean(name: str, channels: Iterable[str]) -> str | None:
@@ -176,7 +173,7 @@ class Flight:
         data = self.streams[home]
         known = channel(name)
         labels = {"units": known.unit, "frame": known.frame, "long_name": known.description}
-        added = data.assign({name: ("time", np.asarray(values), labels)})
+        added = data.assign({name: storage.timed(np.asarray(values), labels)})
         return self.with_streams({**self.streams, home: added})
 
     def between(self, start: float, stop: float) -> Flight:

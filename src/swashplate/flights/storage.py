@@ -12,17 +12,20 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
-import xarray as xr
 
 from swashplate import documents
+from swashplate.arrays import Array
 from swashplate.atomic import write_bytes
 from swashplate.errors import FlightError
 from swashplate.flights import hdf5
 from swashplate.flights.provenance import LATEST, ProcessingStep, Provenance
 from swashplate.flights.schema import SCHEMA_VERSION
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Schema = TypeVar("Schema")
 _ENGINE: Final = "h5netcdf"
@@ -61,6 +64,24 @@ def _attributes(flight: Parts) -> dict[str, Any]:
     }
 
 
+def timed(values: Array, labels: Mapping[Any, Any]) -> xr.Variable:
+    """Numbers over time with their labels, by xarray's short way: the long one imports dask where that is installed."""
+    import xarray as xr
+
+    return xr.Variable(("time",), values, labels, fastpath=values.dtype.kind in "biuf")
+
+
+def over_time(
+    time: xr.Variable, variables: Mapping[str, xr.Variable], attributes: Mapping[Any, Any] | None = None
+) -> xr.Dataset:
+    """A stream of channels that `timed` made, and its times, as a data set."""
+    import pandas as pd
+    import xarray as xr
+
+    clock = xr.IndexVariable("time", pd.Index(time.values, name="time"), time.attrs)  # type: ignore[no-untyped-call]
+    return xr.Dataset(variables, coords={"time": clock}, attrs=attributes)
+
+
 def save(flight: Parts, path: str | os.PathLike[str]) -> Path:
     """Writes a flight as a netCDF file, which appears by rename when it is complete; returns its path.
 
@@ -69,6 +90,8 @@ def save(flight: Parts, path: str | os.PathLike[str]) -> Path:
     Raises:
         WriteError: where the folder is missing or cannot be written to, or the disk is full.
     """
+    import xarray as xr
+
     attributes = _attributes(flight)
     file = io.BytesIO()
     xr.Dataset(attrs=attributes).to_netcdf(file, mode="w", engine=_ENGINE)
@@ -119,8 +142,8 @@ def _stream(name: str, group: hdf5.Group, place: Path) -> xr.Dataset:
             channel=f"{name}/time",
             hint="Copy it again.",
         )
-    made = {variable: ("time", column.values, column.attributes) for variable, column in group.variables.items()}
-    return xr.Dataset(made, coords={"time": made.pop("time")}, attrs=group.attributes)
+    made = {variable: timed(column.values, column.attributes) for variable, column in group.variables.items()}
+    return over_time(made.pop("time"), made, group.attributes)
 
 
 def _attribute(attributes: Mapping[str, str], name: str, schema: type[Schema], place: Path) -> Schema:

@@ -112,7 +112,7 @@ def hover(parameters: Any, voltage: Scalar, xp: Backend) -> tuple[dict[str, Scal
     return {"omega_lower": omega_lower, "omega_upper": omega_upper}, (*motors, 0.0, 0.0)
 
 
-def settled(inputs: Any, parameters: Any, voltage: Scalar, attitude: Any) -> dict[str, Scalar]:
+def settled(inputs: Any, parameters: Any, voltage: Scalar, attitude: Any, running: Scalar) -> dict[str, Scalar]:
     """Inner states in a slow flight: steady rotor speeds, the bar aligned with the fuselage."""
     speeds = {
         f"omega_{side}": steady_speed(
@@ -213,7 +213,7 @@ def balance(start: Vehicle, identified: Vehicle, trims: Mapping[str, float]) -> 
         logged = motors._replace(
             motor_upper=motors.motor_upper - share * upper, motor_lower=motors.motor_lower - share * lower
         )
-        speeds = settled(logged, after, after.voltage_nominal, Euler(0.0, 0.0, 0.0))
+        speeds = settled(logged, after, after.voltage_nominal, Euler(0.0, 0.0, 0.0), 0.0)
         low, high = speeds["omega_lower"] ** 2, speeds["omega_upper"] ** 2
         yaw = (before.k_torque_upper * high - before.k_torque_lower * low) / after.inertia_zz
         return yaw, (before.k_thrust_upper * high + before.k_thrust_lower * low) / after.mass - LABORATORY_GRAVITY

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from swashplate.physics import drive_train, fuselage, rotor
 from swashplate.physics.backend import Backend, Scalar
-from swashplate.physics.environment import Environment
+from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.frames import Vector, local_to_body
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
 
@@ -27,12 +27,20 @@ class Battery(NamedTuple):
     voltage_sag: Scalar
 
 
+class MotorWarmth(NamedTuple):
+    """How warm the motors' windings are: 0 as before the start, 1 as in a long hover."""
+
+    warmth: Scalar
+
+
 class MultirotorState(NamedTuple):
-    """Rigid body, rotor speeds (a named tuple omega_1 ...) and the battery (None where its voltage is measured)."""
+    """Rigid body, rotor speeds (a named tuple omega_1 ...), the battery (None where its voltage is measured) and the
+    motors (None where they are as strong cold as warm)."""
 
     body: RigidBody
     drive: Any
     battery: Battery | None
+    motors: MotorWarmth | None = None
 
 
 class MultirotorLoads(NamedTuple):
@@ -42,6 +50,7 @@ class MultirotorLoads(NamedTuple):
     moment: Vector
     drive: Any
     battery: Battery | None
+    motors: MotorWarmth | None
 
 
 def place(par: Any, number: int) -> Vector:
@@ -58,7 +67,24 @@ def steady_speed(par: Any, command: Scalar, voltage: Scalar) -> Scalar:
     )
 
 
-def speed_rates(par: Any, speeds: Any, commands: Any, voltage: Scalar) -> list[Scalar]:
+def faster_when_cold(par: Any, motors: MotorWarmth) -> Scalar:
+    """Speed [rad/s] that motors add to `steady_speed` as long as they are not warm."""
+    return par.o_cold * (1.0 - motors.warmth)
+
+
+def warming(par: Any, motors: MotorWarmth, thrust: Scalar) -> Scalar:
+    """Rate of the warmth [1/s] towards the square of the thrust over the weight.
+
+    Current is torque, torque goes with thrust, and its square heats the windings. Their resistance rises by 0.4 % a
+    kelvin (copper), and the speed that a voltage holds falls: linear about hover here, one warmth for all motors.
+    """
+    load = thrust / (par.mass * LABORATORY_GRAVITY)
+    return (load * load - motors.warmth) / par.tau_warm
+
+
+def speed_rates(
+    par: Any, speeds: Any, commands: Any, voltage: Scalar, motors: MotorWarmth | None = None
+) -> list[Scalar]:
     """Accelerations of the rotors [rad/s^2]: eq. 15, and slower for what all do alike.
 
     While rotors speed up together, their motors draw the current of it through one battery, whose voltage falls for as
@@ -67,6 +93,9 @@ def speed_rates(par: Any, speeds: Any, commands: Any, voltage: Scalar) -> list[S
     log of ten voltages a second shows the lower voltage of a new steady state, and not this.
     """
     away = [steady_speed(par, command, voltage) - omega for omega, command in zip(speeds, commands, strict=True)]
+    if motors is not None:
+        cold = faster_when_cold(par, motors)
+        away = [one + cold for one in away]
     common = sum(away) / len(away)
     together = common / (par.tau_drive + par.tau_shared)
     return [drive_train.drive_train_rate(common, one, par.tau_drive) + together for one in away]
@@ -95,7 +124,7 @@ def loads(
     Args:
         senses: of each rotor about body z (down): +1 clockwise seen from above, -1 counter-clockwise.
     """
-    body, drive, battery = state
+    body, drive, battery, motors = state
     density = env.air_density / par.air_density
     air = body.velocity + local_to_body(env.wind, body.attitude, xp).scaled(-1.0)
     voltage = env.voltage
@@ -105,7 +134,7 @@ def loads(
         air, drag_x=par.drag_x, drag_y=par.drag_y, drag_z=par.drag_z, damping_w=0.0, xp=xp
     ).scaled(density)
     moment = fuselage.yaw_damping_moment(body.r, par.damping_r)
-    rates = speed_rates(par, drive, inputs, voltage)
+    rates, lift = speed_rates(par, drive, inputs, voltage, motors), 0.0
     for i, (omega, rate, sense) in enumerate(zip(drive, rates, senses, strict=True), start=1):
         gain, arm = getattr(par, f"gain_{i}"), place(par, i)
         flow = air + body.rates.cross(arm)
@@ -114,7 +143,7 @@ def loads(
         thrust = gain * rotor.thrust(par.k_thrust, omega, density)
         pull = Vector(-across * flow.x, -across * flow.y, -thrust - through * flow.z)
         torque = gain * rotor.drag_torque(par.k_torque, omega, density)
-        force = force + pull
+        force, lift = force + pull, lift + thrust
         moment = (
             moment
             + arm.cross(pull)
@@ -123,7 +152,8 @@ def loads(
             + rotor.gyroscopic_moment(body.rates, par.inertia_drive, omega, sense)
         )
     lost = None if battery is None else Battery(sag_rate(par, battery.voltage_sag, drive, env, xp))
-    return MultirotorLoads(force, moment, type(drive)(*rates), lost)
+    warmer = None if motors is None else MotorWarmth(warming(par, motors, lift))
+    return MultirotorLoads(force, moment, type(drive)(*rates), lost, warmer)
 
 
 def derivatives(
@@ -134,7 +164,7 @@ def derivatives(
     force = acting.force + gravity(par.mass, env.gravity, state.body.attitude, xp)
     inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz)
     return MultirotorState(
-        rigid_body_rates(state.body, force, acting.moment, inertia, xp), acting.drive, acting.battery
+        rigid_body_rates(state.body, force, acting.moment, inertia, xp), acting.drive, acting.battery, acting.motors
     )
 
 

@@ -13,8 +13,10 @@ from swashplate.models.card import Card
 from swashplate.models.choices import Choice, Free, PhysicalEffect
 from swashplate.models.multirotor import (
     Battery,
+    MotorWarmth,
     MultirotorState,
     derivatives,
+    faster_when_cold,
     shaft_power,
     specific_force,
     steady_speed,
@@ -53,6 +55,7 @@ UNITS: dict[str, str] = {
 """Every parameter that does not belong to one rotor or to the battery, and its unit."""
 
 BATTERY_UNITS = {"battery_resistance": "ohm", "tau_battery": "s", "drive_efficiency": "1"}
+WARMING_UNITS = {"o_cold": "rad/s", "tau_warm": "s"}
 ROTOR_UNITS = {"rotor_{}_x": "m", "rotor_{}_y": "m", "rotor_{}_z": "m", "gain_{}": "1"}
 """Of each rotor: its place from the centre of gravity, and its thrust and torque against `k_thrust` and `k_torque`."""
 
@@ -67,6 +70,9 @@ EFFECTS = (
 )
 """What nested structures may leave out."""
 
+WARMING = PhysicalEffect("motors that lose speed as they warm", {"o_cold": 0.0})
+"""The same, where the card has it."""
+
 PUSHES = {
     **dict.fromkeys(("push_u", "push_v", "push_w"), 0.5),
     **dict.fromkeys(("push_p", "push_q", "push_r"), 5.0),
@@ -79,10 +85,10 @@ _VOLTAGE_SECONDS = 0.15
 """Averaging of a logged voltage: it is under load and follows the commands, which are shares of it."""
 
 
-def units_of(senses: Sequence[float], *, battery: bool) -> dict[str, str]:
+def units_of(senses: Sequence[float], *, battery: bool, warming: bool) -> dict[str, str]:
     """Every parameter of a multirotor with these rotors and its unit, in the order of the equations' tuple."""
     each = {name.format(i): unit for i in range(1, len(senses) + 1) for name, unit in ROTOR_UNITS.items()}
-    return {**UNITS, **(BATTERY_UNITS if battery else {}), **each}
+    return {**UNITS, **(BATTERY_UNITS if battery else {}), **(WARMING_UNITS if warming else {}), **each}
 
 
 @lru_cache(maxsize=64)
@@ -91,23 +97,24 @@ def _tuple(name: str, fields: tuple[str, ...]) -> Any:
     return NamedTuple(name, [(entry, Any) for entry in fields])
 
 
-def _options(card: Card) -> tuple[tuple[float, ...], bool]:
-    """Senses of the rotors, and whether the battery's internal resistance is in the equations."""
-    options = {"battery": "measured", **card.options}
+def _options(card: Card) -> tuple[tuple[float, ...], bool, bool]:
+    """Senses of the rotors, and whether the battery's resistance and the motors' warmth are in the equations."""
+    options = {"battery": "measured", "motors": "steady", **card.options}
     senses = options.get("senses")
     if (
-        set(options) - {"battery", "senses"}
+        set(options) - {"battery", "motors", "senses"}
         or not isinstance(senses, list | tuple)
         or any(sense not in (1, -1) for sense in senses)
         or options["battery"] not in ("measured", "resistance")
+        or options["motors"] not in ("steady", "warming")
     ):
         raise CardError(
             f"options are {dict(card.options)}, expected senses = [1, -1, ...] (1: clockwise seen from above), one for "
-            "each rotor, and battery = 'measured' or 'resistance'.",
+            "each rotor, battery = 'measured' or 'resistance', and motors = 'steady' or 'warming'.",
             where=card.where,
             channel="options",
         )
-    return tuple(float(sense) for sense in senses), options["battery"] == "resistance"
+    return tuple(float(sense) for sense in senses), options["battery"] == "resistance", options["motors"] == "warming"
 
 
 def effectiveness(par: Any, senses: Sequence[float]) -> list[list[Scalar]]:
@@ -146,7 +153,7 @@ def _terminal(par: Any, speeds: Sequence[Scalar], voltage: Scalar, xp: Backend) 
 
 
 def hover(
-    par: Any, voltage: Scalar, xp: Backend, *, senses: tuple[float, ...], battery: bool
+    par: Any, voltage: Scalar, xp: Backend, *, senses: tuple[float, ...], battery: bool, warming: bool
 ) -> tuple[dict[str, Scalar], tuple[Scalar, ...]]:
     """Hover in closed form: level, thrusts carry the weight, moments vanish, with the least sum of speeds^4.
 
@@ -160,27 +167,38 @@ def hover(
     if battery:
         at = _terminal(par, speeds, voltage, xp)
         states["voltage_sag"] = voltage - at
+    if warming:
+        states["warmth"] = 1.0
     share = par.voltage_nominal / (par.k_drive * at)
     zero = par.o_drive + par.k_drive_voltage * (at - par.voltage_nominal)
     return states, tuple((omega - zero) * share for omega in speeds)
 
 
-def settled(inputs: Any, par: Any, voltage: Scalar, attitude: Any) -> dict[str, Scalar]:
-    """Inner states in a slow flight: the rotor speeds that the measured voltage holds."""
-    return {f"omega_{i}": steady_speed(par, command, voltage) for i, command in enumerate(inputs, start=1)}
+def settled(
+    inputs: Any, par: Any, voltage: Scalar, attitude: Any, running: Scalar, *, warming: bool
+) -> dict[str, Scalar]:
+    """Inner states in a slow flight: the rotor speeds that the measured voltage holds, and motors that have carried
+    the weight for `running` seconds."""
+    if not warming:
+        return {f"omega_{i}": steady_speed(par, command, voltage) for i, command in enumerate(inputs, start=1)}
+    motors = MotorWarmth(1.0 - np.e ** (-running / par.tau_warm))
+    cold = faster_when_cold(par, motors)
+    speeds = {f"omega_{i}": steady_speed(par, command, voltage) + cold for i, command in enumerate(inputs, start=1)}
+    return speeds | motors._asdict()
 
 
-def axes(par: Any, senses: Sequence[float]) -> tuple[Axis, ...]:
+def axes(par: Any, senses: Sequence[float], *, warming: bool) -> tuple[Axis, ...]:
     """Roll, pitch, yaw and heave with the rotors that make them, from where these are and how they turn."""
     names = [f"motor_{i}" for i in range(1, len(senses) + 1)]
     rows = np.asarray(effectiveness(par, senses), dtype=np.float64)
     rows /= np.abs(rows).sum(axis=1, keepdims=True)
+    slow = tuple(WARMING_UNITS) if warming else ()
     lift, roll, pitch, yaw = (dict(zip(names, row.tolist(), strict=True)) for row in rows)
     return (
         Axis("roll", roll),
         Axis("pitch", pitch),
         Axis("yaw", yaw, ("k_torque", "inertia_drive", "inertia_zz")),
-        Axis("heave", lift, ("thrust_damping", "tau_shared", "o_drive", "k_drive_voltage")),
+        Axis("heave", lift, ("thrust_damping", "tau_shared", "o_drive", "k_drive_voltage", *slow)),
     )
 
 
@@ -191,7 +209,8 @@ def choices(card: Card) -> Mapping[str, Choice]:
     forces, and moments about z scale with `inertia_zz`: both are held. A card with the battery's resistance has no
     choice: what a log calls voltage is measured behind that resistance.
     """
-    if _options(card)[1]:
+    _, battery, warming = _options(card)
+    if battery:
         return {}
     at = card.values()
 
@@ -199,6 +218,10 @@ def choices(card: Card) -> Mapping[str, Choice]:
         return Free(name, 0.5 * sigma, at[name], sigma, source=source)
 
     rotors = [name for name in at if name.startswith("gain_")]
+    slow = (
+        near("o_cold", 0.03 * at["k_drive"], "3 % of the full speed: a winding that warms by some 30 K"),
+        near("tau_warm", 0.5 * at["tau_warm"], "the card, half its value"),
+    ) if warming else ()  # fmt: skip
     free = (
         Free("k_thrust", 0.1 * at["k_thrust"]),
         Free("k_torque", 0.2 * at["k_torque"], at["k_torque"], at["k_torque"], source="the card, as much again"),
@@ -209,6 +232,7 @@ def choices(card: Card) -> Mapping[str, Choice]:
         near("tau_shared", at["tau_drive"], "one battery for all motors: the time constant of one, as much again"),
         near("o_drive", 0.3 * at["k_drive"], "the card, three tenths of the full speed"),
         near("k_drive_voltage", 0.3 * at["k_drive"] / at["voltage_nominal"], "a third of what a share of it does"),
+        *slow,
         near("inertia_drive", at["inertia_drive"], "the card, as much again"),
         near("thrust_damping", 2.0 * at["thrust_damping"], "the card, twice its value"),
         near("flap_back", 3.0 * at["flap_back"], "the card, three times its value"),
@@ -271,8 +295,8 @@ def multirotor(card: Card) -> Vehicle:
     Raises:
         CardError: options or parameters that do not fit, or rotors that cannot lift and turn the body in every axis.
     """
-    senses, battery = _options(card)
-    units = units_of(senses, battery=battery)
+    senses, battery, warming = _options(card)
+    units = units_of(senses, battery=battery, warming=warming)
     card.checked_against(units)
     parameters = _tuple("MultirotorParameters", tuple(units))
     numbers = card.values()
@@ -288,32 +312,37 @@ def multirotor(card: Card) -> Vehicle:
     numbered = range(1, len(senses) + 1)
     drive = _tuple("MultirotorDrive", tuple(f"omega_{i}" for i in numbered))
     inputs = _tuple("MultirotorInputs", tuple(f"motor_{i}" for i in numbered))
-    sag = ("voltage_sag",) if battery else ()
+    inner = {**({"voltage_sag": "V"} if battery else {}), **({"warmth": "1"} if warming else {})}
     return Vehicle(
         card=card,
-        state=MultirotorState(RigidBody(*(0.0,) * 12), drive(*(0.0,) * len(senses)), Battery(0.0) if battery else None),
+        state=MultirotorState(
+            RigidBody(*(0.0,) * 12),
+            drive(*(0.0,) * len(senses)),
+            Battery(0.0) if battery else None,
+            MotorWarmth(0.0) if warming else None,
+        ),
         inputs=inputs,
         parameters=parameters,
-        state_names=(*RigidBody._fields, *drive._fields, *sag),
-        state_units=(*BODY_UNITS, *("rad/s",) * len(senses), *("V",) * len(sag)),
+        state_names=(*RigidBody._fields, *drive._fields, *inner),
+        state_units=(*BODY_UNITS, *("rad/s",) * len(senses), *inner.values()),
         input_names=inputs._fields,
         input_units=("1",) * len(senses),
         input_limits=((0.0, 1.0),) * len(senses),
         derivatives=partial(derivatives, senses=senses),
         specific_force=partial(specific_force, senses=senses),
         traits=Traits(
-            axes=axes(par, senses),
+            axes=axes(par, senses, warming=warming),
             observed=True,
             gyroscope=True,
             no_link="a multirotor's motors have no servo mapping; ArduPilot's and PX4's own multirotor simulators "
             "fly such a frame",
             choices=choices,
-            effects=lambda card: EFFECTS,
+            effects=lambda card: (*EFFECTS, WARMING) if warming else EFFECTS,
             recording=RecordingFit(),
             picture=picture,
             pose=pose,
-            hover=partial(hover, senses=senses, battery=battery),
-            settled=None if battery else settled,
+            hover=partial(hover, senses=senses, battery=battery, warming=warming),
+            settled=None if battery else partial(settled, warming=warming),
             power=_power,
             voltage_seconds=_VOLTAGE_SECONDS,
         ),

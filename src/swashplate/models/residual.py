@@ -1,11 +1,13 @@
 """A linear residual: accelerations that a vehicle's equations leave out, linear in its motion and commands.
 
 The accelerations of u, v, p and q by those states, roll, pitch and the inputs; those of w and r by w, r and the inputs.
-The coefficients stand on the
-card as `residual_ROW_COLUMN`, with `residual_at_INPUT`, the input from which each counts. So what has one is an
-ordinary vehicle: simulation, linearisation, controllers, exporters and the filter of a fit take it as they take any.
-Together with the gusts of that filter, which fade and are driven by the innovations, it is an autoregression with
-exogenous inputs on the innovations (ARX; Ljung 1999, sec. 4.2).
+The coefficients stand on the card as `residual_ROW_COLUMN`, with `residual_at_INPUT`, the input from which each counts.
+So what has one is an ordinary vehicle: simulation, linearisation, controllers, exporters and the filter of a fit take
+it as they take any. Together with the gusts of that filter, which fade and are driven by the innovations, it is an
+autoregression with exogenous inputs on the innovations (ARX; Ljung 1999, sec. 4.2).
+
+A residual of errors ahead has the autopilot's answers in it, and an autopilot holds its heading: there r follows psi
+too, counted from where a record or a simulation begins (`facing`). No aircraft does so by itself.
 """
 
 from __future__ import annotations
@@ -29,17 +31,37 @@ MOTION = {"u": "m/s", "v": "m/s", "w": "m/s", "phi": "rad", "theta": "rad", "p":
 _LEVEL, _TURNING = ("u", "v", "phi", "theta", "p", "q"), ("w", "r")
 ROWS = {"u": _LEVEL, "v": _LEVEL, "w": _TURNING, "p": _LEVEL, "q": _LEVEL, "r": _TURNING}
 """The accelerations that it adds, and the states that each depends on; each depends on every input too."""
+HEADING = "psi"
+"""On what r depends beside, where errors some time ahead were fitted."""
+_ROWS_AHEAD = {**ROWS, "r": (*_TURNING, HEADING)}
+_COUNTED_HEADING = f"{_AT}{HEADING}"
 
 
 def coefficients(vehicle: Vehicle) -> dict[str, tuple[str, str]]:
     """The coefficients of a vehicle's residual, whether it has one or not: row and column by name, row after row."""
-    pairs = ((row, column) for row, states in ROWS.items() for column in (*states, *vehicle.input_names))
+    return _coefficients(vehicle, heading=_COUNTED_HEADING in vehicle.card.parameters)
+
+
+def _coefficients(vehicle: Vehicle, *, heading: bool) -> dict[str, tuple[str, str]]:
+    rows = _ROWS_AHEAD if heading else ROWS
+    pairs = ((row, column) for row, states in rows.items() for column in (*states, *vehicle.input_names))
     return {f"{PREFIX}{row}_{column}": (row, column) for row, column in pairs}
 
 
 def counted_from(vehicle: Vehicle) -> dict[str, float]:
     """By input, the value from which the residual of a vehicle counts it."""
     return {name: vehicle.card.parameters[f"{_AT}{name}"].value for name in vehicle.input_names}
+
+
+def facing(vehicle: Vehicle, heading: float) -> Vehicle:
+    """The vehicle with the heading [rad] from which its residual counts, where it counts one."""
+    counted = _COUNTED_HEADING in vehicle.card.parameters
+    return vehicle.with_values({_COUNTED_HEADING: heading}) if counted else vehicle
+
+
+def heading_counted(vehicle: Vehicle) -> float:
+    """That heading [rad]; 0 where it counts none."""
+    return vehicle.card.values().get(_COUNTED_HEADING, 0.0)
 
 
 def has_residual(card: Card) -> bool:
@@ -84,7 +106,7 @@ def with_residual(vehicle: Vehicle, about: Mapping[str, float], *, ahead: float 
         CardError: for what has one already, lacks a state, or is a linear model.
     """
     _suited(vehicle)
-    columns = {**MOTION, **dict(zip(vehicle.input_names, vehicle.input_units, strict=True))}
+    columns = {**MOTION, HEADING: "rad", **dict(zip(vehicle.input_names, vehicle.input_units, strict=True))}
     note = "a linear residual: no physics"
 
     def entry(value: float, unit: str) -> Parameter:
@@ -92,9 +114,10 @@ def with_residual(vehicle: Vehicle, about: Mapping[str, float], *, ahead: float 
 
     entries = {
         name: entry(0.0, f"({MOTION[row]}/s) / ({columns[column]})")
-        for name, (row, column) in coefficients(vehicle).items()
+        for name, (row, column) in _coefficients(vehicle, heading=ahead > 0.0).items()
     }
-    entries |= {f"{_AT}{name}": entry(about[name], columns[name]) for name in vehicle.input_names}
+    counted = {name: about[name] for name in vehicle.input_names} | ({HEADING: 0.0} if ahead > 0.0 else {})
+    entries |= {f"{_AT}{name}": entry(value, columns[name]) for name, value in counted.items()}
     entries[_AHEAD] = entry(ahead, "s")
     return joined(vehicle, replace(vehicle.card, parameters={**vehicle.card.parameters, **entries}))
 
@@ -122,14 +145,17 @@ def joined(vehicle: Vehicle, card: Card) -> Vehicle:
         CardError: where a coefficient is missing, or is none of this vehicle's.
     """
     _suited(vehicle)
-    names = (*coefficients(vehicle), *(f"{_AT}{name}" for name in vehicle.input_names), _AHEAD)
+    heading = _COUNTED_HEADING in card.parameters
+    counted = (*vehicle.input_names, *((HEADING,) if heading else ()))
+    names = (*_coefficients(vehicle, heading=heading), *(f"{_AT}{name}" for name in counted), _AHEAD)
     on_card = [name for name in card.parameters if name.startswith(PREFIX)]
     for name in (*names, *on_card):
         if name not in on_card or name not in names:
             what = "is missing" if name in names else f"is no coefficient of '{vehicle.name}'"
             raise CardError(f"{what}.", where=card.where, channel=name, hint="Identify anew with --residual.")
     parameters = _wider(vehicle.parameters, names)
-    given = {"own": vehicle.parameters, "names": vehicle.input_names}
+    rows = tuple((_ROWS_AHEAD if heading else ROWS).items())
+    given = {"own": vehicle.parameters, "names": vehicle.input_names, "rows": rows}
     return replace(
         vehicle,
         card=card,
@@ -158,30 +184,36 @@ def _wider(parameters: Any, names: tuple[str, ...]) -> Any:
     return NamedTuple(parameters.__name__, [(name, Any) for name in (*parameters._fields, *names)])
 
 
-def residual(state: Any, inputs: Any, par: Any, *, names: tuple[str, ...]) -> tuple[Scalar, ...]:
+_Rows = tuple[tuple[str, tuple[str, ...]], ...]
+
+
+def residual(state: Any, inputs: Any, par: Any, *, names: tuple[str, ...], rows: _Rows) -> tuple[Scalar, ...]:
     """The accelerations of u, v, w [m/s^2] and p, q, r [rad/s^2] that the residual adds."""
     away = {name: value - getattr(par, f"{_AT}{name}") for name, value in zip(names, inputs, strict=True)}
     columns = {name: getattr(state.body, name) for name in MOTION} | away
+    if hasattr(par, _COUNTED_HEADING):
+        columns[HEADING] = state.body.psi - getattr(par, _COUNTED_HEADING)
     return tuple(
-        sum(getattr(par, f"{PREFIX}{row}_{name}") * columns[name] for name in (*states, *away))
-        for row, states in ROWS.items()
+        sum(getattr(par, f"{PREFIX}{row}_{name}") * columns[name] for name in (*states, *away)) for row, states in rows
     )
 
 
 def _derivatives(
-    state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any
-) -> Any:
+    state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any,
+    rows: _Rows,
+) -> Any:  # fmt: skip
     """Time derivative of the whole state: the equations' own, and the residual's accelerations."""
     rates = of(state, inputs, own(*par[: len(own._fields)]), env, xp)
-    added = dict(zip(ROWS, residual(state, inputs, par, names=names), strict=True))
+    added = dict(zip(ROWS, residual(state, inputs, par, names=names, rows=rows), strict=True))
     body = rates.body._replace(**{row: getattr(rates.body, row) + value for row, value in added.items()})
     return rates._replace(body=body)
 
 
 def _specific_force(
-    state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any
-) -> Vector:
+    state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any,
+    rows: _Rows,
+) -> Vector:  # fmt: skip
     """What an accelerometer at the centre of gravity reads [m/s^2]: the residual's force is one that it feels."""
     x, y, z = of(state, inputs, own(*par[: len(own._fields)]), env, xp)
-    ax, ay, az = residual(state, inputs, par, names=names)[:3]
+    ax, ay, az = residual(state, inputs, par, names=names, rows=rows)[:3]
     return Vector(x + ax, y + ay, z + az)

@@ -23,7 +23,7 @@ Pose = Callable[[Sequence[float], Sequence[float], Environment], dict[str, Any]]
 """From a state row, an input row and surroundings to how the moving parts stand (see `Traits.pose`)."""
 Doubts = Callable[[Model, Array, Array, Environment], Mapping[str, str]]
 Hover = Callable[[Any, Scalar, Backend], tuple[Mapping[str, Scalar], Sequence[Scalar]]]
-Settled = Callable[[Any, Any, Scalar, Any], Mapping[str, Scalar]]
+Settled = Callable[[Any, Any, Scalar, Any, Scalar], Mapping[str, Scalar]]
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,8 @@ class Traits:
         pose: of a vehicle, the function from state, inputs and surroundings to how its moving parts stand.
         hover: from parameters, voltage [V] and operations to the hover in closed form: states that are not zero, and
             inputs; None where it is found by Newton's method.
-        settled: from inputs, parameters, voltage and attitude to the inner states in slow flight, by name; None where
-            they are found where they rest.
+        settled: from inputs, parameters, voltage, attitude and the seconds since the flight's time zero to the inner
+            states in slow flight, by name; None where they are found where they rest.
         doubts: what of its equations does not hold at a state, in words by kind; None where nothing is known.
         power: of a state, the shaft power [W]; None where it has none.
         balance: from the vehicle before a fit, the one after it and the motors' trims, what keeps it in balance, in

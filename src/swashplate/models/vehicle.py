@@ -9,10 +9,10 @@ from typing import Any
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import CardError
-from swashplate.models.card import Card
+from swashplate.models.card import Card, Parameter
 from swashplate.models.choices import Choice
 from swashplate.models.linear.answering import LinearResponse
-from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.surroundings import environment_of
 from swashplate.models.traits import Traits
@@ -85,6 +85,11 @@ class Vehicle:
     @property
     def parameter_names(self) -> tuple[str, ...]:
         return tuple(self.parameters._fields)
+
+    @property
+    def numbers(self) -> Mapping[str, Parameter | ModelParameter]:
+        """What may be fitted or varied, by name: the parameters of its structure where it has one, else of its card."""
+        return self.card.parameters if self.structure is None else self.structure.parameters
 
     def values(self) -> Any:
         """The card's numbers as the equations want them."""

@@ -17,15 +17,17 @@ from swashplate.reporting.words import counted
 
 _BINS = 40
 _POINTS = 24
+_DIGITS = tuple("+-.0123456789")
 _COLOURS = (MODEL, VERMILION, *INPUT_COLORS)
 
 
 class WorstRow(NamedTuple):
-    """One row of a campaign: its number, its task's seed, and how bad it was in the shown unit."""
+    """One row of a campaign: its number, its task's seed, how bad it was in the shown unit, and what shows it again."""
 
     number: int
     seed: int
     value: float
+    command: str
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ def compose_campaign(
         sections.append(Section("spread", "How they are spread", blocks))
         sections.append(Section("convergence", "Whether there were enough", (_convergence(shapes, shares, rows),)))
     if worst:
-        sections.append(Section("worst", f"The worst by {worst_by}", (_worst(worst, rows, worst_by, folder),)))
+        sections.append(Section("worst", f"The worst by {worst_by}", (_worst(worst, rows, worst_by),)))
     if failed:
         sections.append(Section("failed", "What failed", (_failed(failed, folder),)))
     return Report(
@@ -135,7 +137,13 @@ def _label(shape: Shape) -> str:
 
 
 def _plain(caption: str, head: tuple[str, ...], cells: tuple[tuple[str, ...], ...]) -> Block:
-    return Table(caption, head, tuple(tuple(Cell(words, number=k > 0) for k, words in enumerate(row)) for row in cells))
+    return Table(
+        caption,
+        head,
+        tuple(
+            tuple(Cell(words, number=k > 0 and words[:1] in _DIGITS) for k, words in enumerate(row)) for row in cells
+        ),
+    )
 
 
 def _quantiles(shapes: Sequence[Shape], shares: Sequence[float], rows: str) -> Table:
@@ -215,13 +223,13 @@ def _convergence(shapes: Sequence[Shape], shares: Sequence[float], rows: str) ->
     )
 
 
-def _worst(worst: Sequence[WorstRow], rows: str, by: str, folder: str) -> Table:
+def _worst(worst: Sequence[WorstRow], rows: str, by: str) -> Table:
     cells = tuple(
         (
             Cell(str(row.number)),
             Cell(f"{row.value:.5g}", True),
             Cell(str(row.seed), True),
-            Cell(f"swash campaign replay {folder} {row.number} -o worst-{row.number}.nc"),
+            Cell(row.command),
         )
         for row in worst
     )

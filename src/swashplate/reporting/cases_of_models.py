@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from swashplate.arrays import Complex
 from swashplate.identification.frequency.response_cost import Target, cost_of
@@ -63,6 +62,8 @@ def match(first: Sequence[complex], other: Sequence[complex]) -> list[int | None
     """For each eigenvalue of the first the other's that is it, None for none: nearest over all at once."""
     if not (first and other):
         return [None] * len(first)
+    from scipy.optimize import linear_sum_assignment  # a tenth of a second, and every report imports this module
+
     a, b = np.array(first)[:, None], np.array(other)[None, :]
     away = np.abs(a - b) / np.maximum(np.abs(a), np.abs(b))
     rows, columns = linear_sum_assignment(np.minimum(away, 2.0 * _SAME))

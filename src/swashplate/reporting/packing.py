@@ -9,14 +9,20 @@ from __future__ import annotations
 
 import base64
 import gzip
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import platformdirs
 
 from swashplate.arrays import Array
+from swashplate.atomic import write_text
+from swashplate.errors import WriteError
 from swashplate.extras import library
 from swashplate.reporting.figures.themes import unpacked
 from swashplate.reporting.structure import Figure
@@ -28,12 +34,26 @@ _GAP = 65535
 
 @cache
 def plotly_script() -> str:
-    """plotly.js as base64 of gzip.
+    """plotly.js as base64 of gzip; kept in the user's cache folder with its digest, for it takes a tenth of a second.
 
     Raises:
         SwashError: plotly missing, with the command that installs it.
     """
-    return _squeezed(str(library("plotly.offline", what="a page").get_plotlyjs()).encode("utf-8"))
+    script = str(library("plotly.offline", what="a page").get_plotlyjs()).encode("utf-8")
+    place = Path(platformdirs.user_cache_dir("swashplate")) / "pages" / f"plotly-{_digest(script)}.txt"
+    with suppress(OSError, ValueError):
+        digest, _, known = place.read_text(encoding="ascii").partition("\n")
+        if digest == _digest(known.encode("ascii")):
+            return known
+    text = _squeezed(script)
+    with suppress(OSError, WriteError):  # without it, it is made again the next time
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_text(place, f"{_digest(text.encode('ascii'))}\n{text}")
+    return text
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def figures_text(figures: Sequence[Figure]) -> str:

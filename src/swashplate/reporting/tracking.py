@@ -41,7 +41,8 @@ def compose_tracking(
 
 def _stood(tracks: Sequence[Tracked]) -> str:
     times = max((len(one.frozen) for one in tracks), default=0)
-    return f"{times} times, see below" if times else "never: no gap, no value that is no number"
+    often = "once" if times == 1 else f"{times} times"
+    return f"{often}, see below" if times else "never: no gap, no value that is no number"
 
 
 def _blocks(one: Tracked, k: int, source: str) -> tuple[Text | Points | Table | Figure, ...]:
@@ -71,6 +72,7 @@ def _blocks(one: Tracked, k: int, source: str) -> tuple[Text | Points | Table | 
 
 def _figure(one: Tracked, k: int, source: str) -> Figure:
     layout = stacked([quantity(name, unit) for name, unit in zip(one.names, one.units, strict=True)], height=_HEIGHT)
+    layout["margin"] = {**layout["margin"], "l": 78}  # converged estimates have long numbers at their axes
     traces = []
     for i, name in enumerate(one.names):
         number = "" if i == 0 else str(i + 1)

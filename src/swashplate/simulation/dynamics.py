@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any
@@ -13,12 +13,14 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.models.nesting import rebuild
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import JaxBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import RUN_RARELY, compile_small_loops_whole
+from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.trigonometry import vector_backend
 
 Rates = Callable[[Any, Any, Any, Environment], Any]
@@ -91,10 +93,8 @@ def parameter_row(vehicle: Vehicle, environment: Environment) -> NDArray[np.floa
     return np.array([*vehicle.values(), *constants], dtype=np.float64)
 
 
-def unpack_rows(
-    equations: Equations, w: Float[jax.Array, "driving ..."], p: Float[jax.Array, "parameters ..."]
-) -> tuple[Any, Any, Environment]:
-    """Inputs, named parameters and environment from a driving row `w` and a parameter row `p`."""
+def unpack_rows(equations: Equations, w: Any, p: Any) -> tuple[Any, Any, Environment]:
+    """Inputs, named parameters and environment from a driving row `w` and a parameter row `p`, or batches of these."""
     n_inputs, names = len(equations.vehicle.input_names), equations.vehicle.parameter_names
     parameters = equations.vehicle.parameters(*(p[i] for i in range(len(names))))
     surroundings = {name: w[n_inputs + i] for i, name in enumerate(SURROUNDINGS)}
@@ -147,14 +147,31 @@ def row_force(equations: Equations, *, xp: JaxBackend | None = None) -> RowRates
     return felt
 
 
+def rates_and_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
+    """The rates of a state row, and their slopes by it and by what drives it; rows as in `row_rates`.
+
+    By numbers that carry their slopes, which compiles nothing, or by XLA where the equations cannot take these.
+    """
+
+    def rates(x: Sequence[Any], w: Sequence[Any]) -> list[Any]:
+        u, parameters, environment = unpack_rows(equations, w, p.tolist())
+        return equations.vehicle.rates(x, u, parameters, environment, DUAL)
+
+    try:
+        values, slopes = slopes_of(rates, x, w)
+    except CANNOT:
+        values, by_x, by_w = _compiled_slopes(equations, x, w, p)
+        return np.asarray(values), np.asarray(by_x), np.asarray(by_w)
+    return values, slopes[:, : len(x)], slopes[:, len(x) :]
+
+
 @partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
-def rates_and_slopes(
+def _compiled_slopes(
     equations: Equations,
     x: Float[jax.Array, " states"],
     w: Float[jax.Array, " driving"],
     p: Float[jax.Array, " parameters"],
 ) -> tuple[Any, Any, Any]:
-    """The rates of a state row, and their slopes by it and by what drives it; rows as in `row_rates`."""
     rates = row_rates(equations, padded=False)
 
     def both(x: Float[jax.Array, " states"], w: Float[jax.Array, " driving"]) -> tuple[Any, Any]:

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
+from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.earth import Earth
 from swashplate.physics.environment import Environment
@@ -92,6 +93,8 @@ def simulate(
     time, rows = driving_rows(vehicle, inputs, rate=rate, environment=surroundings, interpolation=interpolation)
     first = surroundings._replace(**dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :], strict=True)))
     x0 = start_row(vehicle, start, first)
+    if HEADING in vehicle.state_names:
+        vehicle = facing(vehicle, float(x0[vehicle.index(HEADING)]))
     check_step(vehicle, np.asarray(x0), rows[0, : len(vehicle.input_names)], first, rate=rate, substeps=substeps)
     acting = acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first)
     numbers = parameter_row(vehicle, surroundings)

@@ -13,11 +13,11 @@ from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Result
+from swashplate.identification.core.spans import CALIBRATION
+from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.validation import block_bootstrap
-from swashplate.validation.calibration import calibrate
 from swashplate.validation.prediction import predict
-from swashplate.validation.spans import CALIBRATION
 from swashplate.validation.validate import observer_of
 
 CHANNELS = ("u", "v", "w", "phi", "theta", "p", "q", "r")

@@ -16,6 +16,7 @@ from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, St
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import gain_at, steady_gain
 from swashplate.identification.core.records import Record
+from swashplate.identification.core.spans import HORIZONS
 from swashplate.identification.time.beginning import (
     FilterNumbers,
     begun,
@@ -23,13 +24,13 @@ from swashplate.identification.time.beginning import (
     seen_at_start,
     starting_samples,
 )
+from swashplate.identification.time.calibration import as_begun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.record_filter import ahead_of, along
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import lengthened
 from swashplate.validation.closed_loop import closed_ahead
 from swashplate.validation.controller_law import Law, learnt
-from swashplate.validation.spans import HORIZONS
 
 SETTLING = 2.0
 """Seconds before the first start point, for the observer to forget its first guess."""
@@ -114,6 +115,7 @@ def predict(
 
 def observed(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, beyond: int) -> Observed:
     """The causal observer of a vehicle along a record, whose last commands hold for `beyond` samples more."""
+    vehicle = as_begun(vehicle, record)
     model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
     n = record.time.size
     inputs, voltage = (lengthened(rows, n + beyond) for rows in (record.inputs, record.voltage))

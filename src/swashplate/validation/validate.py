@@ -17,6 +17,8 @@ from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.sources import sources_of
+from swashplate.identification.core.spans import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION
+from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.feedback import excitation
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
@@ -29,14 +31,12 @@ from swashplate.simulation.record import monitored
 from swashplate.validation import innovations
 from swashplate.validation.bands import BandedRecord, bands, check_draws
 from swashplate.validation.black_box import FilteredMotion
-from swashplate.validation.calibration import calibrate
 from swashplate.validation.contact import Contact, contact
 from swashplate.validation.controller_law import Law, check_closed
 from swashplate.validation.flight_floors import ClosedRecord, ScoredRecord, closed_floors, flight_floors, motion_of
 from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.paths import spread
 from swashplate.validation.prediction import Predictions, naive, predict, prediction_sigma
-from swashplate.validation.spans import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION
 from swashplate.validation.validation import Example, Score, Validation
 from swashplate.validation.verdict import THRESHOLDS, verdict
 

@@ -8,11 +8,11 @@ from typing import Any, overload
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.result import Result
+from swashplate.identification.core.spans import CALIBRATION, HORIZONS
 from swashplate.identification.time.flight_details import FlightDetails
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
-from swashplate.validation.spans import CALIBRATION, HORIZONS
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 from swashplate.validation.verify import verify

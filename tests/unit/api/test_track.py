@@ -96,6 +96,7 @@ def test_models_give_their_equations_and_renamed_channels_are_found() -> None:
         ("q_dot = Mq*q", {"delays": {"alpha": 0.1}}, IdentificationError),
         ("q_dot = Mq*q", {"held": ["servo_pich"]}, IdentificationError),
         ("q_dot = Mq*q", {"instruments": ["servo_pich"]}, IdentificationError),
+        ("q_dot = Mq*q", {"instruments": ["q"]}, IdentificationError),
         ("q_dot = Mq*q", {"rate": 2.0}, IdentificationError),
         ([], {}, IdentificationError),
     ],

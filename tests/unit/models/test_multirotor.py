@@ -16,8 +16,12 @@ from swashplate.compiler import compiler
 from swashplate.errors import CardError
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import trace_vehicle
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import stochastic_model
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight, Provenance, stream
-from swashplate.identification.core.records import records
+from swashplate.identification.core.records import POSE, Record, records
+from swashplate.identification.time.beginning import FilterNumbers, begun, seen_at_start
 from swashplate.models.card import Card, Parameter, packaged_cards
 from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
@@ -30,16 +34,25 @@ XP = FloatBackend()
 STATE = [0.1, -0.2, -1.0, 0.7, -0.5, 0.3, 0.2, -0.1, 0.6, 0.8, -0.6, 0.4]  # a body that moves in every way
 RESISTANCE = {"battery_resistance": (0.08, "ohm"), "tau_battery": (0.05, "s"), "drive_efficiency": (0.4, "1")}
 
+WARMING = {"o_cold": (60.0, "rad/s"), "tau_warm": (10.0, "s")}
+
 
 def crazyflie(**values: float) -> Vehicle:
     return sp.vehicle("crazyflie").with_values(values)
 
 
-def with_resistance(name: str = "crazyflie") -> Vehicle:
-    card = packaged_cards()[name]
-    more = {key: Parameter(value, unit, "test", "assumed") for key, (value, unit) in RESISTANCE.items()}
-    options = {**card.options, "battery": "resistance"}
-    return from_card(replace(card, options=options, parameters={**card.parameters, **more}))
+def _with(more: dict[str, tuple[float, str]], **options: str) -> Vehicle:
+    card = packaged_cards()["crazyflie"]
+    added = {key: Parameter(value, unit, "test", "assumed") for key, (value, unit) in more.items()}
+    return from_card(replace(card, options={**card.options, **options}, parameters={**card.parameters, **added}))
+
+
+def with_resistance() -> Vehicle:
+    return _with(RESISTANCE, battery="resistance")
+
+
+def with_warming() -> Vehicle:
+    return _with(WARMING, motors="warming")
 
 
 def rates(vehicle: Vehicle, x: Any, u: Any, env: Environment | None = None) -> np.ndarray:
@@ -183,12 +196,84 @@ def test_the_battery_gives_what_its_resistance_leaves() -> None:
     assert not vehicle.choices  # a log's voltage lies behind the resistance: nothing is offered to be fitted
 
 
+def test_motors_that_warm_are_the_same_aircraft_in_a_long_hover() -> None:
+    vehicle = with_warming()
+    states, inputs = vehicle.traits.hover(vehicle.values(), 3.7, XP)  # type: ignore[misc]
+    x = [states.get(state, 0.0) for state in vehicle.state_names]
+    assert np.max(np.abs(rates(vehicle, x, inputs))) < 1e-10
+    plain = crazyflie()
+    assert inputs == plain.traits.hover(plain.values(), 3.7, XP)[1]  # type: ignore[misc]
+    both = _with({**RESISTANCE, **WARMING}, battery="resistance", motors="warming")
+    assert both.state_names[-2:] == ("voltage_sag", "warmth")
+    states, inputs = both.traits.hover(both.values(), 4.0, XP)  # type: ignore[misc]
+    x = [states.get(state, 0.0) for state in both.state_names]
+    assert np.max(np.abs(rates(both, x, inputs, Environment(voltage=4.0)))) < 1e-9
+
+
+def test_a_warmer_winding_costs_the_speed_that_its_circuit_says() -> None:
+    """V = Ke w + R (1 + a dT) I with k_torque w^2 = Ke I, heated by I^2: speed and heat of the linear equations."""
+    k_torque, Ke, R, copper, hover = 1e-10, 7e-4, 1.2, 0.0039, 2050.0
+    rise = 30.0  # of the winding in a long hover [K]
+
+    def speed(voltage: float, warmer: float) -> float:  # the positive root of the circuit
+        b = R * (1.0 + copper * warmer) * k_torque / Ke
+        return (-Ke + math.sqrt(Ke**2 + 4.0 * b * voltage)) / (2.0 * b)
+
+    volts = Ke * hover + R * (1.0 + copper * rise) * k_torque / Ke * hover**2
+    assert speed(volts, rise) == pytest.approx(hover, rel=1e-12)
+    vehicle = with_warming().with_values({"o_cold": speed(volts, 0.0) - hover})
+    par, half = vehicle.values(), 0.5
+    states, inputs = vehicle.traits.hover(par, 3.7, XP)  # type: ignore[misc]
+    x = np.array([states.get(state, 0.0) for state in vehicle.state_names])
+    x[-1] = half
+    faster = rates(vehicle, x, inputs)[12] * (
+        par.tau_drive + par.tau_shared
+    )  # towards the speed that the voltage holds
+    assert faster == pytest.approx(speed(volts, half * rise) - hover, rel=0.03)
+    x[12:16] *= 1.1
+    heat = (1.1**2) ** 2  # current goes with torque, torque with the square of speed, heat with the square of current
+    assert rates(vehicle, x, inputs)[-1] * par.tau_warm == pytest.approx(heat - half, rel=1e-9)
+
+
+def test_a_record_begins_with_motors_as_warm_as_its_time_says() -> None:
+    """From time zero on the weight is carried: the same exponential as the equations have, integrated here."""
+    vehicle = with_warming()
+    par, settled = vehicle.values(), vehicle.traits.settled
+    states, inputs = vehicle.traits.hover(par, 3.7, XP)  # type: ignore[misc]
+    warmth, dt = 0.0, 0.01
+    x = np.array([states.get(state, 0.0) for state in vehicle.state_names])
+    for _ in range(600):
+        x[-1] = warmth
+        warmth += dt * rates(vehicle, x, inputs)[-1]
+    told = settled(vehicle.inputs(*inputs), par, 3.7, None, 6.0)  # type: ignore[misc]
+    assert told["warmth"] == pytest.approx(warmth, abs=1e-3)
+    assert told["omega_1"] == pytest.approx(states["omega_1"] + par.o_cold * (1.0 - told["warmth"]), rel=1e-12)
+    n = 200
+    still, volts = np.zeros((n, len(POSE))), np.full(n, 3.7)
+    piece = Record("made", 6.0 + dt * np.arange(n), np.tile(inputs, (n, 1)), still, volts, POSE, voltage_known=True)
+    begin = seen_at_start(vehicle, piece)
+    noises = (np.array(row, dtype=np.float64) for row in (par, Noise(), Nuisance(), inputs))
+    first = begun(stochastic_model(vehicle, POSE, 0.01), FilterNumbers(*noises), begin)
+    assert first.x[-1] == pytest.approx(told["warmth"], rel=1e-12)
+
+
+def test_warming_may_be_fitted_and_left_out_where_the_card_has_it() -> None:
+    vehicle = with_warming()
+    assert {"o_cold", "tau_warm"} <= {free.name for free in vehicle.choices["full"].free}
+    assert not {"o_cold", "tau_warm"} & {free.name for free in crazyflie().choices["full"].free}
+    assert "o_cold" in vehicle.traits.effects(vehicle.card)[-1].without
+    heave = next(axis for axis in vehicle.traits.axes if axis.name == "heave")
+    assert {"o_cold", "tau_warm"} <= set(heave.parameters)
+
+
 def _broken(**changes: Any) -> Card:
     card = packaged_cards()["crazyflie"]
     return replace(card, options={**card.options, **changes})
 
 
-@pytest.mark.parametrize("changes", [{"senses": [1, 1, 2, -1]}, {"senses": "xx"}, {"battery": "big"}, {"arms": 4}])
+@pytest.mark.parametrize(
+    "changes", [{"senses": [1, 1, 2, -1]}, {"senses": "xx"}, {"battery": "big"}, {"motors": "hot"}, {"arms": 4}]
+)
 def test_wrong_options_are_named(changes: dict[str, Any]) -> None:
     with pytest.raises(CardError, match="senses"):
         from_card(_broken(**changes))
@@ -205,10 +290,12 @@ def test_rotors_that_cannot_turn_the_body_are_refused() -> None:
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
-@pytest.mark.parametrize("kind", ["measured", "resistance"])
+@pytest.mark.parametrize("kind", ["measured", "both"])
 def test_exported_c_has_the_same_rates(kind: str, tmp_path: Path) -> None:
     pytest.importorskip("casadi", reason="the extra 'export' is not installed")
-    vehicle = with_resistance() if kind == "resistance" else sp.vehicle("crazyflie")
+    vehicle = sp.vehicle("crazyflie")
+    if kind == "both":
+        vehicle = _with({**RESISTANCE, **WARMING}, battery="resistance", motors="warming")
     env = Environment(wind_north=0.5, wind_east=-0.3, wind_down=0.1, air_density=1.15, gravity=9.80665, voltage=3.9)
     trim = sp.trim(vehicle, environment=env)
     model = trace_vehicle(vehicle, trim, name="multirotor")

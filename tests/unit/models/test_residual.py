@@ -14,7 +14,7 @@ from swashplate.errors import CardError
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import trace_vehicle
 from swashplate.models.nesting import rebuild
-from swashplate.models.residual import ROWS, coefficients, refuse_predictor, with_residual
+from swashplate.models.residual import ROWS, coefficients, facing, refuse_predictor, with_residual
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
@@ -117,3 +117,30 @@ def test_exported_c_carries_it(tmp_path: Path) -> None:
     x, u = np.array(state(made)), np.full(4, 0.85)
     (found,) = run.call("rates", x, u, s, p, out=(x.size,))
     np.testing.assert_allclose(found, made.rates(x, u, made.values(), trim.environment), rtol=1e-11, atol=1e-9)
+
+
+def test_a_residual_of_errors_ahead_holds_the_heading_it_began_with(tmp_path: Path) -> None:
+    plain = sp.vehicle("crazyflie")
+    made = with_residual(plain, dict.fromkeys(plain.input_names, 0.8), ahead=0.5).with_values({"residual_r_psi": -9.0})
+    x, u = state(plain), [0.8] * 4
+    began = facing(made, 2.0)
+    turned = [2.1 if name == "psi" else value for name, value in zip(plain.state_names, x, strict=True)]
+    added = (
+        began.rates(turned, u, began.values())[plain.index("r")]
+        - plain.rates(turned, u, plain.values())[plain.index("r")]
+    )
+    assert added == pytest.approx(-9.0 * 0.1)
+    assert facing(plain, 2.0) is plain
+    assert facing(wider(), 2.0).card == wider().card  # what is no autopilot's knows no heading
+    assert equations_of(made) != equations_of(wider())
+    made.save(tmp_path / "model.toml")
+    assert sp.vehicle(tmp_path / "model.toml").card.values() == made.card.values()
+
+
+def test_a_predictor_simulates_alike_wherever_the_nose_points() -> None:
+    plain = sp.vehicle("crazyflie")
+    made = with_residual(plain, dict.fromkeys(plain.input_names, 0.8), ahead=0.5).with_values({"residual_r_psi": -9.0})
+    inputs = np.tile(sp.trim(plain).inputs, (20, 1))
+    ends = [sp.simulate(made, inputs, start={"psi": psi, "r": 0.3}).values("r")[-1] for psi in (0.0, 2.0)]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+    assert ends[0] < 0.3

@@ -14,10 +14,10 @@ from swashplate.errors import FlightError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record, records
+from swashplate.identification.core.spans import CALIBRATION
+from swashplate.identification.time.calibration import calibrate, first_part
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.validation.calibration import calibrate, first_part
 from swashplate.validation.prediction import Predictions, predict
-from swashplate.validation.spans import CALIBRATION
 from swashplate.validation.validate import observer_of, validate
 from swashplate.validation.validation import PREDICTORS, Validation
 

@@ -14,7 +14,7 @@ from swashplate.api.campaigns.flown import vehicle_of
 from swashplate.api.campaigns.kind import CampaignSettings, NamedFile
 from swashplate.api.campaigns.tasks import Columns
 from swashplate.arrays import Array
-from swashplate.errors import SwashError
+from swashplate.errors import CampaignError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.parameters import parameterize
@@ -45,8 +45,15 @@ class FitCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, fr
 
         Raises:
             IdentificationError, CardError: for names that the model does not have.
+            CampaignError: for names beside a state-space model, whose file says itself what is free.
         """
         if model.structure is not None:
+            if self.free is not None:
+                raise CampaignError(
+                    f"is {self.free!r}, and '{model.structure.name}' is a state-space model.",
+                    channel="free",
+                    hint="Leave it out: what its file does not call fixed is free.",
+                )
             return model.structure.free
         return parameterize(model, "full" if self.free is None else self.free, ties=self.ties).names
 
@@ -146,18 +153,14 @@ def _identified(model: Vehicle) -> Vehicle | StateSpaceModel:
     return model if model.structure is None else model.structure
 
 
-def _entries(model: Vehicle) -> Mapping[str, Any]:
-    return model.card.parameters if model.structure is None else model.structure.parameters
-
-
 def values_of(model: Vehicle, names: Sequence[str]) -> Array:
     """Values of a model's numbers (p,)."""
-    return np.array([_entries(model)[name].value for name in names], dtype=np.float64)
+    return np.array([model.numbers[name].value for name in names], dtype=np.float64)
 
 
 def spreads_of(model: Vehicle, names: Sequence[str]) -> Array:
     """Standard deviations of a model's numbers (p,), one where none is known."""
-    return np.array([getattr(_entries(model)[name], "sigma", None) or 1.0 for name in names], dtype=np.float64)
+    return np.array([getattr(model.numbers[name], "sigma", None) or 1.0 for name in names], dtype=np.float64)
 
 
 def within_bounds(model: Vehicle, names: Sequence[str], values: Array) -> Array:

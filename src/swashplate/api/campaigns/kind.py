@@ -78,6 +78,7 @@ class CampaignFindings:
         careful: what a reader must see first.
         counted: column of 0 and 1 whose share of ones is told of each choice of a sweep; "" where none is.
         curves: lines of one figure.
+        again: ending of the file that `replay` writes of a row.
     """
 
     summary: tuple[tuple[str, str, str], ...]
@@ -87,6 +88,7 @@ class CampaignFindings:
     careful: tuple[str, ...] = ()
     counted: str = ""
     curves: tuple[ChoiceCurve, ...] = ()
+    again: str = ".json"
 
 
 class CampaignKind(Protocol):

@@ -13,13 +13,14 @@ from typing import Any
 import msgspec
 
 from swashplate import documents
+from swashplate.api.campaigns.flown import vehicle_of
 from swashplate.api.campaigns.kind import CAMPAIGNS, NO_RESULT, CampaignKind, CampaignSettings
 from swashplate.api.campaigns.pool import ProcessPool
 from swashplate.api.campaigns.program import differences, program
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask, Portion, made_tasks
 from swashplate.api.campaigns.worker import work
-from swashplate.errors import CampaignError
+from swashplate.errors import CampaignError, SwashError
 from swashplate.files import is_file
 
 _HINT = "See `swash campaign run --help` and docs/howto/campaigns.md."
@@ -176,20 +177,23 @@ def _planned(text: str, place: Path, *, where: str) -> CampaignPlan:
     if settings.count < 1 or (settings.batch is not None and settings.batch < 1):
         raise CampaignError("is less than one.", where=where, channel="count" if settings.count < 1 else "batch")
     files = {}
-    for entry, name, or_name in kind.files(settings):
-        path = place / name
-        if is_file(path):
-            files[name] = path.read_bytes()
-        elif not or_name:
-            raise CampaignError(
-                f"there is no file '{name}'.", where=where, channel=entry, hint=f"It is looked for in {place}."
-            )
+    try:
+        for entry, name, or_name in kind.files(settings):
+            if is_file(place / name):
+                files[name] = (place / name).read_bytes()
+            elif or_name:
+                vehicle_of(name)  # says what there is
+            else:
+                raise CampaignError(f"there is no file '{name}'.", channel=entry, hint=f"It is looked for in {place}.")
+        parts = kind.parts(settings, place)
+    except SwashError as error:  # as in a worker, where the file's name is not known
+        raise CampaignError(error.problem, where=error.where or where, channel=error.channel, hint=error.hint) from None
     if sum(map(len, files.values())) > _LARGEST:
         raise CampaignError(
             f"its files have more than {_LARGEST >> 20} MiB, and every task takes them along.", where=where
         )
     whole = msgspec.to_builtins(settings)
-    tasks = made_tasks(str(document["of"]), matters(whole), kind.parts(settings, place), files=files, program=program())
+    tasks = made_tasks(str(document["of"]), matters(whole), parts, files=files, program=program())
     return CampaignPlan(text, place, str(document["of"]), whole, tasks)
 
 

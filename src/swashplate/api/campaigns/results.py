@@ -93,8 +93,13 @@ class Campaign(Shown):
         values = np.asarray(self.table[by], dtype=np.float64)
         order = np.argsort(-np.where(np.isnan(values), -np.inf, values), kind="stable")[:count]
         factor = self.findings.shown.get(by, ("", 1.0))[1]
-        rows = self.table
-        return tuple(WorstRow(int(rows["number"][k]), int(rows["seed"][k]), float(factor * values[k])) for k in order)
+        rows, told = self.table, f"swash campaign replay {self.folder}"
+        worst = []
+        for k in order:
+            number = int(rows["number"][k])
+            command = f"{told} {number} -o worst-{number}{self.findings.again}"
+            worst.append(WorstRow(number, int(rows["seed"][k]), float(factor * values[k]), command))
+        return tuple(worst)
 
     @property
     def standing(self) -> str:
@@ -186,9 +191,7 @@ class Campaign(Shown):
             told.append(text_table(head, cells, left=(0, len(head) - 1)) if cells else caption)
         by = self.findings.worst
         if row := next(iter(self.worst(1)), None):
-            told.append(
-                f"worst {by}: number {row.number}, seed {row.seed}: swash campaign replay {self.folder} {row.number}"
-            )
+            told.append(f"worst {by}: number {row.number}, seed {row.seed}: {row.command}")
         for failed in list(self.failed.values())[:3]:
             told.append(f"given up: rows from {failed['first']} (seed {failed['seed']}): {failed['tries'][-1]}")
         return "\n".join(told)

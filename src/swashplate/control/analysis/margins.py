@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.optimize
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import ControllerError
@@ -175,10 +173,13 @@ def _crossings(w: Array, loop: NDArray[np.complex128]) -> tuple[Array, Array, Ar
 
     Read from the cubic spline through the points, as python-control's `stability_margins` reads frequency responses.
     """
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import brentq
+
     between = CubicSpline(w, loop)
 
     def roots(of: Callable[[Complex], Array], at: NDArray[np.int_]) -> Array:
-        return np.array([scipy.optimize.brentq(lambda v: float(of(between(v))), w[i], w[i + 1]) for i in at])
+        return np.array([brentq(lambda v: float(of(between(v))), w[i], w[i + 1]) for i in at])
 
     def turned(value: Complex) -> Array:
         return np.asarray(np.angle(-value))
@@ -218,6 +219,8 @@ def _scaled(M: NDArray[np.complex128], logs: Array) -> Any:
 
 def _best_scaled(M: NDArray[np.complex128]) -> float:
     """The smallest over D found; a convex problem in log D."""
+    from scipy.optimize import minimize  # a tenth of a second, and every report imports this module
+
     start = _perron(M)
-    best = scipy.optimize.minimize(lambda logs: _scaled(M, logs), start, method="Nelder-Mead", options={"xatol": 1e-4})
+    best = minimize(lambda logs: _scaled(M, logs), start, method="Nelder-Mead", options={"xatol": 1e-4})
     return min(float(_scaled(M, start)), float(best.fun))

@@ -22,7 +22,8 @@ def tolerances_of(vehicle: Vehicle) -> dict[str, float]:
         raise ControllerError(
             "no number of the card has a sigma.",
             where=vehicle.card.path or vehicle.name,
-            hint="Take a card from `swash bench` or `swash identify`, or say what varies: --vary mass=5%.",
+            hint="Take a card from `swash bench` or `swash identify`, or say what varies: --vary mass=5%, "
+            'in a campaign\'s file numbers = {mass = "5%"} without tolerances.',
         )
     return sigmas
 

@@ -15,7 +15,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
 from swashplate.control.lqg.controller_step import (
@@ -34,6 +33,7 @@ from swashplate.filtering import disturbances, observer
 from swashplate.filtering.batched_matrices import StackMatrices
 from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
+from swashplate.filtering.observer_slopes import linearised_at
 from swashplate.filtering.sensor_suite import BIASED, readings
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
@@ -133,7 +133,7 @@ def _drawing(count: int, seed: Int[jax.Array, ""], sample: Int[jax.Array, ""]) -
     return jax.random.normal(jax.random.fold_in(jax.random.key(seed), sample), (count,))
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
 def _drawn_compiled(count: int, seed: Int[jax.Array, ""], samples: Int[jax.Array, " samples"]) -> Any:
     each: Any = jax.vmap(partial(_drawing, count), in_axes=(None, 0))
     return each(seed, samples)
@@ -232,19 +232,18 @@ class Lqg:
         """At the trim, stored readings included."""
         plan, n = self.plan, self.plan.n
         N, own = len(plan.names), n + 6 + len(plan.biases)
-        mean = np.zeros((N, 1))
-        mean[:n, 0] = self.start.state
+        mean = np.zeros(N)
+        mean[:n] = self.start.state
         variance = np.zeros(N)
         variance[:own] = observer.start_variance(plan, self.unrest)
-        w = np.array([*self.start.inputs, float(self.start.environment.voltage)])[:, None]
+        w = np.array([*self.start.inputs, self.start.environment.voltage, *[1.0] * len(plan.sensors)], dtype=np.float64)
         P = np.diag(variance)
         if own < N:
             deepest = max(at.kept for at in plan.sampling)
             for _ in range(deepest):  # every stored reading is one of the start
-                stored = _stored(plan, self.numbers, mean, w)
-                mean, G = (np.asarray(part, dtype=np.float64) for part in stored)
+                mean, G = linearised_at(observer.keeping, plan, self.numbers, mean, w)
                 P = G @ P @ G.T
-        return ObserverEstimate(mean, P)
+        return ObserverEstimate(mean[:, None], P)
 
     def _sensor_memory(self, seed: int) -> Array:
         plan = self.plan
@@ -278,17 +277,3 @@ class Lqg:
         ]
         start = replace(trim, state=np.array(state), state_names=own.state_names)
         return replace(self, start=start, seed=self.seed if seed is None else seed)
-
-
-def _stored(plan: ObserverPlan, numbers: Numbers, mean: ArrayLike, w: ArrayLike) -> Any:
-    made = Numbers(*(None if part is None else jnp.asarray(part) for part in numbers))
-    return _stored_compiled(plan, made, jnp.asarray(mean), jnp.asarray(w))
-
-
-@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
-def _stored_compiled(
-    plan: ObserverPlan, numbers: Numbers, mean: Float[jax.Array, "n 1"], w: Float[jax.Array, " driving"]
-) -> Any:
-    M = JaxMatrices()
-    flags = M.column([*M.scalars(w), *[1.0] * len(plan.sensors)])
-    return M.linearised(lambda e, w: observer.keeping(plan, numbers, e, w, M.xp), mean, flags)

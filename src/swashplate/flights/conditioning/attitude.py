@@ -19,6 +19,7 @@ from swashplate.registry import listed
 if TYPE_CHECKING:  # half a second to import, and most of what imports this module turns nothing
     from scipy.spatial.transform import Rotation
 
+_UPRIGHT = 1e-7  # rad from the vertical: where SciPy warns of angles that are not unique
 _TOO_SHORT = 1e-6  # a quaternion shorter than this has no direction left to normalise
 
 
@@ -61,7 +62,15 @@ def to_body(quaternion: Array, local: Array) -> Array:
 
 def euler_from_quaternion(quaternion: ArrayLike) -> Array:
     """Roll, pitch and unwrapped yaw [rad], shape (n, 3), of scalar-first quaternions (n, 4), order ZYX."""
-    psi, theta, phi = rotation(quaternion).as_euler("ZYX").T
+    qw, qx, qy, qz = np.asarray(quaternion, dtype=np.float64).T
+    a, b, c, d = qw - qy, qx + qz, qw + qy, qz - qx
+    # Half of the sum and of the difference of roll and yaw (Bernardes and Viollet 2022).
+    lean, total, apart = 2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b)), np.arctan2(b, a), np.arctan2(d, c)
+    if np.any((lean < _UPRIGHT) | (lean > np.pi - _UPRIGHT)):  # of which one cannot be told at the vertical
+        psi, theta, phi = rotation(quaternion).as_euler("ZYX").T
+    else:
+        phi, psi = ((angle + np.pi) % (2.0 * np.pi) - np.pi for angle in (total - apart, total + apart))
+        theta = lean - 0.5 * np.pi
     return np.stack([phi, theta, np.unwrap(psi)], axis=-1)
 
 

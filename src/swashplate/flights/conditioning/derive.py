@@ -6,32 +6,18 @@ The differentiator is a local polynomial (Savitzky and Golay 1964) of degree fou
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import attitude_of, to_body, with_euler
+from swashplate.flights.conditioning.digital_filters import savitzky_golay
 from swashplate.flights.conditioning.filters import by_segment, uniform_rate
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import POSITION, RATES, VELOCITY
 
 GRAVITY = 9.80665  # m/s^2, standard; position data cannot tell it from a vertical bias
 _POINTS, _DEGREE = 5, 4
-
-
-def _weights(order: int) -> Array:
-    """The derivative at each of five points one apart, of the polynomial through them, from the values there (5, 5)."""
-    place = np.arange(_POINTS, dtype=np.float64)
-    powers = np.vander(place, increasing=True)
-    derived = np.zeros_like(powers)
-    factor = np.array([math.perm(k, order) for k in range(order, _POINTS)], dtype=np.float64)
-    derived[:, order:] = factor * powers[:, : _POINTS - order]
-    return np.asarray(derived @ np.linalg.inv(powers), dtype=np.float64)
-
-
-_WEIGHTS = {order: _weights(order) for order in (1, 2)}
 
 
 def differentiate(values: Array, *, rate: float, order: int = 1) -> Array:
@@ -45,11 +31,7 @@ def differentiate(values: Array, *, rate: float, order: int = 1) -> Array:
     if values.shape[0] < _POINTS:
         raise FlightError(f"{values.shape[0]} samples cannot be differentiated, expected at least {_POINTS}.")
     at = np.asarray(values, dtype=np.float64)
-    weights = _WEIGHTS[order] * rate**order
-    half, last = _POINTS // 2, at.shape[0] - _POINTS + 1
-    inner = sum(weight * at[k : k + last] for k, weight in enumerate(weights[half]))
-    ends = weights[:half] @ at[:_POINTS], weights[half + 1 :] @ at[-_POINTS:]
-    return np.concatenate([ends[0], inner, ends[1]])
+    return savitzky_golay(at, _POINTS, _DEGREE, derivative=order, step=1.0 / rate)
 
 
 def body_rates(quaternion: Array, *, rate: float) -> Array:

@@ -9,8 +9,10 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import continuous
+from swashplate.flights.conditioning.digital_filters import both_ways, butterworth, forwards
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import QUATERNION
+from swashplate.flights.storage import timed
 
 
 def shortest(order: int, *, band: bool = False) -> int:
@@ -35,8 +37,6 @@ def filtered(
     Raises:
         FlightError: the corner is not below half the rate, or the record is too short.
     """
-    from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
-
     band = isinstance(cutoff, tuple)
     corners = np.atleast_1d(np.asarray(cutoff, dtype=np.float64))
     if not (np.all(corners > 0) and np.all(corners < rate / 2) and np.all(np.diff(corners) > 0)):
@@ -52,11 +52,8 @@ def filtered(
             f"{needed} samples ({needed / rate:.3f} s) at {rate:g} Hz.",
             hint="Use a longer record, or condition with cutoff=0 (no filter).",
         )
-    sos = butter(order, cutoff, btype="bandpass" if band else "lowpass", fs=rate, output="sos")
-    if not zero_phase:
-        rest = sosfilt_zi(sos).reshape(sos.shape[0], 2, *(1,) * (values.ndim - 1)) * values[0]
-        return np.asarray(sosfilt(sos, values, axis=0, zi=rest)[0], dtype=np.float64)
-    return np.asarray(sosfiltfilt(sos, values, axis=0), dtype=np.float64)
+    sections = butterworth(order, cutoff, rate=rate)
+    return both_ways(sections, values) if zero_phase else forwards(sections, values)
 
 
 def within(values: Array, *, rate: float, band: tuple[float, float]) -> Array:
@@ -147,5 +144,5 @@ def lowpass(flight: Flight, *, cutoff: float, order: int = 4, zero_phase: bool =
         # Components are filtered one by one; at the few degrees per filter time of a flight only their length suffers.
         unit = continuous(np.stack([smooth[n] for n in QUATERNION], axis=-1))
         smooth.update(zip(QUATERNION, unit.T, strict=True))
-    made = data.assign({n: data[n].copy(data=v) for n, v in smooth.items()})
+    made = data.assign({n: timed(v, data[n].attrs) for n, v in smooth.items()})
     return flight.with_streams({name: made}).done("lowpass", cutoff=cutoff, order=order, zero_phase=zero_phase)

@@ -21,6 +21,7 @@ from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import continuous
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import CHANNELS, QUATERNION
+from swashplate.flights.storage import over_time, timed
 
 Mask = NDArray[np.bool_]
 HALF_WINDOW = 6  # samples each side: a glitch of three samples is then a quarter of the neighbourhood
@@ -28,9 +29,6 @@ SCALE_WINDOW = 1.0  # s: the scale follows how lively the flight is at that mome
 _CURVED = 0.02  # of the movement in the window: what a parabola may miss of a fast motion without noise
 _MAD_TO_SIGMA = 1.4826  # normal distribution
 _MINIMUM_LENGTH = 0.5  # a quaternion shorter than this means that tracking was lost
-
-
-_NORMAL = np.add.outer(np.arange(3), np.arange(3))  # which moment stands where in a parabola's normal equations
 
 
 @dataclass(frozen=True)
@@ -47,44 +45,61 @@ class OutlierRule:
 
 
 def _windows(n: int, first: int, last: int) -> NDArray[np.intp]:
-    """Indices of the samples from `first` to `last` around every sample, kept inside the record."""
-    around = np.arange(n)[:, None] + np.arange(first, last + 1)[None, :]
-    shift = np.maximum(0, -around[:, :1]) - np.maximum(0, around[:, -1:] - (n - 1))
+    """Indices of the samples from `first` to `last` around every sample, kept inside the record; a column each."""
+    around = np.arange(first, last + 1)[:, None] + np.arange(n)
+    shift = np.maximum(0, -around[0]) - np.maximum(0, around[-1] - (n - 1))
     return np.asarray(around + shift, dtype=np.intp)
+
+
+def _middle(rows: Array) -> Array:
+    """The median of every column, (n,): a sort where `numpy.median` looks for what is not a number as well."""
+    half = len(rows) // 2
+    if len(rows) % 2:
+        return np.asarray(np.partition(rows, half, axis=0)[half])
+    return np.asarray(np.partition(rows, (half - 1, half), axis=0)[half - 1 : half + 1].mean(axis=0))
+
+
+def _parabola(moments: list[Array], right: list[Array]) -> list[Array]:
+    """The coefficients of parabolas by elimination in their normal equations, of which every column is one."""
+    ridge = 1e-9
+    first, second, third = moments[0] + ridge, moments[2] + ridge, moments[4] + ridge
+    by, over = moments[1] / first, moments[2] / first
+    second, cross, third = second - by * moments[1], moments[3] - by * moments[2], third - over * moments[2]
+    linear, square = right[1] - by * right[0], right[2] - over * right[0]
+    square = (square - cross / second * linear) / (third - cross / second * cross)
+    linear = (linear - cross * square) / second
+    return [(right[0] - moments[1] * linear - moments[2] * square) / first, linear, square]
 
 
 def _two_sided(time: Array, values: Array, passes: int = 5) -> Array:
     """Residual against a robust parabola through the neighbours, the sample itself left out; shape (n,)."""
     n = time.size
     window = _windows(n, -HALF_WINDOW, HALF_WINDOW)
-    offset = time[window] - time[:, None]
-    offset /= np.max(np.abs(offset), axis=1, keepdims=True)
+    offset = time[window] - time
+    offset /= np.max(np.abs(offset), axis=0)
     near = values[window]
-    powers = offset[..., None] ** np.arange(5)
-    others = (window != np.arange(n)[:, None]).astype(np.float64)
+    powers = [offset**k for k in range(5)]
+    others = (window != np.arange(n)).astype(np.float64)
     weight = others.copy()
-    fit = np.zeros((n, 3))
+    fit = [np.zeros(n)]
     for _ in range(passes):
-        moments = (weight[:, None, :] @ powers)[:, 0]  # of the neighbours' offsets: the normal equations' entries
-        normal = moments[:, _NORMAL] + 1e-9 * np.eye(3)
-        right = (weight * near)[:, None, :] @ powers[..., :3]
-        fit = np.linalg.solve(normal, right.transpose(0, 2, 1))[..., 0]
-        residual = np.abs(near - (powers[..., :3] @ fit[..., None])[..., 0])
-        scale = np.median(residual, axis=1, keepdims=True) * 6.0 + np.finfo(float).tiny
-        weight = others * np.maximum(0.0, 1.0 - (residual / scale) ** 2) ** 2 + 1e-6 * others
-    return values - fit[:, 0]
+        moments = [np.einsum("jn,jn->n", weight, power) for power in powers]  # the normal equations' entries
+        right = [np.einsum("jn,jn->n", weight * near, power) for power in powers[:3]]
+        fit = _parabola(moments, right)
+        residual = np.abs(near - (fit[0] + offset * (fit[1] + offset * fit[2])))
+        scale = _middle(residual) * 6.0 + np.finfo(float).tiny
+        weight = others * (np.maximum(0.0, 1.0 - (residual / scale) ** 2) ** 2 + 1e-6)
+    return values - fit[0]
 
 
 def _one_sided(time: Array, values: Array, *, after: bool) -> Array:
     """Residual against a Theil-Sen line (Sen 1968) through the samples before (or after), extrapolated; (n,)."""
     window = _windows(time.size, 1, HALF_WINDOW) if after else _windows(time.size, -HALF_WINDOW, -1)
-    offset = time[window] - time[:, None]
+    offset = time[window] - time
     near = values[window]
-    pairs = np.array(list(combinations(range(HALF_WINDOW), 2)))
-    run = offset[:, pairs[:, 1]] - offset[:, pairs[:, 0]]
-    slope = np.median((near[:, pairs[:, 1]] - near[:, pairs[:, 0]]) / run, axis=1)
-    level = np.median(near - slope[:, None] * offset, axis=1)
-    return values - level
+    pairs = np.array(list(combinations(range(HALF_WINDOW), 2))).T
+    slope = _middle((near[pairs[1]] - near[pairs[0]]) / (offset[pairs[1]] - offset[pairs[0]]))
+    return values - _middle(near - slope * offset)
 
 
 def _local_sigma(time: Array, residual: Array) -> Array:
@@ -99,7 +114,7 @@ def _local_sigma(time: Array, residual: Array) -> Array:
 def _local_range(values: Array) -> Array:
     """How far the channel moves within the window (10 to 90 %, so that no glitch counts), shape (n,)."""
     near = values[_windows(values.size, -HALF_WINDOW, HALF_WINDOW)]
-    low, high = np.percentile(near, [10.0, 90.0], axis=1)
+    low, high = np.percentile(near, [10.0, 90.0], axis=0)
     return np.asarray((high - low) / 0.8, dtype=np.float64)
 
 
@@ -189,8 +204,9 @@ def remove_outliers(flight: Flight, *, threshold: float = 6.0, longest: int = 5)
                 by_channel[channel] = int(here.sum())
             bad |= here
         removed[name] = int(bad.sum())
-        made = data.assign({q: data[q].copy(data=columns[q]) for q in QUATERNION if q in columns})
-        streams[name] = made.isel(time=np.flatnonzero(~bad))
+        made = data.assign({q: timed(columns[q], data[q].attrs) for q in QUATERNION if q in columns})
+        kept = {str(n): timed(v.values[~bad], v.attrs) for n, v in made.variables.items()}
+        streams[name] = over_time(kept.pop("time"), kept, made.attrs)
     return flight.with_streams(streams).done(
         "remove_outliers", threshold=threshold, longest=longest, removed=removed, by_channel=by_channel
     )

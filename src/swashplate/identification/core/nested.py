@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
 from swashplate.identification.core.result import Result, bounds_of
 from swashplate.models.choices import PhysicalEffect
@@ -139,6 +138,8 @@ def chance_of(statistic: float, free: int, bounded: int) -> float:
     With one number on a bound half of chi-squared of one degree less and half of all degrees (Self and Liang 1987, case
     6); with more on a bound the same is an upper limit (Perlman 1969).
     """
+    from scipy.special import chdtrc  # every report imports this module
+
     whole = float(chdtrc(free, max(statistic, 0.0)))
     if not bounded:
         return whole

@@ -7,15 +7,17 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from swashplate.arrays import Array
 from swashplate.atomic import write_bytes
 from swashplate.errors import IdentificationError
 from swashplate.text_table import text_table
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SPLIT_RHAT = 1.01
 """At most, for draws that may be used (Vehtari et al. 2021)."""
@@ -133,6 +135,8 @@ class Posterior:
 
     def tree(self) -> xr.DataTree:
         """The draws as ArviZ lays them out: groups `posterior`, `sample_stats` and, for NUTS, `diagnostics`."""
+        import xarray as xr
+
         chains, count = self.draws.shape[:2]
         dims, k = ("chain", "draw"), self.parameters
         coords = {"chain": np.arange(chains), "draw": np.arange(count)}
@@ -165,6 +169,8 @@ class Posterior:
         Raises:
             WriteError: for a place that cannot be written to.
         """
+        import xarray as xr
+
         file, tree = io.BytesIO(), self.tree()
         xr.Dataset(attrs=tree.attrs).to_netcdf(file, mode="w", engine="h5netcdf")
         for name, group in tree.children.items():

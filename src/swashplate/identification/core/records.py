@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
+from swashplate.flights.conditioning.digital_filters import savitzky_golay
 from swashplate.flights.flight import Flight, did_you_mean
 from swashplate.flights.schema import ATTITUDE, POSITION, RATES
 from swashplate.models.surroundings import environment_of
@@ -218,7 +219,5 @@ _STILL = 1e-6
 
 def _slow(voltage: Array, dt: float, seconds: float) -> Array:
     """A logged voltage without its noise: straight lines over some seconds each way (Savitzky and Golay 1964)."""
-    from scipy.signal import savgol_filter
-
     window = min(2 * round(seconds / dt) + 1, voltage.size - (voltage.size + 1) % 2)
-    return np.asarray(savgol_filter(voltage, window, 1), dtype=np.float64)
+    return savitzky_golay(voltage, window, 1)

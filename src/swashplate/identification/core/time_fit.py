@@ -184,7 +184,7 @@ def result_of(
             value=solved.numbers[entry.name],
             sigma=float(spread[i]),
             sigma_corrected=float(wider[i]),
-            insensitivity=1.0 / float(np.sqrt(optimum.information[i, i])) * float(row.scale[i]),
+            insensitivity=float(row.scale[i]) / told if (told := float(np.sqrt(optimum.information[i, i]))) else np.inf,
             prior_mean=entry.mean if np.isfinite(entry.sigma) else None,
             prior_sigma=entry.sigma if np.isfinite(entry.sigma) else None,
             at_bound=entry.name in optimum.at_bound,

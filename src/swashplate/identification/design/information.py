@@ -20,6 +20,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.identification.core.records import POSE
+from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -66,12 +67,12 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
     Raises:
         IdentificationError: an unknown parameter, or a vehicle without tracked pose or body rates.
     """
-    strange = [name for name in unknown if name not in vehicle.parameter_names]
+    strange = [name for name in unknown if name not in vehicle.numbers]
     if strange or not unknown:
         raise IdentificationError(
-            f"is no parameter of '{vehicle.name}'." if strange else "names nothing.",
+            f"is no parameter of '{vehicle.called}'." if strange else "names nothing.",
             channel=", ".join(strange) or "unknown",
-            hint=f"It has {', '.join(vehicle.parameter_names)}.",
+            hint=f"It has {', '.join(vehicle.numbers)}.",
         )
     lacking = [name for name in (*POSE, *DISTURBED) if name not in vehicle.state_names]
     if lacking:
@@ -84,7 +85,6 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
     around = [getattr(about.environment, name) for name in SURROUNDINGS]
     w = np.array([*about.inputs, *around], dtype=np.float64)
     p = parameter_row(vehicle, about.environment)
-    places = np.array([vehicle.parameter_names.index(name) for name in unknown])
     m, equations = len(vehicle.input_names), equations_of(vehicle)
 
     def slopes(row: Array) -> Array:
@@ -92,11 +92,14 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
             [np.asarray(part) for part in rates_and_slopes(equations, about.state, w, row)[1:]], axis=1
         )
 
-    steps = _STEP * np.maximum(np.abs(p[places]), 1e-6)
-    ways = np.eye(p.size)[places] * steps[:, None]
-    moved = [(slopes(p + way) - slopes(p - way)) / (2.0 * step) for way, step in zip(ways, steps, strict=True)]
-    here, by = slopes(p), np.stack(moved, axis=-1)
-    n = len(vehicle.state_names)
+    def moved(name: str, step: float) -> Array:
+        if vehicle.structure is not None:
+            return _structured(vehicle, name, step)
+        return slopes(p + step * np.eye(p.size)[vehicle.parameter_names.index(name)])
+
+    steps = {name: _STEP * max(abs(vehicle.numbers[name].value), 1e-6) for name in unknown}
+    by = np.stack([(moved(n, step) - moved(n, -step)) / (2.0 * step) for n, step in steps.items()], axis=-1)
+    here, n = slopes(p), len(vehicle.state_names)
     return Sensed(
         here[:, :n],
         here[:, n : n + m],
@@ -106,6 +109,17 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
         np.array([vehicle.index(name) for name in DISTURBED]),
         about,
     )
+
+
+def _structured(vehicle: Vehicle, name: str, step: float) -> Array:
+    """A and B side by side (n, n + m) with one parameter of the structure moved; rows of kinematics are left zero."""
+    model = structure_of(vehicle)
+    A, B, _, _ = model.with_values({name: model.parameters[name].value + step}).explicit()
+    n, at = len(vehicle.state_names), [vehicle.index(state) for state in model.states]
+    columns = [*at, *(n + vehicle.input_names.index(one) for one in model.inputs)]
+    side_by_side = np.zeros((n, n + len(model.inputs)))
+    side_by_side[np.ix_(at, columns)] = np.hstack([A, B])
+    return side_by_side
 
 
 def output_noise(model: Sensed, frequency: Array, noise: Noise, *, rate: float) -> Complex:

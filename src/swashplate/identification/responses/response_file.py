@@ -13,7 +13,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-import xarray as xr
 
 from swashplate import documents
 from swashplate.atomic import write_bytes
@@ -51,6 +50,8 @@ def save(fields: Mapping[str, Any], path: Path) -> Path:
     Raises:
         WriteError: where the folder is missing or cannot be written to, or the disk is full.
     """
+    import xarray as xr
+
     variables: dict[str, Any] = {
         "response_real": (_PAIR, fields["response"].real, {"long_name": "real part of the response"}),
         "response_imag": (_PAIR, fields["response"].imag, {"long_name": "imaginary part of the response"}),

@@ -82,12 +82,14 @@ class FirstMotion(NamedTuple):
         value, rate: of every measured channel at the first sample.
         velocity: mean ahead, right and down [m/s] that the gain is for (`start_states.mean_velocity`).
         voltage: of the battery at the first sample, and its mean [V].
+        running: seconds since the flight's time zero, where motors begin.
     """
 
     value: Any
     rate: Any
     velocity: Any
     voltage: Any
+    running: Any = 0.0
 
 
 class Begun(NamedTuple):
@@ -101,7 +103,7 @@ def seen_at_start(vehicle: Vehicle, record: Record) -> FirstMotion:
     """What a record shows of its beginning."""
     value, rate = slopes(record, np.array([0]))
     voltage = np.array([record.voltage[0], np.mean(record.voltage)])
-    return FirstMotion(value[0], rate[0], mean_velocity(vehicle, record), voltage)
+    return FirstMotion(value[0], rate[0], mean_velocity(vehicle, record), voltage, float(record.time[0]))
 
 
 def starting_samples(dt: float) -> int:
@@ -159,6 +161,7 @@ def traced_begin(model: StochasticModel, numbers: FilterNumbers, seen: FirstMoti
         rate=seen.rate,
         inputs=numbers.inputs,
         voltage=first,
+        running=seen.running,
     )
     return Begun(gain, x)
 
@@ -281,6 +284,7 @@ def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> A
         rate=seen.rate,
         inputs=rows.inputs,
         voltage=first,
+        running=seen.running,
         xp=_XP,
     )
     starts = np.array(np.broadcast_to(starts, (len(rows.parameters), starts.shape[-1])))

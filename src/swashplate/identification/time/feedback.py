@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.flights.conditioning.digital_filters import both_ways, butterworth
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.flight_details import AxisExcitation
@@ -69,12 +70,9 @@ def excitation(vehicle: Vehicle, record: Record, states: Array) -> tuple[AxisExc
 
 
 def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array]) -> AxisExcitation:
-    from scipy.signal import butter, sosfiltfilt
-
     rate = 1.0 / record.dt
     high = min(_BAND[1], 0.4 * rate)
-    sos = butter(2, (_BAND[0], high), "bandpass", fs=rate, output="sos")
-    banded = sosfiltfilt(sos, command)
+    banded = both_ways(butterworth(2, (_BAND[0], high), rate=rate), command)
     power = float(np.std(banded))
     still = power < _MOVED
     explained, later, peak, phase = float("nan"), float("nan"), 0.0, float("nan")
@@ -113,11 +111,9 @@ def _called(inputs: Mapping[str, float]) -> str:
 
 def _explained(command: Array, motion: list[Array], rate: float) -> float:
     """Adjusted R^2 of the command on present and past motion, everything low-passed to the band and decimated."""
-    from scipy.signal import butter, sosfiltfilt
-
     keep = max(1, round(rate / (4.0 * _BAND[1])))
-    sos = butter(4, min(_BAND[1], 0.4 * rate), fs=rate, output="sos")
-    slow = [sosfiltfilt(sos, signal)[::keep] for signal in (command, *motion)]
+    sections = butterworth(4, min(_BAND[1], 0.4 * rate), rate=rate)
+    slow = [both_ways(sections, signal)[::keep] for signal in (command, *motion)]
     lags = max(1, round(_LAGS * rate / keep))
     n = slow[0].size - lags
     if n < 4 * lags * len(motion):
@@ -133,11 +129,17 @@ def _explained(command: Array, motion: list[Array], rate: float) -> float:
 
 
 def _coherence(command: Array, response: Array, rate: float, high: float) -> tuple[float, float]:
-    from scipy.signal import coherence, csd
-
+    """The largest coherence of a band and its phase, by means of windows of 4 s that overlap by half (Welch 1967)."""
     length = int(min(command.size, 4.0 * rate))
-    frequency, squared = coherence(command, response, rate, nperseg=length)
-    cross = csd(command, response, rate, nperseg=length)[1]
+    starts = range(0, command.size - length + 1, length - length // 2)
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+    parts = np.array([[signal[i : i + length] for i in starts] for signal in (command, response)])
+    asked, answered = np.fft.rfft(window * (parts - parts.mean(axis=-1, keepdims=True)))
+    cross = np.mean(asked.conj() * answered, axis=0)
+    power = np.mean(np.abs(asked) ** 2, axis=0) * np.mean(np.abs(answered) ** 2, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        squared = np.abs(cross) ** 2 / power
+    frequency = np.fft.rfftfreq(length, 1.0 / rate)
     band = (frequency >= _BAND[0]) & (frequency <= high)
     best = np.flatnonzero(band)[np.argmax(squared[band])]
     return float(squared[best]), float(np.angle(cross[best]))

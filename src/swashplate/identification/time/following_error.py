@@ -4,8 +4,8 @@ What wind does to a rotor grows with the air speed: nothing at rest, much in a g
 average. Where the air speed is small it then takes other noise for wind, and a noisy regressor makes its coefficient
 too small, with bounds too narrow. An extended Kalman filter carries the covariance along instead (Jategaonkar 2015,
 sec. 5.5), with slopes and means averaged over the air speed's own uncertainty (statistical linearisation, Gelb 1974,
-sec. 6.2): the force of wind has a kink at rest, and a slope there would be zero. It begins with what is not known of
-a record's first states, and goes on by itself where the pose was not seen.
+sec. 6.2): the force of wind has a kink at rest, and a slope there would be zero. It begins with how far
+off a record's first states may be, and goes on by itself where the pose was not seen.
 """
 
 from __future__ import annotations
@@ -30,12 +30,20 @@ from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.scoring import TracedCost
-from swashplate.identification.time.beginning import FilterNumbers, FirstMotion, first_state, traced_begin
-from swashplate.identification.time.innovations import RecordRun
+from swashplate.identification.time.beginning import (
+    FilterNumbers,
+    FirstMotion,
+    first_state,
+    starting_samples,
+    traced_begin,
+)
+from swashplate.identification.time.innovations import Filtered, RecordRun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.identification.time.record_filter import STRETCH, stretches, whole
-from swashplate.identification.time.start_states import steady_flight
+from swashplate.identification.time.start_states import measured_start, slopes_ahead, steady_flight
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
 from swashplate.simulation.discretisation import held_series
@@ -92,8 +100,9 @@ class FollowingError(PredictionError):
 
     @cached_property
     def _spread(self) -> tuple[Array, ...]:
-        """What is not known of the states that each record begins with: of rotors and bars that a maneuver may move."""
-        return tuple(_spread_inside(run.states.x) for run in self._constant.runs(self.row.starts()))
+        """How far off the states may be that each record begins with, (states, states)."""
+        went = self._constant.runs(self.row.starts())
+        return tuple(_off(self.table.vehicle, *each) for each in zip(self.pieces, self._runs, went, strict=True))
 
     def traced(self) -> TracedCost:
         """None: what JAX can differentiate as a whole has a constant gain, which is another likelihood.
@@ -197,13 +206,35 @@ class FollowingError(PredictionError):
         return followed
 
 
-def _spread_inside(states: Array) -> Array:
-    """Covariance (states, states) that what no camera sees has along a record: rotors that lag, and bars."""
-    spread = np.zeros((states.shape[1], states.shape[1]))
-    inner = states[:, _BODY:]
-    if np.isfinite(inner).all():
-        spread[_BODY:, _BODY:] = np.cov(inner, rowvar=False)
-    return spread
+def _off(vehicle: Vehicle, piece: Record, run: RecordRun, went: Filtered) -> Array:
+    """Second moment (states, states) of what a beginning is off: of beginnings at all samples of the record, against
+    the states that the constant gain's filter finds there.
+
+    In the middle of a maneuver a line through 0.15 s of pose knows little of rates, and nothing of rotors that lag and
+    of bars.
+    """
+    states, off = went.states.x, np.zeros((went.states.x.shape[1],) * 2)
+    if not np.isfinite(states).all():
+        return off
+    value, rate = slopes_ahead(piece)
+    settling = min(starting_samples(piece.dt), len(states))
+    reaching = np.lib.stride_tricks.sliding_window_view(went.commands, settling, axis=0).mean(axis=2)
+    n = min(len(value), len(reaching))
+    begun = measured_start(
+        vehicle,
+        piece.output_names,
+        vehicle.parameters(*went.numbers.parameters),
+        Nuisance(*went.numbers.nuisance),
+        value=value[:n].T,
+        rate=rate[:n].T,
+        inputs=reaching[:n],
+        voltage=run.voltage[:n],
+        xp=ArrayBackend(),
+    )
+    error = begun - states[:n]
+    if vehicle.traits.settled is None:  # found by Newton's method at the start, not here
+        error[:, _BODY:] = states[:n, _BODY:] - states[:, _BODY:].mean(axis=0)
+    return np.asarray(error.T @ error / n)
 
 
 def _along_some(
@@ -218,7 +249,7 @@ def _along_some(
     Args:
         model, run: whose.
         readings: NaN where there are none.
-        spread: what is not known of the states that it begins with, a covariance.
+        spread: how far off the states may be that it begins with, a second moment.
         placed: commands and numbers of each row.
     """
     commands = np.stack([reaching for reaching, _ in placed])
@@ -237,8 +268,8 @@ def _along_some(
 def _begun(
     model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Float[jax.Array, "states states"]
 ) -> tuple[FilterState, Any]:
-    """States to begin with, and their covariances, by lane: where the filter has settled in steady flight, and the
-    spread of what was not seen: the air, and whether the rotors have settled."""
+    """States to begin with, and their covariances, by lane: those of a filter that has settled in steady flight, how
+    far off the first states may be, and the air."""
 
     def one(numbers: FilterNumbers) -> tuple[FilterState, Any]:
         parameters = model.vehicle.parameters(*numbers.parameters)

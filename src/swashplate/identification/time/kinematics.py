@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.flights.conditioning.attitude import euler_from_quaternion
+from swashplate.flights.conditioning.digital_filters import savitzky_golay
 from swashplate.flights.schema import RATES
 from swashplate.identification.core.records import Record
+from swashplate.physics.backend import ArrayBackend
+from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body
+from swashplate.physics.quaternion import quaternion_of
+
+_XP = ArrayBackend()
 
 PREDICTED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 """The body states in the order of every (n, 12) table."""
@@ -30,25 +36,26 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
     so each uses samples after its own time too: this is what predictions are held against, never what they start from.
     Rates are a gyroscope's where the record has them, smoothed over five samples.
     """
-    from scipy.signal import savgol_filter
-
     names = list(record.output_names)
     pose = record.outputs[:, [names.index(name) for name in ("x", "y", "z", "phi", "theta", "psi")]].copy()
     pose[:, 3] -= float(nuisance.level_phi)
     pose[:, 4] -= float(nuisance.level_theta)
     if float(nuisance.level_psi):
-        tracked = Rotation.from_euler("ZYX", pose[:, [5, 4, 3]])
-        turned = (tracked * Rotation.from_euler("Z", -float(nuisance.level_psi))).as_euler("ZYX")
-        pose[:, 3:] = turned[:, ::-1]
+        half = -0.5 * float(nuisance.level_psi)
+        c, s = np.cos(half), np.sin(half)
+        qw, qx, qy, qz = quaternion_of(Euler(*pose[:, 3:].T), _XP)
+        pose[:, 3:] = euler_from_quaternion(
+            np.stack([c * qw - s * qz, c * qx + s * qy, c * qy - s * qx, c * qz + s * qw], axis=1)
+        )
         pose[:, 5] += 2.0 * np.pi * np.round((record.outputs[:, names.index("psi")] - pose[:, 5]) / (2.0 * np.pi))
-    lever = np.array([nuisance.lever_x, nuisance.lever_y, nuisance.lever_z], dtype=np.float64)
-    pose[:, :3] -= Rotation.from_euler("ZYX", pose[:, [5, 4, 3]]).apply(lever)
+    lever = Vector(float(nuisance.lever_x), float(nuisance.lever_y), float(nuisance.lever_z))
+    pose[:, :3] -= np.stack(body_to_local(lever, Euler(*pose[:, 3:].T), _XP), axis=1)
     length = samples_smoothed(record.dt, window)
-    smooth = savgol_filter(pose, length, 3, axis=0)
-    slope = savgol_filter(pose, length, 3, deriv=1, delta=record.dt, axis=0)
+    smooth = savitzky_golay(pose, length, 3)
+    slope = savitzky_golay(pose, length, 3, derivative=1, step=record.dt)
     phi, theta = smooth[:, 3], smooth[:, 4]
     phi_dot, theta_dot, psi_dot = slope[:, 3], slope[:, 4], slope[:, 5]
-    velocity = Rotation.from_euler("ZYX", smooth[:, [5, 4, 3]]).apply(slope[:, :3], inverse=True)
+    velocity = np.stack(local_to_body(Vector(*slope[:, :3].T), Euler(*smooth[:, 3:].T), _XP), axis=1)
     rates = np.stack(
         [
             phi_dot - psi_dot * np.sin(theta),
@@ -59,5 +66,5 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
     )
     if set(RATES) <= set(names):
         gyro = record.outputs[:, [names.index(name) for name in RATES]]
-        rates = savgol_filter(gyro, 5, 2, axis=0)
+        rates = savitzky_golay(gyro, 5, 2)
     return np.concatenate([smooth[:, :3], velocity, smooth[:, 3:], rates], axis=1)

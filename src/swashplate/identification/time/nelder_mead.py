@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize
 
 from swashplate.arrays import Array
 from swashplate.identification.core import stopping
@@ -39,6 +38,8 @@ def minimise_squares(likelihood: OutputError, *, progress: Progress | None = Non
         stopping.counted()
         if progress is not None:
             progress(len(history), history[-1])
+
+    from scipy.optimize import minimize  # a tenth of a second, and every fit imports this module
 
     limit = _EVALUATIONS_PER_PARAMETER * places.size
     options = {"maxfev": limit, "xatol": 1e-3, "fatol": 1e-2}

@@ -141,6 +141,7 @@ class OutputError:
             "outputs": jnp.asarray(np.stack(outputs)),
             "value": jnp.asarray(np.stack(values)),
             "rate": jnp.asarray(np.stack(rates)),
+            "running": jnp.asarray([self.pieces[number].time[first] for number, first in self._places]),
             "first": jnp.asarray([first for _, first in self._places]),
             "record": jnp.asarray([number for number, _ in self._places]),
             "inputs": jnp.asarray(stacked["inputs"]),
@@ -315,6 +316,7 @@ def _shoot(
         rate=data["rate"][place],
         inputs=cut[0],
         voltage=voltage[0],
+        running=data["running"][place],
     )
     calm = jnp.zeros(N_DISTURBANCES)
 

@@ -15,7 +15,7 @@ from swashplate.arrays import Array
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.time.estimates import Found
-from swashplate.identification.time.residual_fit import LinearResidual
+from swashplate.identification.time.linear_residual import LinearResidual
 from swashplate.models.residual import counted_from, with_residual
 from swashplate.models.vehicle import Vehicle
 

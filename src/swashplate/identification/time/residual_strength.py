@@ -14,9 +14,16 @@ from typing import NamedTuple
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.errors import IdentificationError
 
 STRENGTHS = np.geomspace(1e5, 1e-3, 33)
 """Of the ridge, from strong to weak."""
+
+BLOCK = 6.0
+"""Seconds of a block that is left out, at least."""
+
+FEWEST = 4
+"""Blocks below which nothing can be left out to choose by."""
 
 _SURE = 0.975
 """Quantile of Student's t that the gain on blocks left out must exceed, in standard errors: a few blocks tell these
@@ -24,6 +31,23 @@ badly."""
 
 _FLOOR = 1e-9
 """Of each parameter's information, what is added to it: blocks may leave out the one that tells a combination."""
+
+
+def enough_blocks(found: int, where: str, *, after: float = 0.0) -> None:
+    """Refuses records that make too few blocks.
+
+    Raises:
+        IdentificationError: for fewer than `FEWEST`.
+    """
+    if found < FEWEST:
+        later = f" after their first {after:g} s, which tell a flight's constants" if after else ""
+        raise IdentificationError(
+            f"the flights make {found} blocks of {BLOCK:g} s{later}, a residual needs {FEWEST}: without blocks to "
+            "leave out, nothing says how much of it is chance.",
+            where=where,
+            channel="residual",
+            hint="Give longer flights, or leave --residual away.",
+        )
 
 
 class Physics(NamedTuple):

@@ -125,6 +125,20 @@ def slopes(record: Record, places: Array) -> tuple[Array, Array]:
     return np.array(values), np.array(rates)
 
 
+def slopes_ahead(record: Record) -> tuple[Array, Array]:
+    """What `slopes` would say of the first sample of a record that begins at any of its samples but the last few.
+
+    Returns:
+        Measured channels and their rates by the line through what follows, each (places, outputs).
+    """
+    reach = min(max(2, round(_SPAN / record.dt)), record.time.size - 1)
+    line = np.linalg.pinv(np.vander(record.dt * np.arange(reach + 1), 2, increasing=True))
+    values, rates = np.moveaxis(
+        np.lib.stride_tricks.sliding_window_view(record.outputs, reach + 1, axis=0) @ line.T, 2, 0
+    )
+    return values, rates
+
+
 def start_state(
     vehicle: Vehicle,
     output_names: tuple[str, ...],
@@ -135,11 +149,12 @@ def start_state(
     rate: Float[jax.Array, " outputs"],
     inputs: Float[jax.Array, " inputs"],
     voltage: Float[jax.Array, ""],
+    running: Float[jax.Array, ""] | float = 0.0,
 ) -> Any:
     """`measured_start`, with the inner states where they would rest (traceable).
 
     Args:
-        value, rate, inputs, voltage: as `measured_start` takes them.
+        value, rate, inputs, voltage, running: as `measured_start` takes them.
     """
     row = measured_start(
         vehicle,
@@ -150,6 +165,7 @@ def start_state(
         rate=rate,
         inputs=inputs,
         voltage=voltage,
+        running=running,
         xp=jax_backend(),
     )
     if vehicle.traits.settled is not None:
@@ -168,6 +184,7 @@ def measured_start(
     inputs: Float[jax.Array | np.ndarray, "... inputs"],
     voltage: Float[jax.Array | np.ndarray, ...],
     xp: Backend,
+    running: Float[jax.Array | np.ndarray, ...] | float = 0.0,
 ) -> Any:
     """A flat state: pose and its rates from the measurement, inner states by `Traits.settled`, where there is one.
 
@@ -175,6 +192,7 @@ def measured_start(
         parameters, nuisance: numbers, or rows of them for as many states.
         value, rate: measured channels and their time derivatives at the start.
         inputs: commands that reach the vehicle around the start, trims included, (..., inputs).
+        running: seconds since the flight's time zero.
         xp: the operations.
     """
     here = {name: value[i] for i, name in enumerate(output_names)}
@@ -209,7 +227,11 @@ def measured_start(
     settled = vehicle.traits.settled
     if settled is not None:
         known |= settled(
-            vehicle.inputs(*(inputs[..., i] for i in range(len(vehicle.input_names)))), parameters, voltage, attitude
+            vehicle.inputs(*(inputs[..., i] for i in range(len(vehicle.input_names)))),
+            parameters,
+            voltage,
+            attitude,
+            running,
         )
     entries = [xp.arrays.asarray(known.get(name, 0.0)) for name in vehicle.state_names]
     return xp.arrays.stack(xp.arrays.broadcast_arrays(*entries), axis=-1)

@@ -13,6 +13,8 @@ from swashplate.arrays import Array
 from swashplate.errors import DivergenceError, FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import records
+from swashplate.identification.core.spans import CALIBRATION, SHORTEST_CALIBRATION
+from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.links.live.picture import inputs_of, picture, pose_of
 from swashplate.models.catalogue import from_card
@@ -25,9 +27,7 @@ from swashplate.registry import listed
 from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
-from swashplate.validation.calibration import calibrate
 from swashplate.validation.prediction import predict
-from swashplate.validation.spans import CALIBRATION, SHORTEST_CALIBRATION
 from swashplate.validation.validate import observer_of
 
 RATE = 50.0

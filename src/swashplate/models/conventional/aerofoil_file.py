@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from swashplate.arrays import Array
 from swashplate.errors import CardError
@@ -226,6 +225,8 @@ def _laid_out(block: Array, step: float) -> tuple[Array, Array]:
 
     Monotone cubics of the block's own points (Fritsch and Butland 1984) go through them without overshoot.
     """
+    from scipy.interpolate import PchipInterpolator  # a tenth of a second that a vehicle without tables need not wait
+
     whole = _with_plate(block)
     layout = AerofoilTable(
         "", "", "", (), (), _FINE, step, np.empty(0), np.empty(0), (0.0, 0.0), ((0.0, 0.0), (0.0, 0.0))

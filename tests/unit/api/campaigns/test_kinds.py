@@ -103,7 +103,7 @@ def test_flights_are_asked_for_as_the_file_says(tmp_path: Path, monkeypatch: pyt
     assert asked["limits"] == Limits(lean=np.radians(30.0), place=np.inf)
     says = found("monte-carlo", table, **document)
     assert says.summary[0][1].startswith("1 of 2 (50 %")
-    assert says.worst == "place"
+    assert (says.worst, says.again) == ("place", ".nc")
     assert [entry.entry for entry in of_flights.MONTE_CARLO.files(settings)] == ["vehicle", "controller", "varies.fit"]
 
 

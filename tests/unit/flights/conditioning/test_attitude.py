@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from swashplate.flights.conditioning.attitude import continuous, interpolate, quaternion_from_euler, to_body
+from swashplate.flights.conditioning.attitude import (
+    continuous,
+    euler_from_quaternion,
+    interpolate,
+    quaternion_from_euler,
+    to_body,
+)
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> float:
@@ -18,6 +25,17 @@ def test_euler_angles_make_scipys_quaternions() -> None:
     expected = Rotation.from_euler("ZYX", euler[:, ::-1]).as_quat(scalar_first=True)
     assert _apart(quaternion_from_euler(euler), expected) < 1e-14
     assert _apart(quaternion_from_euler(euler + 1e-6), expected) > 1e-8, "the distance can say no"
+
+
+def test_euler_angles_of_quaternions_are_scipys() -> None:
+    turned = continuous(np.random.default_rng(3).standard_normal((500, 4)))
+    psi, theta, phi = Rotation.from_quat(turned, scalar_first=True).as_euler("ZYX").T
+    found = euler_from_quaternion(turned)
+    np.testing.assert_allclose(found[:, :2], np.stack([phi, theta], axis=1), atol=1e-14)
+    np.testing.assert_allclose(found[:, 2], np.unwrap(psi), atol=1e-12)
+    upright = quaternion_from_euler(np.array([[0.1, 0.5 * np.pi, 0.2]]))
+    with pytest.warns(UserWarning, match="Gimbal lock"):
+        assert euler_from_quaternion(upright)[0, 1] == pytest.approx(0.5 * np.pi)
 
 
 def test_between_samples_lies_what_scipy_says() -> None:

@@ -36,6 +36,17 @@ def test_the_slopes_are_those_of_the_linear_model(place: int) -> None:
         )
 
 
+def test_the_slopes_of_a_structure_are_those_of_its_parameters() -> None:
+    """Of a model of named expressions the unknowns have the file's names, and all entries that they move are moved."""
+    vehicle = sp.vehicle("hybrid")
+    found = sensed(vehicle, ("tau_f", "Blat"))
+    value = vehicle.numbers["tau_f"].value
+    late, soon = (sp.linearize(vehicle.with_values({"tau_f": value + s}), found.trim) for s in (1e-6, -1e-6))
+    for slopes, above, below in ((found.dA, late.A, soon.A), (found.dB, late.B, soon.B)):
+        np.testing.assert_allclose(slopes[:, :, 0], (above - below) / 2e-6, rtol=1e-5, atol=1e-4)
+    assert np.abs(found.dA[:, :, 0]).max() > 1.0
+
+
 def told(amplitude: float = 1.0, noise: Noise | None = None) -> np.ndarray:
     inputs = amplitude * np.tile([0.0, 0.0, 1.0, 0.3j], (3, 1))
     return line_information(coax(), LINES, inputs, noise or Noise(), rate=100.0)

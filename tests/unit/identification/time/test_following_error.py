@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import scipy.linalg
 from scipy.special import erf
 
 import swashplate as sp
@@ -18,18 +19,19 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
+from swashplate.identification.time.beginning import seen_at_start
+from swashplate.identification.time.calibration import first_part
 from swashplate.identification.time.following_error import (
     _AWAY,
-    _BODY,
     _SHARES,
     FollowingError,
     _begun,
     _corrected,
+    _off,
     _predicted,
-    _spread_inside,
 )
+from swashplate.identification.time.start_states import slopes_ahead
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.validation.calibration import first_part
 
 
 @lru_cache(maxsize=1)
@@ -115,21 +117,30 @@ def test_what_was_not_read_tells_nothing() -> None:
     assert list(np.flatnonzero(likelihood.counted[0] & ~other.counted[0])) == [200, 201, 202]
 
 
-def test_a_record_begins_with_rotors_that_may_not_have_settled() -> None:
-    """And with air of which nothing is known: the spread of both is in the first covariance."""
+def test_a_record_that_begins_in_a_maneuver_says_how_far_off_its_states_may_be() -> None:
+    """Rates by a line through 0.15 s, rotors and bars as if settled, and air of which nothing is known."""
     likelihood = _likelihood()
-    run = likelihood._runs[0]
-    numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), likelihood.row.starts())[1]
-    numbers = jax.tree.map(lambda row: np.asarray(row)[None], numbers)
-    (spread,) = likelihood._spread
+    run, (piece,), (spread,) = likelihood._runs[0], likelihood.pieces, likelihood._spread
+    (went,) = likelihood.constant.runs(likelihood.row.starts())
     n, noise = len(spread), likelihood.noise
-    assert np.all(np.diag(spread)[_BODY:] > 0.0)
-    assert not np.any(spread[:_BODY])
-    sure, unsure = (np.asarray(_begun(likelihood.model, numbers, run.seen, s)[1][0]) for s in (0.0 * spread, spread))
-    np.testing.assert_allclose((unsure - sure)[:n, :n], spread, atol=1e-12)
+    off, sure = [], np.zeros(0)
+    for place in range(0, piece.time.size - 50, 4):
+        later = replace(piece, **{k: getattr(piece, k)[place:] for k in ("time", "inputs", "outputs", "voltage")})
+        seen = seen_at_start(likelihood.table.vehicle, later)
+        np.testing.assert_allclose([part[place] for part in slopes_ahead(piece)], [seen.value, seen.rate], atol=1e-9)
+        numbers = went.numbers._replace(inputs=went.commands[place : place + 50].mean(axis=0))
+        numbers = jax.tree.map(lambda row: np.asarray(row)[None], numbers)
+        state, P = _begun(likelihood.model, numbers, run.seen._replace(value=seen.value, rate=seen.rate), spread)
+        off.append(np.asarray(state.x)[0] - went.states.x[place])
+        sure = np.asarray(P)[0] - scipy.linalg.block_diag(spread, np.zeros((len(P[0]) - n,) * 2))
+    distance = np.sqrt(np.mean(np.array(off) ** 2, axis=0) / np.diag(spread))
+    assert np.all((distance > 0.8) & (distance < 1.25))  # every fourth place stands for all
+    moved = [likelihood.table.vehicle.index(name) for name in ("p", "q", "eta_bar", "zeta_bar")]
+    assert np.all(np.diag(spread)[moved] > np.diag(sure)[moved])  # more than a filter leaves open that has settled
     wind = float(noise.wind) * np.sqrt(0.5 * float(noise.tau_wind))
     assert np.all(np.sqrt(np.diag(sure))[n + N_DISTURBANCES : n + N_DISTURBANCES + 2] > 0.99 * wind)
-    assert not np.any(_spread_inside(np.full((5, n), np.nan)))
+    lost = went._replace(states=went.states._replace(x=np.full_like(went.states.x, np.nan)))
+    assert not np.any(_off(likelihood.table.vehicle, piece, run, lost))
 
 
 def test_the_gradient_is_the_slope_of_the_cost() -> None:

@@ -23,12 +23,12 @@ from swashplate.identification.core import accuracy
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.scoring import minimise
+from swashplate.identification.time.calibration import DifferencedError, first_part
 from swashplate.identification.time.innovations import traced_innovations
 from swashplate.identification.time.output_error import WINDOW, OutputError
 from swashplate.identification.time.prediction_error import PredictionError, stack_records
 from swashplate.identification.time.record_filter import STRETCH
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.validation.calibration import DifferencedError, first_part
 
 
 @lru_cache(maxsize=1)

@@ -15,7 +15,10 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import records
 from swashplate.identification.time import residual_fit
 from swashplate.identification.time.flight_details import AxisExcitation
-from swashplate.identification.time.residual_fit import LinearResidual, fit_residual
+from swashplate.identification.time.linear_residual import LinearResidual
+from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.residual_fit import fit_residual
+from swashplate.identification.time.residual_strength import BLOCK
 
 
 def test_words_say_what_was_gained_and_where() -> None:
@@ -60,5 +63,25 @@ def test_blocks_cover_the_record_once() -> None:
     long = replace(piece, **{name: np.concatenate([getattr(piece, name)] * 3) for name in ("inputs", "outputs")},
                    time=0.01 * np.arange(3 * piece.time.size), voltage=np.tile(piece.voltage, 3))  # fmt: skip
     cut = residual_fit._blocks(long)
-    assert len(cut) == int(long.time[-1] // residual_fit.BLOCK)
+    assert len(cut) == int(long.time[-1] // BLOCK)
     np.testing.assert_array_equal(np.concatenate([block.time for block in cut]), long.time)
+
+
+def test_blocks_begin_with_their_flights_own_accelerations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A block whose filter begins without them must find them with its drifts, in the 1.5 s that are not counted."""
+    coax = sp.vehicle("coax")
+    (piece,) = records((ten_seconds().condition(rate=100.0, cutoff=0.0),), coax)
+    made: list[PredictionError] = []
+
+    def stop(likelihoods: list[PredictionError]) -> None:
+        made.extend(likelihoods)
+        raise InterruptedError
+
+    monkeypatch.setattr(residual_fit, "seen_along", stop)
+    own = Nuisance(delay_servo=0.05, delay_motor=0.05, trim_motor_upper=0.01, push_p=2.0, push_w=-0.5)
+    with pytest.raises(InterruptedError):
+        fit_residual(coax, [piece] * 4, [own] * 4, Noise())
+    assert len(made) == 4
+    for each in made:
+        kept = Nuisance(*each.numbers(each.row.starts())[0].nuisance)
+        assert kept == own

@@ -8,6 +8,7 @@ import pytest
 from hfb320 import OUTPUTS, START, flight, hfb320
 from rolling import SAME, TRUTH, gusty, rolling
 from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Flight
 from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.identification.time.vehicle_time_fit import fit_vehicle
 from swashplate.models.linear.state_space_file import parse
@@ -28,6 +29,19 @@ def test_a_linear_vehicle_is_fitted_as_the_linear_model() -> None:
     entry = found.model.card.parameters["tau"]
     assert (entry.value, entry.status) == (found["tau"].value, "identified")
     assert found.to_document()["estimates"][0]["name"] == "Lb"
+
+
+def test_a_delay_of_a_stick_that_rests_is_what_was_known_before() -> None:
+    """Nothing tells it, and its prior keeps it; the fit divided by its information, which is zero."""
+    late = SAME.replace("[parameters]", '[delays]\nstick = "late"\n[parameters]\nlate = {value = 0.05, lower = 0.0}')
+    model = parse(late.replace("A = {value = 0.4}", "A = {value = 0.5, fixed = true}"))
+    flown = gusty()
+    stick = np.zeros_like(flown.values("stick"))
+    flown = Flight({"uniform": flown.streams["uniform"].assign(stick=("time", stick, {"units": "1"}))})
+    found = fit_in_time(model, flown, method="filter-error", shifts=False, biases=["ay"])
+    assert found["late"].insensitivity == np.inf
+    assert found["Lb"].insensitivity < found["Lb"].sigma < np.inf
+    assert "late" in repr(found)
 
 
 def test_what_cannot_be_fitted_is_said() -> None:

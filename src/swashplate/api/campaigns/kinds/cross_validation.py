@@ -15,7 +15,7 @@ from swashplate.api.campaigns.shares import share_words
 from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
 from swashplate.errors import CampaignError
 from swashplate.identification.core.result import Result
-from swashplate.validation.spans import CALIBRATION, HORIZONS
+from swashplate.identification.core.spans import CALIBRATION, HORIZONS
 from swashplate.validation.validation import Validation
 from swashplate.validation.verb import validate
 

@@ -125,7 +125,8 @@ class FlightsKind:
             lost, every = int(np.sum(table["lost"])), len(table["lost"])
             words = _limits(settings.limits).words()
             summary = [("Lost", f"{share_words(lost, every)} (limits: {words})", "bad" if lost else "good")]
-        return CampaignFindings(tuple(summary), shown, worst="place" if "place" in table else "", counted="lost")
+        worst = "place" if "place" in table else ""
+        return CampaignFindings(tuple(summary), shown, worst=worst, counted="lost", again=".nc")
 
     def _flown(self, settings: FlightsCampaign, portion: Portion, files: Mapping[str, Path]) -> MonteCarlo:
         varies = settings.varies

@@ -115,8 +115,8 @@ class SweepKind:
         caption = "What each choice brings: the median, and from it to the 95 % quantile"
         summary = (("Choices", f"{len(parts)}: {', '.join(names)}", "plain"),)
         return CampaignFindings(
-            summary, shown, worst=first.worst, tables=((caption, head, tuple(cells)),), careful=tuple(careful),
-            counted=first.counted, curves=curves(shares, what=first.counted),
+            summary, shown, worst=first.worst, again=first.again, tables=((caption, head, tuple(cells)),),
+            careful=tuple(careful), counted=first.counted, curves=curves(shares, what=first.counted),
         )  # fmt: skip
 
 

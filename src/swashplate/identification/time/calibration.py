@@ -13,10 +13,11 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Parameterization, trim_of_record
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.spans import CALIBRATION
 from swashplate.identification.time.innovations import Filtered, RecordRun
 from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle
-from swashplate.validation.spans import CALIBRATION
 
 _STEP = 1e-3
 """Of a scaled entry, to either side."""
@@ -37,6 +38,12 @@ class DifferencedError(PredictionError):
         innovations = np.array([high.innovations - low.innovations for high, low in sides])
         covariances = np.array([high.begin.gain.covariance - low.begin.gain.covariance for high, low in sides])
         return innovations / (2.0 * _STEP), covariances / (2.0 * _STEP)
+
+
+def as_begun(vehicle: Vehicle, record: Record) -> Vehicle:
+    """A vehicle for this record: a residual that counts the heading counts it from where the record begins."""
+    names = record.output_names
+    return facing(vehicle, float(record.outputs[0, names.index(HEADING)])) if HEADING in names else vehicle
 
 
 def first_part(record: Record, seconds: float) -> Record:
@@ -65,6 +72,7 @@ def calibrate(
         prior: centre of the priors, e.g. what the fit found on its own records.
         trims: further trims to find, and the standard deviations of their priors; None: what the vehicle's card says.
     """
+    vehicle = as_begun(vehicle, record)
     further = vehicle.card.observer.get("trims", {}) if trims is None else trims
     table = Parameterization(vehicle, (), of_records=tuple(trim_of_record(n, sigma) for n, sigma in further.items()))
     likelihood = DifferencedError(
