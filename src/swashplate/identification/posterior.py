@@ -20,8 +20,8 @@ from swashplate.identification.core.result import Fitted, Result, bounds_of
 from swashplate.identification.core.whitened import Chains, effective, split_rhat
 
 METHODS = ("laplace", "metropolis", "nuts")
-WARMUP = 80
-"""Draws of one chain of NUTS in which the step of all is found."""
+WARMUP = 25
+"""Draws of each chain of NUTS in which it looks for its step."""
 LEARNING = 300
 """Steps of each chain of Metropolis between two looks at the reference that it learns."""
 BLOCK = 50
@@ -56,7 +56,7 @@ def posterior(
         method: "laplace", "metropolis" or "nuts".
         draws: of each chain at most.
         chains: how many.
-        warmup: draws of one chain in which the step of all is found ("nuts"), or steps of each chain between two looks
+        warmup: draws of each chain in which it looks for its step ("nuts"), or steps of each chain between two looks
             at the reference ("metropolis", five times); None: `WARMUP`, `LEARNING`.
         seed: of all that is random.
         progress: told draws of a chain so far, and at most.

@@ -15,6 +15,7 @@ import swashplate as sp
 from rolling import OUTPUTS_OF_ROLL, SAME, TRUTH, gusty, rolling
 from simulated_flights import FREE, ten_seconds
 from swashplate.errors import IdentificationError
+from swashplate.identification.core import nuts
 from swashplate.identification.core.called_cost import called_cost
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import POSE, records
@@ -113,6 +114,14 @@ def test_a_method_without_a_traced_likelihood_says_so() -> None:
 
 
 @pytest.mark.proof
-def test_too_few_draws_are_refused_with_their_diagnostics() -> None:
+def test_too_few_draws_are_refused_with_their_diagnostics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """200 draws would do, each as far from the last as a new one; with every fourth of them four times they do not."""
+    plain = nuts._drawn
+
+    def sluggish(*given: Any) -> Any:
+        state, rows, stats = plain(*given)
+        return state, np.repeat(rows[::4], 4, axis=0)[: len(rows)], stats
+
+    monkeypatch.setattr(nuts, "_drawn", sluggish)
     with pytest.raises(IdentificationError, match=r"the posterior did not converge: .*400 effective draws are needed"):
         sp.posterior(fitted("output-error"), method="nuts", chains=2, warmup=60, draws=100)

@@ -1,7 +1,9 @@
 """The No-U-Turn sampler on a likelihood's exact gradients, whitened by the Fisher information at its optimum.
 
 Hoffman and Gelman (2014), by blackjax; the metric is the information with the priors' (Girolami and Calderhead 2011,
-held at the optimum), so that every direction has a standard deviation of about one and only the step is to be learnt.
+held at the optimum), and in it the slope of the gradients a little to either side: what one flight says of a number at
+its bound, or of a noise that it hardly shows, is not what the information expects of all flights. So every direction
+has a standard deviation of about one and only the step is to be learnt.
 """
 
 from __future__ import annotations
@@ -16,7 +18,6 @@ import blackjax
 import jax
 import jax.numpy as jnp
 import numpy as np
-from blackjax.adaptation.step_size import dual_averaging_adaptation
 from blackjax.mcmc.hmc import HMCState
 
 from swashplate.arrays import Array
@@ -29,9 +30,11 @@ Density = Callable[[Any, Any, Any], Any]
 Target = tuple[Density, Hashable, Mapping[str, Any]]
 _ACCEPTED = 0.8
 """Mean acceptance that the step is chosen for: longer steps mix worse on a real flight (decision 119)."""
-_FIRST_STEP = 0.4
-_SETTLING = 20
-"""Draws that a chain drops which takes the step that another has found."""
+_FIRST_STEP = 0.5
+_ASIDE = 0.3
+"""Standard deviations to either side at which gradients say how the density bends."""
+_FLATTEST = 0.04
+"""Of the information: less bending than this is taken for as much, so that no direction is made wider than five."""
 _DOUBLINGS = 8
 _STATS = ("lp", "diverging", "energy", "tree_depth", "n_steps", "acceptance_rate")
 
@@ -56,7 +59,7 @@ def sample(
         traced: the cost. row: its entries, with bounds and priors.
         optimum: scaled row to start from (p,). covariance: inverse of information and priors there (p, p).
         chains: how many, each from a point of its own as far from the optimum as the metric says.
-        warmup: draws of the first chain in which the step of all is found, dropped.
+        warmup: draws of each chain, dropped, in which it looks for a step; all then take the mean of these.
         block: draws between two looks at `enough`, which ends it; most: draws of a chain at most.
         seed: of all that is random.
         progress: told draws of a chain so far and at most.
@@ -66,16 +69,15 @@ def sample(
     random = np.random.default_rng(seed)
     starts = [jnp.asarray(random.standard_normal(numbers)) for _ in range(chains)]
     keys = list(jax.random.split(jax.random.key(seed), chains))
-    target = (traced.function, traced.plan, data)
-    states = [_alive(target, start) for start in starts]
-    np.asarray(_step(*target, keys[0], states[0], _FIRST_STEP)[1])  # compiled once, before there are threads
+    target: Target = (traced.function, traced.plan, data)
+    np.asarray(_step(*target, keys[0], _begin(*target, starts[0]), _FIRST_STEP)[1])  # compiled before there are threads
     parts: list[list[tuple[Array, Array]]] = [[] for _ in range(chains)]
     with ThreadPoolExecutor(max_workers=min(chains, os.cpu_count() or 1)) as pool:
-        states[0], step = _warmed(target, warmup, keys[0], states[0])
-        settle, steps = min(warmup, _SETTLING), np.full(chains, step)
-        # The metric is one, and so is the step: the other chains only leave where they began.
-        settled = [pool.submit(_drawn, target, keys[c], states[c], step, -settle, settle) for c in range(1, chains)]
-        states[1:] = [job.result()[0] for job in settled]
+        target = _evened(target, pool)
+        warmed = [pool.submit(_warmed, target, warmup, keys[c], _alive(target, starts[c])) for c in range(chains)]
+        states = [job.result()[0] for job in warmed]
+        # The metric is one, and so is the step.
+        steps = np.full(chains, np.exp(np.mean([np.log(job.result()[1]) for job in warmed])))
         done, chain = 0, None
         while done < most:
             size = min(block, most - done)
@@ -111,13 +113,14 @@ def _together(parts: list[list[tuple[Array, Array]]], steps: Array) -> Chains:
 
 
 def _warmed(target: Target, warmup: int, key: jax.Array, state: HMCState) -> tuple[Any, float]:
-    begin, update, final = dual_averaging_adaptation(_ACCEPTED)
-    adapting = begin(_FIRST_STEP)
+    """The state after some draws, and the step that the second half of them took, by Robbins and Monro (1951)."""
+    log, taken = float(np.log(_FIRST_STEP)), [float(np.log(_FIRST_STEP))]
     for k in range(warmup):
-        step = float(np.exp(adapting.log_step_size))
-        state, _, stats = _step(*target, jax.random.fold_in(key, k), state, min(step, 2.0))
-        adapting = update(adapting, stats[_STATS.index("acceptance_rate")])
-    return state, float(final(adapting)) if warmup else _FIRST_STEP
+        state, _, stats = _step(*target, jax.random.fold_in(key, k), state, float(np.exp(log)))
+        accepted = float(stats[_STATS.index("acceptance_rate")])
+        log += ((accepted if np.isfinite(accepted) else 0.0) - _ACCEPTED) / np.sqrt(k + 1.0)
+        taken.append(log)
+    return state, float(np.exp(np.mean(taken[len(taken) // 2 :])))
 
 
 def _drawn(
@@ -138,6 +141,21 @@ def _prepared(traced: TracedCost, row: Row, optimum: Array, covariance: Array) -
     enable_double_precision()
     numbers = whitening(row, optimum, covariance)
     return {"likelihood": traced.data, **{name: jnp.asarray(value) for name, value in numbers.items()}}
+
+
+def _evened(target: Target, pool: ThreadPoolExecutor) -> Target:
+    """The target in numbers in which it bends alike in every direction, by differences of gradients at the optimum."""
+    function, plan, data = target
+    numbers = data["middle"].shape[0]
+    sides = _ASIDE * np.stack([np.eye(numbers), -np.eye(numbers)], axis=1).reshape(-1, numbers)
+    slopes = list(pool.map(lambda z: np.asarray(_begin(*target, jnp.asarray(z)).logdensity_grad), sides))
+    high, low = np.array(slopes).reshape(numbers, 2, numbers).transpose(1, 0, 2)
+    bends = (low - high) / (2.0 * _ASIDE)
+    lost = ~np.all(np.isfinite(bends), axis=1)  # the model diverges there: as the information has it
+    bends[lost] = bends[:, lost] = 0.0
+    values, vectors = np.linalg.eigh(0.5 * (bends + bends.T) + np.diag(lost.astype(float)))
+    stretched = vectors / np.sqrt(np.maximum(values, _FLATTEST))
+    return function, plan, {**data, "root": data["root"] @ stretched}
 
 
 def _density(function: Density, plan: Hashable, data: Mapping[str, Any], z: jax.Array) -> Any:

@@ -2,6 +2,7 @@
 
 The numbers of a fit are whitened by the inverse of information and priors at the optimum. A scale with a near bound is
 bent so that the bound lies at infinity: exponential for one bound, logistic for two; at the middle its slope is one.
+The logarithm of a noise is stretched to the prior's width where the noise is too small to be seen.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ _NEAR = 8.0
 """Sigmas from the optimum within which a bound bends the scale; farther ones only end it."""
 _INSIDE = 0.5
 """Sigmas that the bent scale's middle keeps from a bound on which the optimum lies."""
+
+_UNSEEN, _BLEND, _SHARE = 1.0, 0.3, 0.8
+"""How far below the optimum the logarithm of a noise is that the data no longer see (its variance is a seventh there),
+and how wide the change to the prior's width is; in sigmas at most `_SHARE`, so that the optimum keeps its width."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,7 @@ def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, Array]:
     middle = np.where(tight, 0.5 * (np.where(tight, low, 0.0) + np.where(tight, high, 0.0)), middle)
     below, above = middle - low < _NEAR * sigma, high - middle < _NEAR * sigma
     values, vectors = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+    logarithmic, wide = row.column("logarithmic") > 0.0, row.column("sigma") / row.scale
     return {
         "middle": middle,
         "low": low,
@@ -56,6 +62,9 @@ def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, Array]:
         "gap_high": np.where(above, high - middle, 1.0),
         "below": below,
         "above": above,
+        "wider": np.where(logarithmic & np.isfinite(wide), np.maximum(wide / sigma, 1.0), 1.0) - 1.0,
+        "unseen": _UNSEEN / row.scale,
+        "blend": np.minimum(_BLEND / row.scale, _SHARE * sigma),
         "root": sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)),
         "mean": row.column("mean") / row.scale,
         "prior": row.prior_information,
@@ -69,6 +78,9 @@ def unbent(data: Mapping[str, Any], z: Array | jax.Array, xp: ModuleType) -> tup
         data: from `whitening`. z: whitened numbers (p,). xp: NumPy, or JAX's.
     """
     away = data["root"] @ z
+    small = (-away - data["unseen"]) / data["blend"]
+    slope = 1.0 + data["wider"] * xp.exp(-xp.logaddexp(0.0, -small))
+    away = away - data["wider"] * data["blend"] * xp.logaddexp(0.0, small)
     a, b = data["gap_low"], data["gap_high"]
     up, down = xp.exp(away / a), xp.exp(-away / b)
     both = data["below"] & data["above"]
@@ -87,7 +99,7 @@ def unbent(data: Mapping[str, Any], z: Array | jax.Array, xp: ModuleType) -> tup
     )
     logistic = low + high - xp.log(share * (1.0 - share))
     stretch = xp.where(both, logistic, xp.where(data["below"], away / a, xp.where(data["above"], -away / b, 0.0)))
-    return value, stretch.sum()
+    return value, stretch.sum() + xp.log(slope).sum()
 
 
 def split_rhat(draws: Array) -> Array:

@@ -51,7 +51,7 @@ _NUISANCE = {
 
 
 _Accumulated = tuple[Array, Array, list[Filtered], list[tuple[Array, Array]]]
-"""Gradient, information, runs, and slopes by record."""
+"""Gradient, information, runs, and by record slopes and the information in the covariance."""
 
 _KEPT = 2
 """Rows whose runs are kept: a search tries up to two, and goes on from one of them."""
@@ -286,36 +286,40 @@ class PredictionError:
             d_nu, dS = self._moved(mine, run, row)
             gradient += self._gradient(run, counted, d_nu, dS)
             Li = np.linalg.inv(np.linalg.cholesky(S))
-            dM = Li @ dS @ Li.T
-            told = (self._foreseen(d_nu[:, counted], nu, mine.log).reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
-            moved.append((told, dM))
+            told, by_covariance = self._foreseen(d_nu[:, counted], nu, dS, S, mine.log)
+            told = (told.reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
+            moved.append((told, by_covariance))
             weighted = told.reshape(p, -1) * np.sqrt(robust.weights(nu @ Li.T)).ravel()
-            information += weighted @ weighted.T
-            information += _by_covariance(dM, nu.shape[0])
+            information += weighted @ weighted.T + by_covariance
         return gradient, information, runs, moved
 
     def _moved(self, mine: RecordRun, run: Filtered, row: Array) -> tuple[Array, Array]:
         """Slopes of a record's innovations (p, n, outputs) and of their covariance (p, outputs, outputs)."""
         return mine.moved(run, self.table.card_row, row * self.row.scale, self.row.scale)
 
-    def _foreseen(self, d_nu: Array, nu: Array, log: int) -> Array:
-        """Slopes of innovations (p, n, outputs) without what only turns them: the part that tells something.
+    def _foreseen(self, d_nu: Array, nu: Array, dS: Array, S: Array, log: int) -> tuple[Array, Array]:
+        """Slopes of innovations and the information in their covariance (p, p), without what only turns both.
 
         Innovations stand in the axes of the predicted heading. An entry that moves it turns what was measured now too,
-        which makes no flight more or less likely.
+        and its covariance with it, which makes no flight more or less likely.
         """
+        Li = np.linalg.inv(np.linalg.cholesky(S))
+        flat = (Li @ dS @ Li.T).reshape(len(dS), -1)
+        by_covariance = 0.5 * len(nu) * flat @ flat.T
         names = self.model.output_names
         if not {"x", "y", "psi"} <= set(names):
-            return d_nu
+            return d_nu, by_covariance
         i, j, k = (names.index(name) for name in ("x", "y", "psi"))
         heading = -d_nu[:, :, k]
         if (level := f"level_psi[{log}]") in self.row.names:
             place = self.row.names.index(level)
             heading[place] -= self.row.scale[place]  # what is tracked moves, the nose does not
-        told = d_nu.copy()
-        told[:, :, i] -= heading * nu[:, j]
-        told[:, :, j] += heading * nu[:, i]
-        return told
+        turn = np.zeros_like(S)
+        turn[i, j], turn[j, i] = 1.0, -1.0
+        turned = (Li @ (turn @ S + S @ turn.T) @ Li.T).ravel()
+        mixed = np.outer(flat @ turned, heading.sum(axis=1))
+        by_covariance += 0.5 * (turned @ turned * (heading @ heading.T) - mixed - mixed.T)
+        return d_nu - heading[:, :, None] * (nu @ turn.T), by_covariance
 
     def refresh(self, row: Array) -> None:
         """Nothing is held between iterations: the noise is part of the row."""
@@ -362,10 +366,10 @@ class PredictionError:
         """
         _, _, runs, moved = self._accumulate(row)
         white, sensitivities, rest = [], [], np.zeros((len(self.row), len(self.row)))
-        for run, (d_white, dM), counted in zip(runs, moved, self.counted, strict=True):
+        for run, (d_white, by_covariance), counted in zip(runs, moved, self.counted, strict=True):
             white.append(run.innovations[counted] @ np.linalg.inv(np.linalg.cholesky(run.begin.gain.covariance)).T)
             sensitivities.append(d_white)
-            rest += _by_covariance(dM, int(counted.sum()))
+            rest += by_covariance
         return white, sensitivities, rest
 
 
@@ -373,12 +377,6 @@ def _side_by_side(ahead: Ahead) -> Any:
     """Starts of records of different lengths, (records, most starts); what is missing begins at the first sample."""
     most = max(len(starts) for starts in ahead.starts)
     return jnp.asarray([(*starts, *[0] * (most - len(starts))) for starts in ahead.starts])
-
-
-def _by_covariance(dM: Array, n: int) -> Array:
-    """Information of n innovations about entries that change their covariance, dM = L^-1 dS L^-T (p, m, m)."""
-    flat = dM.reshape(len(dM), -1)
-    return np.asarray(0.5 * n * flat @ flat.T)
 
 
 def _of_record(free: Free) -> tuple[float, float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any
 
@@ -24,6 +25,11 @@ def half_squares(plan: tuple[float, ...], data: Any, row: Any) -> Any:
     """A correlated pair, and a third that is exponential above zero."""
     away = row[:2] / jnp.array(plan)
     return 0.5 * away @ jnp.linalg.solve(data["tied"], away) + row[2]
+
+
+def tied_squares(plan: tuple[float, ...], data: Any, row: Any) -> Any:
+    """The correlated pair alone."""
+    return half_squares(plan, data, jnp.append(row, 0.0))
 
 
 PLAN = (1.0, 2.0)
@@ -63,6 +69,19 @@ def test_the_draws_are_of_the_density_and_keep_its_bounds() -> None:
     assert np.all(split_rhat(found.rows) < 1.02)
 
 
+def test_a_covariance_that_is_wrong_is_mended_by_the_gradients() -> None:
+    """A number taken for half as wide, and one for twice as wide, come out as wide as they are."""
+    free = Row(tuple(Entry(name, "parameter", 0.0, 1.0) for name in ("one", "other")))
+    true = TIED * np.outer(PLAN, PLAN)
+    wrong = true * np.outer([0.5, 2.0], [0.5, 2.0])
+    traced = TracedCost(tied_squares, PLAN, {"tied": TIED})
+    with ThreadPoolExecutor(1) as pool:
+        for covariance in (true, wrong):
+            target = (traced.function, PLAN, nuts._prepared(traced, free, np.zeros(2), covariance))
+            root = np.asarray(nuts._evened(target, pool)[2]["root"])
+            np.testing.assert_allclose(root @ root.T, true, rtol=1e-9)
+
+
 def test_equal_seeds_give_equal_draws_whatever_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     first = chains().rows
     chains.cache_clear()
@@ -88,3 +107,15 @@ def test_the_stretch_of_a_bent_scale_is_its_slope(bounds: tuple[float, float]) -
         (slope,) = jax.jacfwd(lambda z: unbent(data, z, jnp)[0][0])(z)
         assert bounds[0] < value < bounds[1]
         np.testing.assert_allclose(stretch, np.log(slope), atol=1e-6)  # near one, 1 - sigmoid has few digits left
+
+
+def test_the_logarithm_of_a_noise_is_as_wide_as_the_prior_where_it_is_not_seen() -> None:
+    row = Row((Entry("noise", "noise", 0.0, 1.0, mean=0.0, sigma=2.0, logarithmic=True),))
+    # One that a flight tells to 1 % keeps that width all the way.
+    for sigma, wide in ((0.4, 2.0), (0.01, 0.01)):
+        data = nuts._prepared(TracedCost(half_squares, (), {}), row, np.zeros(1), np.full((1, 1), sigma**2))
+        slope = jax.jacfwd(lambda z, data=data: unbent(data, z, jnp)[0][0])
+        for place, expected in ((1.0, sigma), (0.0, sigma), (-6.0, wide)):
+            z = jnp.array([place])
+            np.testing.assert_allclose(slope(z), [expected], rtol=0.2)
+            np.testing.assert_allclose(unbent(data, z, jnp)[1], np.log(slope(z)[0] / sigma), rtol=1e-6, atol=1e-9)

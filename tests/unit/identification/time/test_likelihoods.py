@@ -125,8 +125,16 @@ def test_a_heading_that_only_turns_the_innovations_tells_nothing() -> None:
 
     moved = (innovation(1e-5) - innovation(-1e-5)) / 2e-5
     assert np.abs(moved[0, [names.index("x"), names.index("y")]]).min() > 5e-4
-    told = likelihood._foreseen(np.tile(moved, (len(likelihood.row), 1, 1)), innovation(0.0), 0)[0, 0]
-    np.testing.assert_allclose(told, -1.0 * (np.array(names) == "psi"), atol=1e-7)
+    every, heading = np.tile(moved, (len(likelihood.row), 1, 1)), np.array(names) == "psi"
+    # With the innovation turns what is expected of it, which is not as large ahead as to the side.
+    spread = np.diag(np.arange(1.0, 7.0))
+    across = np.zeros_like(spread)
+    across[names.index("x"), names.index("y")], across[names.index("y"), names.index("x")] = 1.0, -1.0
+    with_it = np.tile(across @ spread + spread @ across.T, (len(every), 1, 1))
+    told, nothing = likelihood._foreseen(every, innovation(0.0), with_it, spread, 0)
+    np.testing.assert_allclose(told[0, 0], -1.0 * heading, atol=1e-7)
+    np.testing.assert_allclose(nothing[0, 0], 0.0, atol=1e-9)
+    assert likelihood._foreseen(every, innovation(0.0), 0.0 * with_it, spread, 0)[1][0, 0] > 0.1
 
 
 def test_slopes_by_differences_of_runs_are_those_along_tangent_planes() -> None:
