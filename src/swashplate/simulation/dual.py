@@ -141,7 +141,7 @@ class DualBackend:
     detached = staticmethod(value_of)
 
     @staticmethod
-    def where(condition: Any, x: Number, y: Number) -> Number:
+    def where(condition: bool | np.bool_, x: Number, y: Number) -> Number:
         return x if condition else y
 
 

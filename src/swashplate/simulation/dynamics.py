@@ -25,6 +25,7 @@ from swashplate.simulation.trigonometry import vector_backend
 
 Rates = Callable[[Any, Any, Any, Environment], Any]
 RowRates = Callable[[Any, Any, Any], Any]
+Rows = jax.Array | Array | Sequence[Any]
 
 SURROUNDINGS = ("wind_north", "wind_east", "wind_down", "voltage")
 """What of the environment may change during a flight, in the order of the driving row."""
@@ -93,7 +94,7 @@ def parameter_row(vehicle: Vehicle, environment: Environment) -> NDArray[np.floa
     return np.array([*vehicle.values(), *constants], dtype=np.float64)
 
 
-def unpack_rows(equations: Equations, w: Any, p: Any) -> tuple[Any, Any, Environment]:
+def unpack_rows(equations: Equations, w: Rows, p: Rows) -> tuple[Any, Any, Environment]:
     """Inputs, named parameters and environment from a driving row `w` and a parameter row `p`, or batches of these."""
     n_inputs, names = len(equations.vehicle.input_names), equations.vehicle.parameter_names
     parameters = equations.vehicle.parameters(*(p[i] for i in range(len(names))))

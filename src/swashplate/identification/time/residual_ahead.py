@@ -212,10 +212,10 @@ def _search(flights: Sequence[FlightAhead], at: Array, size: Array, held: float)
     for _ in range(_ROUNDS):
         way = shrunk(told, held)[0] - at
         lower = ((cost(at + share * way), share) for share in _SHORTER)
-        found, share = next(((tried, share) for tried, share in lower if tried < lowest), (lowest, 0.0))
+        least, share = next(((tried, share) for tried, share in lower if tried < lowest), (lowest, 0.0))
         if not share:
             break
-        done, lowest, at = lowest - found < _ENOUGH, found, at + share * way
+        done, lowest, at = lowest - least < _ENOUGH, least, at + share * way
         told = _told(flights, at, size)
         if done:
             break

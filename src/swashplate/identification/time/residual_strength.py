@@ -33,16 +33,16 @@ _FLOOR = 1e-9
 """Of each parameter's information, what is added to it: blocks may leave out the one that tells a combination."""
 
 
-def enough_blocks(found: int, where: str, *, after: float = 0.0) -> None:
+def enough_blocks(count: int, where: str, *, after: float = 0.0) -> None:
     """Refuses records that make too few blocks.
 
     Raises:
         IdentificationError: for fewer than `FEWEST`.
     """
-    if found < FEWEST:
+    if count < FEWEST:
         later = f" after their first {after:g} s, which tell a flight's constants" if after else ""
         raise IdentificationError(
-            f"the flights make {found} blocks of {BLOCK:g} s{later}, a residual needs {FEWEST}: without blocks to "
+            f"the flights make {count} blocks of {BLOCK:g} s{later}, a residual needs {FEWEST}: without blocks to "
             "leave out, nothing says how much of it is chance.",
             where=where,
             channel="residual",
