@@ -79,6 +79,14 @@ class Dual:
     def __pos__(self) -> Dual:
         return self
 
+    __hash__ = None  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> bool:
+        return bool(self.value == value_of(other))
+
+    def __bool__(self) -> bool:
+        return bool(self.value)
+
     def __lt__(self, other: Number) -> bool:
         return self.value < value_of(other)
 

@@ -65,3 +65,12 @@ def test_equations_with_sums_over_arrays_go_to_xla(monkeypatch: pytest.MonkeyPat
     assert len(dynamics.rates_and_slopes(dynamics.equations_of(coax), row, row, row)) == 3
     assert len(asked) == 1
     assert TypeError in CANNOT
+
+
+def test_equality_and_truth_are_those_of_the_value() -> None:
+    """Equations may ask whether a number is zero; the one that is asked must not matter."""
+    value, slopes = slopes_of(
+        lambda x, w: [x[0] if x[0] != 0.0 else w[0], w[0] if x[0] else x[0]], np.zeros(1), np.ones(1)
+    )
+    assert value.tolist() == [1.0, 0.0]
+    assert slopes.tolist() == [[0.0, 1.0], [1.0, 0.0]]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
@@ -117,29 +118,23 @@ def _taken(sensitivity: Array, plain: Array) -> tuple[Array, Array]:
     return seen @ plain, seen
 
 
-def _fast_length(n: int) -> int:
-    """The next product of powers of 2, 3 and 5 from `n` on: what a Fourier transform is fast for."""
-    parts: list[int] = [3**i * 5**j for i in range(n.bit_length()) for j in range(n.bit_length())]
-    return min(part << (-(-n // part) - 1).bit_length() for part in parts)
-
-
 def _products(left: Array, right: Array, lags: int) -> Array:
     """sum_t left(t) right(t + lag)' for lags 0 to `lags`, over a last axis too where there is one; (lags + 1, m, m)."""
     n = len(left)
-    size = _fast_length(n + lags)  # long enough for the sums not to wrap round
-    a, b = (np.fft.rfft(x.reshape(n, x.shape[1], -1), size, axis=0) for x in (left, right))
-    return np.asarray(np.fft.irfft(a.conj() @ b.transpose(0, 2, 1), size, axis=0)[: lags + 1])
+    size = next_fast_len(n + lags, real=True)  # long enough for the sums not to wrap round
+    a, b = (rfft(x.reshape(n, x.shape[1], -1), size, axis=0) for x in (left, right))
+    return np.asarray(irfft(a.conj() @ b.transpose(0, 2, 1), size, axis=0)[: lags + 1])
 
 
 def _spread(correlation: Array, sensitivity: Array) -> Array:
     """Covariance of sum_t S_t' v_t for errors v with a one-sided autocorrelation (lags + 1, m, m), shape (p, p)."""
     n, lags, m = sensitivity.shape[1], len(correlation) - 1, correlation.shape[1]
-    size = _fast_length(n + lags)
+    size = next_fast_len(n + lags, real=True)
     both = np.zeros((size, m, m))
     both[: lags + 1] = correlation.transpose(0, 2, 1)
     both[size - lags :] = correlation[:0:-1]
-    spectrum = np.fft.rfft(both, axis=0)
-    moved = np.fft.rfft(sensitivity, size, axis=1).transpose(1, 2, 0)
+    spectrum = rfft(both, axis=0)
+    moved = rfft(sensitivity, size, axis=1).transpose(1, 2, 0)
     share = np.full(len(spectrum), 2.0 / size)  # of both signs of a frequency (Parseval)
     share[0] = 1.0 / size
     if size % 2 == 0:
