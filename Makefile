@@ -6,6 +6,8 @@ BIN := .venv/bin
 STAMP := .venv/.complete
 # One more than the two cores that are usual: while a test waits, another one runs.
 WORKERS ?= 3
+# Three test processes and many started programs would each compile every module anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo test page lint types layers unit speed proof siege site clean
 .DEFAULT_GOAL := help

@@ -37,16 +37,18 @@ def scan(*, steps: int, repeats: int) -> Result:
     )
 
 
-def speeds(*, repeats: int) -> Result:
-    """Trim and all 60 derivatives by contributor at 50 speeds, warm."""
+def speeds(*, count: int, repeats: int) -> Result:
+    """Trim and all 60 derivatives by contributor at `count` speeds, warm."""
     flown = vehicle("raptor50")
-    wanted = np.linspace(0.0, 15.0, 50)
+    wanted = np.linspace(0.0, 15.0, count)
 
     def run() -> None:
         for at in trims_over_speed(flown, wanted):
             derivative_table(flown, at)
 
-    return Result("trims with derivatives", best_rate(run, 50, repeats=repeats), SPEEDS_TARGET, "per second, 0-15 m/s")
+    return Result(
+        "trims with derivatives", best_rate(run, count, repeats=repeats), SPEEDS_TARGET, "per second, 0-15 m/s"
+    )
 
 
 def lpv(*, steps: int, repeats: int) -> Result:

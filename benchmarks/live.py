@@ -69,8 +69,8 @@ class Punctual:
 
 
 def measure(*, short: bool) -> list[Punctual]:
-    """Both kinds of page for 60 s; the first alone for 5 s in the short form and without Chromium."""
-    seconds = 5.0 if short else 60.0
+    """Both kinds of page for 60 s; the first alone for 2 s in the short form and without Chromium."""
+    seconds = 2.0 if short else 60.0
     readings = [_reading(seconds)]
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is not None and not short:

@@ -190,9 +190,9 @@ def simulate_closed_loop(
 def _flown_by_xla(
     as_carried: CarriedAttitude, controller: Controller, tables: LoopTables, waiting: int, p: Array
 ) -> tuple[Array, Array]:
-    fly, n = _fly_quickly_compiled if getattr(controller.step, "feels", False) else _fly, len(tables.around)
+    n = len(tables.around)
     longer = shared_length(n)
-    states, inputs = fly(
+    states, inputs = _fly(
         equations_of(as_carried.vehicle),
         controller.step,
         waiting,
@@ -274,9 +274,7 @@ def _arrived(sent: Float[jax.Array, "commands inputs"], late: Int[jax.Array, " i
     return jnp.take_along_axis(sent, late[None, :], axis=0)[0]
 
 
-_fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3))
-# An observer's derivatives take minutes to compile as XLA usually does it.
-_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_TO_COMPILE)
+_fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_TO_COMPILE)
 
 
 def told(

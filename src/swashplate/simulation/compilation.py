@@ -18,7 +18,8 @@ from swashplate.atomic import write_text
 from swashplate.errors import WriteError
 
 QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
-"""Options for `jax.jit` of what runs few times: four times less compiling for a helicopter's exact derivatives."""
+"""Options for `jax.jit`: a helicopter's exact derivatives compile four times faster, loops of one vehicle by a sixth to
+a third, and run as fast; a batch runs 5 % slower."""
 
 RUN_RARELY = {**QUICK_TO_COMPILE, "xla_backend_optimization_level": 0}
 """Of what is called a few hundred times at most: half of the compiling, and a call takes 10 to 70 us longer."""

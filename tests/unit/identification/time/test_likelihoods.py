@@ -156,7 +156,7 @@ def test_records_longer_than_a_stretch_and_beside_others_are_run_alike() -> None
     both = PredictionError(whole.table, [piece, piece])
     assert both.cost(row) == pytest.approx(2.0 * whole.cost(row), rel=1e-12)
     assert piece.time.size > STRETCH
-    values = traced_innovations(*whole.traced_at(), jnp.asarray(row))[0]
+    values = jax.jit(traced_innovations, static_argnums=0)(*whole.traced_at(), jnp.asarray(row))[0]
     np.testing.assert_allclose(whole.runs(row)[0].innovations, values[0, : piece.time.size], rtol=1e-9, atol=1e-13)
 
 
