@@ -78,7 +78,7 @@ def over_time(
     import pandas as pd
     import xarray as xr
 
-    clock = xr.IndexVariable("time", pd.Index(time.values, name="time"), time.attrs)  # type: ignore[no-untyped-call]
+    clock = xr.IndexVariable("time", pd.Index(time.values, name="time"), time.attrs)
     return xr.Dataset(variables, coords={"time": clock}, attrs=attributes)
 
 
