@@ -1,6 +1,7 @@
 """How long an identification takes: 15 parameters from 40 s of flight at 100 Hz, warm, cold, and by the paper's way.
 
 python -m benchmarks.identifying METHOD    one identification in this process; prints seconds and peak memory as JSON
+python -m benchmarks.identifying RIVAL     simplex or scipy: its row as JSON, with the peak memory of this process
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ FIRST = {
 }
 """Seconds of processor time of whole commands, from the start of the program to its report."""
 FIRST_MEMORY = 0.8
+REPORT = 1.0
 MEMORY = 2.0
 RATIO = 20.0
 
@@ -227,6 +229,32 @@ def nelder_mead(logged: sp.Flight) -> Span:
     return Span(f"output error to where the simplex is after {RATIO:g} times as long", ours, theirs / RATIO, note, kept)
 
 
+RIVALS = {"simplex": nelder_mead, "scipy": scipy_least_squares}
+"""Each against output error: `python -m benchmarks.identifying NAME`."""
+
+
+def beside(rival: str) -> Span:
+    """A rival's row from a process of its own, for its peak memory."""
+    command = [sys.executable, "-m", "benchmarks.identifying", rival]
+    row = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    note = f"{row['note']}; peak of both in one process {row['peak_gib']:.2f} GiB"
+    return Span(row["name"], row["seconds"], row["target"], note, row["kept"])
+
+
+def reports(logged: sp.Flight) -> list[Span]:
+    """The page of a fit and the page of a validation, by the clock, the first of their process."""
+    fit = sp.identify(_start(), logged, free="full", method="prediction-error", keep_unexcited=True)
+    pages = {"an identification": fit, "a validation": sp.validate(fit.model, logged)}
+    spans = []
+    with tempfile.TemporaryDirectory() as folder:
+        for what, result in pages.items():
+            path, begin = Path(folder) / "report.html", time.perf_counter()
+            sp.report(result, path=path)
+            seconds = time.perf_counter() - begin
+            spans.append(Span(f"report of {what}", seconds, REPORT, f"{path.stat().st_size / 1e6:.1f} MB"))
+    return spans
+
+
 def measure(*, short: bool) -> list[Span]:
     """The short form fits a short flight by output error alone."""
     if short:
@@ -236,12 +264,12 @@ def measure(*, short: bool) -> list[Span]:
         *first_answers(logged),
         *(warm(method, logged) for method in WARM),
         *(cold(method) for method in WARM),
-        nelder_mead(logged),
-        scipy_least_squares(logged),
+        *map(beside, RIVALS),
+        *reports(logged),
     ]
 
 
 if __name__ == "__main__":
-    taken = identify(sys.argv[1], flight())
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    print(json.dumps({"seconds": taken, "peak_gib": peak}))
+    asked = sys.argv[1]
+    told = RIVALS[asked](flight()).as_json() if asked in RIVALS else {"seconds": identify(asked, flight())}
+    print(json.dumps({**told, "peak_gib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20}))
