@@ -117,7 +117,8 @@ class Visit:
 
 
 def drawn(visit: Visit, *, logs: int = 1) -> None:
-    visit.until(f"swash.state.ready().length === {logs} && document.documentElement.dataset.drawn")
+    checked = "swash.state.ready().every((log) => log.checked)"
+    visit.until(f"swash.state.ready().length === {logs} && {checked} && document.documentElement.dataset.drawn")
     visit.until("document.querySelectorAll('.chart canvas').length > 0")
 
 
