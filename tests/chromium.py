@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,8 +21,16 @@ ARGUMENTS = [
 
 
 NO_CARD = ["--disable-gpu"]
-SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-"""WebGL without a graphics card, for pages that draw in three dimensions."""
+SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"]
+"""WebGL without a graphics card, for pages that draw in three dimensions; all else is drawn without WebGL."""
+_OF_THE_BROWSER = re.compile(
+    r"debug|info|warning: \[GroupMarker|warning: \[\.WebGL-\w+\]GL Driver Message .*: GPU stall due to ReadPixels"
+)
+
+
+def complaints(said: list[str]) -> list[str]:
+    """Lines of a page's console, less what the browser itself notes about drawing in software."""
+    return [line for line in said if not _OF_THE_BROWSER.match(line)]
 
 
 def running_browser(*, webgl: bool = False) -> Iterator[Any]:

@@ -103,6 +103,8 @@ class Firmware(HeliAutopilot):
     def over_udp(self, packet: bytes) -> bytes | None:
         if "frozen" in self.faults and self.lift_off:
             time.sleep(3600.0)
+        if "mute" in self.faults:  # all that it does is keep someone waiting
+            time.sleep(1.0 / CRAWL)
         self.udp.send(packet)
         try:
             return self.udp.recv(4096)

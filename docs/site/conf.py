@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+gc.set_threshold(200_000, 50, 1000)  # pages are many small objects that stay; looking for garbage took a seventh
 
 project = "swashplate"
 author = "The swashplate developers"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,37 +15,21 @@ from typing import Any
 
 import pytest
 
+import chromium
 import swashplate as sp
 from swashplate.links.web.libraries import PAGE
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytest.importorskip("starlette", reason="the extra `live` is not installed")
 
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
 SIZES = {"desk": (1280, 860), "telephone": (390, 844)}
 _WAIT = 30_000.0  # ms; a busy machine draws slowly
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("chromium is not installed (Debian: apt-get install chromium)")
     if not (PAGE / "vendor" / "three.module.min.js").is_file():
         pytest.skip("the page's libraries are not here: python scripts/vendor_page.py (needs npm)")
-    with sync_api.sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-        yield running
-        running.close()
+    yield from chromium.running_browser(webgl=True)
 
 
 @contextmanager
@@ -129,7 +112,7 @@ class Visit:
         self.page.evaluate("axes => { window.swash.sticks.scripted = axes; }", held)
 
     def done(self) -> None:
-        assert [line for line in self.said if not line.startswith(("debug", "warning: [GroupMarker", "info"))] == []
+        assert chromium.complaints(self.said) == []
         assert all(url.startswith((self.url, self.url.replace("http", "ws", 1), "data:")) for url in self.asked)
 
 

@@ -108,7 +108,7 @@ class Visit:
         return str(self.page.locator(selector).inner_text())
 
     def close(self, *, complaints: int = 0) -> None:
-        errors = [line for line in self.said if not line.startswith(("debug", "info", "warning: [GroupMarker"))]
+        errors = chromium.complaints(self.said)
         assert len(errors) == complaints, errors
         assert all(url.startswith((self.url, "data:")) for url in self.asked)
         assert self.of("document.documentElement.scrollWidth") <= self.width
@@ -117,7 +117,8 @@ class Visit:
 
 
 def drawn(visit: Visit, *, logs: int = 1) -> None:
-    visit.until(f"swash.state.ready().length === {logs} && document.documentElement.dataset.drawn")
+    checked = "swash.state.ready().every((log) => log.checked)"
+    visit.until(f"swash.state.ready().length === {logs} && {checked} && document.documentElement.dataset.drawn")
     visit.until("document.querySelectorAll('.chart canvas').length > 0")
 
 

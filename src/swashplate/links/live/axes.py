@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import control
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from swashplate.arrays import Array
-from swashplate.control.laws.linear_decoupling import static_decoupling
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers.series import AXES
 from swashplate.models.vehicle import Vehicle
@@ -89,6 +86,10 @@ def _at_once_decoupled(model: LinearModel, directions: Array) -> Array | None:
     None where the first derivatives do not tell the axes apart: thrust perpendicular to the disc leaves the cyclic
     nothing to do until the disc has tilted, while collective pitches at once.
     """
+    import control
+
+    from swashplate.control.laws.linear_decoupling import static_decoupling
+
     names = list(model.states)
     by_axis = control.ss(model.A, model.B @ directions, np.eye(len(names)), 0.0, inputs=list(STICKS), outputs=names)
     try:
@@ -121,6 +122,8 @@ def _directions(vehicle: Vehicle, soon: Array) -> tuple[Array, dict[str, str]]:
                 where=vehicle.card.where,
                 hint="A model that is flown by hand needs four: roll, pitch, yaw and heave.",
             )
+        from scipy.optimize import linear_sum_assignment
+
         ranges = np.ptp(np.array(vehicle.input_limits), axis=1)
         strength = np.abs(soon) * ranges
         strength = strength / np.maximum(np.max(strength, axis=1, keepdims=True), 1e-300)

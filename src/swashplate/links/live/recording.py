@@ -13,10 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.atomic import added_when_complete, make_folder
 from swashplate.errors import FlightError
-from swashplate.links.recorder import begin
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.record import simulated_flight
-from swashplate.simulation.sensors import QUIET, observe
 
 SHORTEST, LONGEST = 2.0, 1800.0
 """Seconds: less is a slip of the finger, more fills the memory."""
@@ -42,6 +39,10 @@ def save_recording(
     Raises:
         FlightError: for less than two seconds, or where the folder cannot be written to.
     """
+    from swashplate.links.recorder import begin
+    from swashplate.simulation.record import simulated_flight
+    from swashplate.simulation.sensors import QUIET, observe
+
     if len(rows) * period < SHORTEST:
         raise FlightError(f"the recording has {len(rows) * period:.1f} s, expected at least {SHORTEST:g} s.")
     table, n = np.stack(rows), len(vehicle.state_names)

@@ -8,13 +8,12 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers.series import Maneuver
-from swashplate.links.estimating import Estimating
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.identifying import HOWS, How, Identifying, Job, Window, busiest
@@ -25,6 +24,9 @@ from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.closed_loop import Controller
+
+if TYPE_CHECKING:
+    from swashplate.links.estimating import Estimating
 
 _BODY = len(RigidBody._fields)
 _SWEEP_SECONDS, _SWEEP_BAND = 30.0, (0.3, 5.0)
@@ -88,6 +90,8 @@ class LiveSession:
         return world, pose_of(vehicle), self._estimator(vehicle, world) if self._estimate else None
 
     def _estimator(self, vehicle: Vehicle, world: World) -> Estimating:
+        from swashplate.links.estimating import Estimating
+
         late = dict(zip(vehicle.input_names, world.delays.tolist(), strict=True))
         return Estimating(self._believed(vehicle), self._estimate, rate=1.0 / world.period, delays=late)
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.opened import Opened
 
@@ -22,6 +21,8 @@ def spectra(opened: Opened, channel: str, start: float, stop: float) -> dict[str
     Raises:
         FlightError: where the log lacks the channel, or has too few samples there.
     """
+    from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
+
     flight = opened.ready
     measured = spectrum(flight, channel, start=start, stop=stop)
     over = spectrogram(flight, channel, start=start, stop=stop, frames=_COLUMNS)

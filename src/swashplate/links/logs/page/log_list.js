@@ -1,11 +1,12 @@
 // The logs on the page: name, length, vehicle, and the seconds that each is shifted by.
 import { note } from "./code.js";
 import { $, DASHES, ink, make, sample } from "./make.js";
-import { get, post } from "./server.js";
+import { answered, get, post } from "./server.js";
 import { logs, offset, offsets, on, ready, say } from "./state.js";
 import { attempt, trouble } from "./trouble.js";
 
 const entries = new Map(); // by log, what the list shows of it
+const leaving = new Set(); // closed here, not yet by the server
 let timer = 0;
 
 function shift(log, seconds) {
@@ -58,14 +59,21 @@ function show() {
   }
 }
 
-// It goes at once, so that nothing more is asked of it; the first of those that stay is on its own clock.
+// It goes at once, so that nothing more is asked of it, and what has been asked is answered first; the first of those
+// that stay is on its own clock.
 const close = attempt(async (log) => {
+  leaving.add(log.id);
   logs.delete(log.id);
   const [first] = ready(), ahead = first ? offset(first) : 0;
   for (const other of ready()) offsets.set(other.id, offset(other) - ahead);
   show();
   say("logs");
-  await post("/close", { log: log.id });
+  await answered();
+  try {
+    await post("/close", { log: log.id });
+  } finally {
+    leaving.delete(log.id);
+  }
   await refresh();
 });
 
@@ -84,7 +92,7 @@ export const refresh = attempt(async () => {
   const told = await get("/logs");
   const before = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state, log.checked]));
   logs.clear();
-  for (const log of told.logs) logs.set(log.id, log);
+  for (const log of told.logs) if (!leaving.has(log.id)) logs.set(log.id, log);
   for (const log of ready()) place(log);
   $("largest").textContent = Math.floor(told.largest / 1e6);
   if (told.logs.some((log) => log.state === "reading" || log.checked === false)) timer = setTimeout(refresh, 400);

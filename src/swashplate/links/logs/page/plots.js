@@ -20,7 +20,7 @@ const fetchAll = attempt(async () => {
   } catch (error) {
     if (number === asked) throw error; // else it was of a log that has been closed meanwhile
   }
-  if (number !== asked) return; // a later zoom has been asked for meanwhile
+  if (number !== asked || wanted.some(([log]) => !logs.has(log))) return; // meanwhile zoomed again, or a log was closed
   let at = 0;
   for (const chart of made) {
     chart.fill(traces.slice(at, at + chart.series.length));

@@ -32,8 +32,18 @@ async function asked(address, options) {
 
 export const get = (address) => asked(address);
 
-export const post = (address, fields) =>
-  asked(address, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(fields) });
+const waiting = new Set(); // questions without an answer yet
+
+export function post(address, fields) {
+  const told = asked(address, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(fields) });
+  const over = () => waiting.delete(told);
+  waiting.add(told);
+  told.then(over, over);
+  return told;
+}
+
+// Once all that is being asked now has its answer.
+export const answered = () => Promise.allSettled([...waiting]);
 
 // A file in pieces, one after the other; `progress` hears the share that is there.
 export async function upload(file, piece, progress) {
