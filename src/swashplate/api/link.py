@@ -9,14 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from swashplate.atomic import write_text
 from swashplate.control.analysis.cascade_gains import cascade_gains
 from swashplate.errors import ControllerError, SwashError
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, written_gains
 from swashplate.links.ardupilot.parameters import Parameters, parameter_file, parameters
-from swashplate.links.estimating import Estimating, KnownNow
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings, unflown
 from swashplate.links.recorder import Recorder, recover
@@ -33,6 +32,9 @@ from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
 from swashplate.simulation.stepping import MakeEngine, SteppingEngine, XlaEngine
 from swashplate.simulation.trim import Trim
+
+if TYPE_CHECKING:
+    from swashplate.links.estimating import KnownNow
 
 Say = Callable[[str], None]
 _ESTIMATED = 100.0
@@ -293,6 +295,8 @@ def _plant(asked: _Asked, suffix: Literal["", "_px4"], notice: Say) -> tuple[Pla
         )
     estimating = None
     if asked.estimate:
+        from swashplate.links.estimating import Estimating
+
         estimating = Estimating(asked.vehicle, asked.estimate, rate=_ESTIMATED, seed=asked.seed, say=notice)
     plant = Plant(
         aircraft,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight
-from swashplate.links.estimating import Estimating
 from swashplate.links.recorder import Recorder
 from swashplate.links.servos import ServoMapping
 from swashplate.models.surroundings import environment_of
@@ -20,6 +20,9 @@ from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.record import simulated_flight
 from swashplate.simulation.standing import at_rest
 from swashplate.simulation.stepping import MakeEngine, Motion, Stepping, at_standstill
+
+if TYPE_CHECKING:
+    from swashplate.links.estimating import Estimating
 
 _SPEEDS = ("u", "v", "w", "p", "q", "r")
 _ALOFT = 0.02
