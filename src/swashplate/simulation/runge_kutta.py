@@ -52,9 +52,9 @@ def rk4_step(rates: Rates, x: Any, w: Driving, dt: Any, *, looped: bool) -> Any:
     return x + rk4_change(rates, x, w, dt, looped=looped)
 
 
-def rk4_steps(rates: Rates, x: Any, w: Callable[[Any, Any], Any], dt: Any, count: int) -> Any:
+def rk4_steps(rates: Rates, x: Any, w: Callable[[Any, Any], Any], dt: Any, count: Any) -> Any:
     """The state `count` steps later, each with its stages in a loop; `w(i, fraction)` drives step i."""
-    if count == 1:
+    if isinstance(count, int) and count == 1:
         return rk4_step(rates, x, lambda fraction: w(0.0, fraction), dt, looped=True)
 
     def step(i: Any, x: Any) -> Any:
