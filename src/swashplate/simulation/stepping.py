@@ -198,5 +198,6 @@ def _advance(
     """Steps of Runge-Kutta under held inputs: the state row, and it again with its derivative behind it."""
     rates = row_rates(equations, padded=True)
     w, h, steps = row[:-2], row[-2], row[-1].astype(jnp.int32)
-    x, slope = rk4_and_slope(lambda x: rates(*jax.lax.optimization_barrier((x, w, p))), x, h, steps)
+    barrier: Any = jax.lax.optimization_barrier
+    x, slope = rk4_and_slope(lambda x: rates(*barrier((x, w, p))), x, h, steps)
     return x, jnp.concatenate([x, slope])
