@@ -37,6 +37,9 @@ from swashplate.simulation.tumbling import CarriedAttitude, steep, with_angles, 
 
 Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
 
+_LEAST_WAITING = 32
+"""Commands that are kept where any is late: one program flies all usual delays, no slower (measured)."""
+
 REFERENCES = ("x", "y", "z", "psi", "ahead", "right", "roll", "pitch")
 """What a controller is asked for, in the order of the reference row: place [m] and heading [rad] to hold, speed ahead
 and to the right [m/s], and a pilot's cyclic commands [-1 to 1] (right and nose down positive)."""
@@ -168,7 +171,7 @@ def simulate_closed_loop(
     wanted = _table(REFERENCES, reference or {}, n, [at_start.get(name, 0.0) for name in REFERENCES])
     added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
     late = steps_late(flown_delays(vehicle, controller, delays=delays), rate)
-    waiting = 1 << (int(late.max()) - 1).bit_length() if late.any() else 0
+    waiting = max(_LEAST_WAITING, 1 << (int(late.max()) - 1).bit_length()) if late.any() else 0
     first = _inputs_before(vehicle, start, surroundings) if waiting else np.zeros(len(vehicle.input_names))
 
     limits = np.array(vehicle.input_limits).T

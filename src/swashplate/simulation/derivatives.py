@@ -17,10 +17,13 @@ from swashplate.models.conventional.helicopter import CONTRIBUTORS, loads
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Backend
 from swashplate.simulation.compilation import RUN_RARELY
+from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
+    Rows,
     enable_double_precision,
     equations_of,
     jax_backend,
@@ -46,8 +49,8 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
     enable_double_precision()
     surroundings = [float(getattr(trim.environment, name)) for name in SURROUNDINGS]
     w = np.array([*trim.inputs, *surroundings])
-    by_x, by_w = _slopes(equations_of(vehicle), np.asarray(trim.state), w, parameter_row(vehicle, trim.environment))
-    by_x, by_w = np.asarray(by_x), np.asarray(by_w)
+    numbers = parameter_row(vehicle, trim.environment)
+    by_x, by_w = _exact_slopes(equations_of(vehicle), np.asarray(trim.state), w, numbers)
     fast = [vehicle.index(name) for name in _FAST if name in vehicle.state_names]
     motions = [vehicle.index(name) for name in MOTIONS]
     controls = [vehicle.input_names.index(name) for name in CONTROLS]
@@ -66,19 +69,33 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
     return DerivativeTable(parts, following[:2], "automatic differentiation")
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
-def _slopes(equations: Equations, x: Array, w: Array, p: Float[jax.Array, " parameters"]) -> tuple[Any, Any]:
-    vehicle = equations.vehicle
+def _exact_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tuple[Array, Array]:
+    """By numbers that carry their slopes, which compiles nothing, or by XLA where the equations cannot take these."""
+    try:
+        _, slopes = slopes_of(partial(_acting, equations, p=p.tolist(), xp=DUAL), x, w)
+    except CANNOT:
+        by_x, by_w = _compiled_slopes(equations, x, w, p)
+        return np.asarray(by_x), np.asarray(by_w)
+    return slopes[:, : len(x)], slopes[:, len(x) :]
 
+
+@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
+def _compiled_slopes(equations: Equations, x: Array, w: Array, p: Float[jax.Array, " parameters"]) -> tuple[Any, Any]:
     def acting(x: Float[jax.Array, " states"], w: Float[jax.Array, " inputs"]) -> Any:
-        inputs, parameters, environment = unpack_rows(equations, w, p)
-        state = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
-        commands = vehicle.inputs(*(inputs[i] for i in range(len(vehicle.input_names))))
-        load = loads(state, commands, parameters, environment, jax_backend(), options=vehicle.options)
-        rows = []
-        for name in CONTRIBUTORS:
-            part = getattr(load, name)
-            rows += [0.0] * 6 if part is None else [*part.force, *part.moment]
-        return jnp.stack([jnp.asarray(value, x.dtype) for value in (*rows, *leaves(load.disc), *leaves(load.inflow))])
+        return jnp.stack([jnp.asarray(value, x.dtype) for value in _acting(equations, x, w, p=p, xp=jax_backend())])
 
     return jax.jacfwd(acting, argnums=(0, 1))(x, w)  # type: ignore[no-any-return]
+
+
+def _acting(equations: Equations, x: Rows, w: Rows, *, p: Rows, xp: Backend) -> list[Any]:
+    """Forces and moments by contributor, and the rates of disc and inflow; rows as of `row_rates`."""
+    vehicle = equations.vehicle
+    inputs, parameters, environment = unpack_rows(equations, w, p)
+    state = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
+    commands = vehicle.inputs(*(inputs[i] for i in range(len(vehicle.input_names))))
+    load = loads(state, commands, parameters, environment, xp, options=vehicle.options)
+    rows = []
+    for name in CONTRIBUTORS:
+        part = getattr(load, name)
+        rows += [0.0] * 6 if part is None else [*part.force, *part.moment]
+    return [*rows, *leaves(load.disc), *leaves(load.inflow)]

@@ -140,7 +140,7 @@ def simulate(
     return observe(flight, vehicle, sensors=sensors, seed=seed)
 
 
-@partial(jax.jit, static_argnums=0, static_argnames=("substeps", "held"), compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, static_argnames="held", compiler_options=QUICK_TO_COMPILE)
 def trajectory(
     equations: Equations,
     x0: Float[jax.Array, " states"],
@@ -148,12 +148,12 @@ def trajectory(
     p: Float[jax.Array, " parameters"],
     dt: Float[jax.Array, ""],
     *,
-    substeps: int,
+    substeps: Int[jax.Array, ""] | int,
     held: bool,
 ) -> Any:
     """States at every sample, shape (n, n_states), from driving rows of shape (n, n_inputs + 4).
 
-    Compiled once per vehicle equations and shape; the card's numbers are arguments.
+    Compiled once per vehicle equations and shape; the card's numbers and how many substeps there are, are arguments.
     """
     rates = row_rates(equations, padded=True)
     h = dt / substeps

@@ -52,12 +52,31 @@ def rk4_step(rates: Rates, x: Any, w: Driving, dt: Any, *, looped: bool) -> Any:
     return x + rk4_change(rates, x, w, dt, looped=looped)
 
 
-def rk4_steps(rates: Rates, x: Any, w: Callable[[Any, Any], Any], dt: Any, count: int) -> Any:
+def rk4_steps(rates: Rates, x: Any, w: Callable[[Any, Any], Any], dt: Any, count: Any) -> Any:
     """The state `count` steps later, each with its stages in a loop; `w(i, fraction)` drives step i."""
-    if count == 1:
+    if isinstance(count, int) and count == 1:
         return rk4_step(rates, x, lambda fraction: w(0.0, fraction), dt, looped=True)
 
     def step(i: Any, x: Any) -> Any:
         return rk4_step(rates, x, lambda fraction: w(i, fraction), dt, looped=True)
 
     return jax.lax.fori_loop(0, count, step, x)
+
+
+def rk4_and_slope(rates: Callable[[Any], Any], x: Any, dt: Any, count: Any) -> tuple[Any, Any]:
+    """The state `count` steps later, and its rates there: `rates` stands once in the compiled code.
+
+    All stages are in one loop, and the first of the step that is not taken gives the rates.
+    """
+
+    def evaluated(i: Any, carry: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+        x, k, total = carry
+        stage = i % 4
+        inner, last = (stage == 1) | (stage == 2), stage == 3
+        fraction = jnp.where(inner, 0.5, jnp.where(stage == 0, 0.0, 1.0))
+        k = rates(x + (fraction * dt) * k)
+        total = total + (jnp.where(inner, 1.0 / 3.0, 1.0 / 6.0) * dt) * k
+        return jnp.where(last, x + total, x), jnp.where(last, 0.0, k), jnp.where(last, 0.0, total)
+
+    x, k, _ = jax.lax.fori_loop(0, 4 * count + 1, evaluated, (x, jnp.zeros_like(x), jnp.zeros_like(x)))
+    return x, k

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Protocol
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
@@ -36,7 +36,7 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_rates,
 )
-from swashplate.simulation.runge_kutta import rk4_step
+from swashplate.simulation.runge_kutta import rk4_and_slope
 from swashplate.simulation.tumbling import TumblingBody, counted_on, from_euler, seen, tumbling
 
 LONGEST_STEP = 5e-4
@@ -198,15 +198,6 @@ def _advance(
     """Steps of Runge-Kutta under held inputs: the state row, and it again with its derivative behind it."""
     rates = row_rates(equations, padded=True)
     w, h, steps = row[:-2], row[-2], row[-1].astype(jnp.int32)
-
     barrier: Any = jax.lax.optimization_barrier
-
-    def held(x: Float[jax.Array, " states"], w: Float[jax.Array, " driving"]) -> Any:
-        return rates(*barrier((x, w, p)))
-
-    def one(i: Int[jax.Array, ""], carry: tuple[Any, Any]) -> tuple[Any, Any]:
-        after = rk4_step(held, carry[0], lambda _: w, h, looped=True)
-        return after, held(after, w)
-
-    x, slope = jax.lax.fori_loop(0, steps, one, (x, jnp.zeros_like(x)))
+    x, slope = rk4_and_slope(lambda x: rates(*barrier((x, w, p))), x, h, steps)
     return x, jnp.concatenate([x, slope])

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from link_bench import QUICK
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.px4 import place, runner
@@ -36,7 +37,7 @@ said: list[str] = []
 @pytest.fixture(scope="module")
 def session() -> Px4Session:
     made = standing(vehicle("coax"))
-    plant = Plant(made, servo_mapping("coax_px4", made), Surroundings(Environment()))
+    plant = Plant(made, servo_mapping("coax_px4", made), Surroundings(Environment()), engine=QUICK)
     plant.prepare()
     return Px4Session(plant, Sensing(plant), Notices(said.append))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from heli_autopilot import Gains, HeliAutopilot, read_line, servo_packet
-from link_bench import Bench, bench
+from link_bench import QUICK, Bench, bench
 from swashplate.errors import SwashError
 from swashplate.links.estimating import Estimating
 from swashplate.models.catalogue import vehicle
@@ -25,7 +25,7 @@ COAX_IDLE = [1500, 1500, 1500, 1500, 1000, 1000]
 @pytest.fixture(scope="module")
 def line() -> Bench:
     """One bench for tests that leave it as they like: every one begins with a restart."""
-    return bench("raptor50")
+    return bench("raptor50", engine=QUICK)
 
 
 def restarted(line: Bench) -> Bench:
@@ -42,7 +42,7 @@ def state(line: Bench) -> tuple[tuple[float, ...], float]:
 
 @pytest.mark.parametrize(("name", "idle"), [("raptor50", IDLE), ("coax", COAX_IDLE)])
 def test_at_rest_on_the_ground(name: str, idle: list[int]) -> None:
-    at = bench(name)
+    at = bench(name, engine=QUICK if name == "raptor50" else None)  # the coaxial: by XLA, as where there is no compiler
     for count in range(400):
         answer = at.send(servo_packet(400, count, idle))
     assert answer is not None
@@ -203,7 +203,7 @@ def hovering(at: Bench, *, seconds: float = 6.0, gains: Gains | None = None) -> 
 @pytest.fixture(scope="module")
 def flown() -> HeliAutopilot:
     """A take-off, a hover with lean, and a landing."""
-    pilot = hovering(bench("raptor50"))
+    pilot = hovering(bench("raptor50", engine=QUICK))
     pilot.place = (3.0, -2.0)
     pilot.fly(4.0)
     pilot.height = 0.01
@@ -225,7 +225,7 @@ def test_take_off_hover_and_landing(flown: HeliAutopilot) -> None:
 
 def test_it_hovers_with_ardupilots_own_gains_and_noise() -> None:
     # With an ILMI of 0.1 a roll error holds a third of the hover's cyclic, so that it comes back slowly.
-    pilot = hovering(bench("raptor50", unit=InertialUnit()), gains=SHIPPED, seconds=9.0)
+    pilot = hovering(bench("raptor50", engine=QUICK, unit=InertialUnit()), gains=SHIPPED, seconds=9.0)
     last = np.array([[*a["attitude"], *a["position"]] for a in pilot.answers[-FRAMES:]])
     assert np.ptp(last[:, :3], axis=0).max() < 0.05
     np.testing.assert_allclose(last[-1, 3:], [0.0, 0.0, -2.0], atol=2.5)
@@ -261,7 +261,7 @@ def test_energy_and_attitude_agree(flown: HeliAutopilot) -> None:
 
 
 def test_a_vehicle_that_goes_over_lies_still_until_the_autopilot_restarts() -> None:
-    at = bench("raptor50")
+    at = bench("raptor50", engine=QUICK)
     pilot = HeliAutopilot(at.send, armed=True, interlock=True)
     pilot.fly(8.0)
     packets = [servo_packet(400, pilot.count + k, [2000, 1200, 1700, 1500, 0, 0, 0, 1660]) for k in range(1600)]
@@ -292,7 +292,7 @@ def test_wind_battery_and_noise_are_told() -> None:
     assert told["rpm"]["rpm_2"] > 1000.0
 
     def noisy(seed: int) -> np.ndarray:
-        at = bench("raptor50", unit=InertialUnit(), seed=seed)
+        at = bench("raptor50", engine=QUICK, unit=InertialUnit(), seed=seed)
         rows = [json.loads(at.send(servo_packet(400, k, IDLE)) or b"")["imu"] for k in range(300)]
         return np.array([[*row["gyro"], *row["accel_body"]] for row in rows])
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from heli_autopilot import servo_packet
-from link_bench import Bench, bench
+from link_bench import QUICK, Bench, bench
 from swashplate.errors import LinkError
 from swashplate.links.ardupilot.runner import serve
 from swashplate.links.sockets import is_loopback, listen_tcp, listen_udp
@@ -22,7 +22,7 @@ IDLE = [1500, 1500, 1500, 1500, 1000, 1000]
 
 @pytest.fixture(scope="module")
 def coax() -> Bench:
-    made = bench("coax")
+    made = bench("coax", engine=QUICK)
     made.plant.prepare()
     return made
 

@@ -14,7 +14,7 @@ import pytest
 
 import swashplate as sp
 from heli_autopilot import servo_packet
-from link_bench import Bench, bench
+from link_bench import QUICK, Bench, bench
 from swashplate.atomic import added_when_complete
 from swashplate.errors import LinkError
 from swashplate.flights.flight import Flight, stream
@@ -39,7 +39,7 @@ def names(folder: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def coax() -> Bench:
-    made = bench("coax")
+    made = bench("coax", engine=QUICK)
     made.plant.prepare()
     return made
 
@@ -204,7 +204,7 @@ def test_memory_stays_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
     wide = Flight({"uniform": stream(np.zeros(0), {f"c{k}": np.zeros(0) for k in range(40)})})
     kept = Recorder(tmp_path / "f.nc", like=wide, say=lambda _: None)
-    row = np.arange(40.0)
+    row = np.arange(40.0).tolist()
     tracemalloc.start()
     try:
         for k in range(100_000):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +14,13 @@ from swashplate.errors import DivergenceError
 from swashplate.models.catalogue import vehicle
 from swashplate.models.nesting import rebuild
 from swashplate.models.surroundings import environment_of
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
+from swashplate.simulation.dynamics import SURROUNDINGS
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.standing import at_rest, skids_of, standing
-from swashplate.simulation.stepping import Stepping
+from swashplate.simulation.stepping import Stepping, motion_row
 
 
 @pytest.mark.parametrize(
@@ -92,6 +96,27 @@ def test_everything_can_stand(name: str, options: dict[str, object]) -> None:
     assert -told.body.z == pytest.approx(skids_of(made).depth, rel=0.1)
 
 
+class PlainFloats:
+    """What moves a vehicle without a compiler."""
+
+    def __init__(self, moved: Vehicle, environment: Environment) -> None:
+        self.moved, self.parameters, self.environment = moved, moved.values(), environment
+
+    def place(self, row: np.ndarray) -> None:
+        self.row = row
+
+    def advance(self, inputs: Sequence[float], around: np.ndarray, step: float, steps: int) -> list[float]:
+        air, xp = self.environment._replace(**dict(zip(SURROUNDINGS, around.tolist(), strict=True))), FloatBackend()
+
+        def rates(x: np.ndarray, w: Sequence[float]) -> np.ndarray:
+            return np.array(self.moved.rates(x.tolist(), w, self.parameters, air, xp))
+
+        for _ in range(steps):
+            self.row = rk4_step(rates, self.row, lambda _: inputs, step, looped=False)
+        slope = rates(self.row, inputs).tolist()
+        return motion_row(self.row.tolist(), slope, float(air.gravity), xp)
+
+
 def test_ground_is_added_to_any_body_as_a_card_has_it() -> None:
     """The wrapper and the helicopter's own options are the same equations."""
     free = vehicle("raptor50", rotor_speed="throttle")
@@ -102,6 +127,6 @@ def test_ground_is_added_to_any_body_as_a_card_has_it() -> None:
     start[own.index("z")] += 0.004  # pressed down, turned and moving
     start[own.index("phi")], start[own.index("u")], start[own.index("q")] = 0.02, 0.3, 0.1
     inputs = np.array([0.05, 0.01, -0.01, 0.1, 0.5])
-    rows = [Stepping(made, start, around).advance(inputs, 0.05) for made in (own, added)]
+    rows = [Stepping(made, start, around, engine=PlainFloats).advance(inputs, 0.05) for made in (own, added)]
     np.testing.assert_allclose(rows[1].states, rows[0].states, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(rows[1].force, rows[0].force, rtol=1e-9, atol=1e-9)

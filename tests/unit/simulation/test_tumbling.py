@@ -166,6 +166,7 @@ def _apart(one: sp.Flight, other: sp.Flight, every: int) -> float:
 
 
 def test_closed_loops_fly_through_the_vertical(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(closed_loop, "shared_length", lambda n: 768)  # programs of one length for both rates
     usual, fine = _thrown(100.0), _thrown(1600.0)
     assert np.abs(usual.values("theta")).max() > np.radians(80.0)
     right = _apart(usual, fine, 16)

@@ -8,8 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
+import jax
 import numpy as np
+from jaxtyping import Float
 
 from swashplate.arrays import Array, Complex
 from swashplate.control.laws.ardupilot.filters import HARMONICS
@@ -18,6 +22,7 @@ from swashplate.control.laws.ardupilot.mixers import Mixer
 from swashplate.control.laws.ardupilot.parameters import AXES
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 
@@ -76,8 +81,8 @@ def cascade_plant(
     model, w = linearize(vehicle, trim), omega
     at = mixer.unmixed(trim.inputs, parameters)
     moved = _STEP * np.eye(len(COMMANDS))
-    ends = [[np.asarray(mixer.mix(at + sign * by, parameters).inputs) for by in moved] for sign in (1.0, -1.0)]
-    effect = (np.array(ends[0]) - np.array(ends[1])).T[: len(vehicle.input_names)] / (2.0 * _STEP)
+    ends = (np.asarray(_mixed(mixer, at + sign * moved, dict(parameters))) for sign in (1.0, -1.0))
+    effect = np.subtract(*ends).T[: len(vehicle.input_names)] / (2.0 * _STEP)
     late = np.exp(-1j * w[:, None] * (delays[None, :] + 0.5 / rate))
     n = len(model.states)
     states = np.linalg.solve(1j * w[:, None, None] * np.eye(n) - model.A, (model.B[None] * late[:, None, :]) @ effect)
@@ -89,6 +94,12 @@ def cascade_plant(
         if not np.max(np.abs(response[:, OUTPUTS.index(output), i])) > 1e-9:
             raise ControllerError(f"the {command} command moves no {output}.", where=vehicle.name, channel=command)
     return CascadePlant(w, response, effect, 1.0 / rate, delays)
+
+
+@partial(jax.jit, compiler_options=RUN_RARELY)
+def _mixed(mixer: Mixer, wanted: Float[jax.Array, "sets commands"], parameters: dict[str, float]) -> Any:
+    """Inputs of sets of commands, shape (sets, inputs)."""
+    return jax.vmap(lambda commands: mixer.mix(commands, parameters).inputs)(wanted)
 
 
 def _one(s: Complex, hertz: Array | float) -> Complex:

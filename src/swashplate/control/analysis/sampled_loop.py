@@ -177,10 +177,14 @@ def _decisions(
 ) -> Any:
     """The command, and the derivatives of command and memory by (state, memory) and by the reference."""
 
-    def deciding(both: Float[jax.Array, " both"], reference: Float[jax.Array, " references"]) -> tuple[Any, Any]:
+    def deciding(
+        both: Float[jax.Array, " both"], reference: Float[jax.Array, " references"]
+    ) -> tuple[tuple[Any, Any], Any]:
         after, command = control(both[n:], 0.0, jnp.concatenate([both[:n], measured[n:]]), reference, gains)
-        return jnp.clip(command, limits[0], limits[1]), after
+        limited = jnp.clip(command, limits[0], limits[1])
+        return (limited, after), limited
 
     both = jnp.concatenate([measured[:n], memory])
-    (command, command_reference), (after, memory_reference) = jax.jacfwd(deciding, argnums=(0, 1))(both, reference)
-    return deciding(both, reference)[0], command, after, command_reference, memory_reference
+    slopes, inputs = jax.jacfwd(deciding, argnums=(0, 1), has_aux=True)(both, reference)
+    (command, command_reference), (after, memory_reference) = slopes
+    return inputs, command, after, command_reference, memory_reference

@@ -25,6 +25,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import Controller, Step
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -53,7 +54,7 @@ _HELD_WITHIN = 3.0
 """Roll or pitch at which the flight of a linear model ends: its angles are small ones."""
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
+@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
 def advance(
     equations: Equations,
     law: Step,
@@ -90,10 +91,11 @@ def advance(
     memory, command = law(memory, 0.0, measured, wanted, gains)
     inputs = jnp.clip(command + added, limits[0], limits[1])
     past = jnp.concatenate([past[1:], inputs[None]])
-    columns, last = jnp.arange(inputs.size), past.shape[0] - 1
+    # Before the loop: XLA makes no function of one that gathers.
+    sent = past[past.shape[0] - 1 - back, jnp.arange(inputs.size)]
 
     def acting(i: Any, _: Any) -> Any:
-        return jnp.concatenate([past[last - back[i], columns], around])
+        return jnp.concatenate([sent[i], around])
 
     return rk4_steps(lambda y, w: rates(y, w, p), y, acting, dt, substeps), past, memory, inputs
 
