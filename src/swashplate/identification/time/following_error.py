@@ -40,19 +40,16 @@ from swashplate.identification.time.beginning import (
 from swashplate.identification.time.innovations import Filtered, RecordRun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
-from swashplate.identification.time.record_filter import STRETCH, stretches, whole
+from swashplate.identification.time.record_filter import FEW_PASSES, STRETCH, stretches, whole
 from swashplate.identification.time.start_states import measured_start, slopes_ahead, steady_flight
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, RUN_RARELY, lengthened
+from swashplate.simulation.compilation import RUN_RARELY, lengthened
 from swashplate.simulation.discretisation import held_series
 
 _LANES = 8
 """Rows whose filters run side by side, where there is more than one."""
-
-_HALF_COMPILED = {**QUICK_TO_COMPILE, "xla_backend_optimization_level": 1}
-"""Of the run along a record: compiled in 8 s instead of 19 s, and as fast."""
 
 _BODY = len(RigidBody._fields)
 
@@ -289,7 +286,7 @@ def _begun(
     return jax.vmap(one)(numbers)
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=_HALF_COMPILED)
+@partial(jax.jit, static_argnums=0, compiler_options=FEW_PASSES)
 def _along(
     model: StochasticModel,
     state: FilterState,
