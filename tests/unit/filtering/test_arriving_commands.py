@@ -26,8 +26,11 @@ def _double() -> None:
 INPUTS = np.random.default_rng(5).standard_normal((40, 4))
 
 
+_late = jax.jit(lambda inputs, nuisance: commands(COAX, DT, inputs, nuisance))
+
+
 def _commands(nuisance: Nuisance, inputs: np.ndarray = INPUTS) -> np.ndarray:
-    return np.asarray(commands(COAX, DT, jnp.asarray(inputs), nuisance))
+    return np.asarray(_late(inputs, nuisance))
 
 
 def test_commands_on_time_are_the_logged_ones() -> None:
@@ -54,7 +57,8 @@ def test_the_cost_of_a_delay_has_no_kink() -> None:
     def late(delay: Any) -> Any:
         return commands(COAX, DT, jnp.asarray(INPUTS), Nuisance(delay_servo=delay))[:, 2]
 
-    before, after = (np.asarray(jax.jacfwd(late)(2 * DT + side)) for side in (-1e-9, 1e-9))
+    slope = jax.jit(jax.jacfwd(late))
+    before, after = (np.asarray(slope(2 * DT + side)) for side in (-1e-9, 1e-9))
     np.testing.assert_allclose(before[3:], after[3:], atol=1e-3)
     assert np.abs(before).max() > 100.0
 

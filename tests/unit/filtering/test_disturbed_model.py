@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import jax
@@ -20,6 +20,7 @@ from swashplate.models.catalogue import vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
@@ -28,6 +29,7 @@ COAX = vehicle("coax")
 DT = 0.01
 TILTED = Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1, level_phi=0.02, level_theta=-0.03, level_psi=0.4)
 VOLTAGE = 12.0
+once = partial(jax.jit, compiler_options=RUN_RARELY)
 
 
 @pytest.fixture(autouse=True)
@@ -44,13 +46,24 @@ def _model() -> StochasticModel:
 def _step() -> Any:
     """One compiled sample for every test: `(x, push, u, parameters, voltage)`."""
     model = _model()
-    return jax.jit(lambda x, push, u, voltage: model.step(x, push, u, COAX.values(), voltage))
+    return once(lambda x, push, u, voltage: model.step(x, push, u, COAX.values(), voltage))
+
+
+@lru_cache(maxsize=1)
+def _measure() -> Any:
+    return once(_model().measure)
+
+
+@lru_cache(maxsize=1)
+def _steady() -> tuple[jax.Array, jax.Array]:
+    x, u = once(lambda voltage: steady_flight(COAX, COAX.values(), voltage))(VOLTAGE)
+    return x, u
 
 
 @lru_cache(maxsize=1)
 def _linear() -> tuple[np.ndarray, ...]:
-    x, u = steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))
-    found = jax.jit(_model().linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), Noise(), TILTED)
+    x, u = _steady()
+    found = once(_model().linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), Noise(), TILTED)
     return tuple(np.asarray(part) for part in found)
 
 
@@ -86,7 +99,7 @@ def test_a_disturbance_is_an_acceleration() -> None:
 def test_the_tracked_point_lies_at_its_lever_in_body_axes() -> None:
     x = _state(3)
     at = dict(zip(COAX.state_names, x, strict=True))
-    found = np.asarray(_model().measure(jnp.asarray(x), TILTED))
+    found = np.asarray(_measure()(x, TILTED))
     lever = body_to_local(Vector(0.05, 0.18, -0.1), Euler(at["phi"], at["theta"], at["psi"]), FloatBackend())
     expected = [at["x"] + lever.x, at["y"] + lever.y, at["z"] + lever.z]
     attitude = Rotation.from_euler("ZYX", [at["psi"], at["theta"], at["phi"]])
@@ -98,15 +111,13 @@ def test_the_tracked_point_lies_at_its_lever_in_body_axes() -> None:
 def test_the_joined_system_is_the_slope_of_one_sample() -> None:
     """A and C against central differences of the nonlinear step; gusts fade, drifts stay, both push alike."""
     A, C, _, _ = _linear()
-    x, u = (np.asarray(part) for part in steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE)))
+    x, u = (np.asarray(part) for part in _steady())
     n, step = x.size, 1e-5
     for i in range(n):
         away = step * np.eye(n)[i]
         slope = (_step()(x + away, np.zeros(6), u, VOLTAGE) - _step()(x - away, np.zeros(6), u, VOLTAGE)) / (2 * step)
         np.testing.assert_allclose(A[:n, i], np.asarray(slope), atol=1e-7)
-        seen = (_model().measure(jnp.asarray(x + away), TILTED) - _model().measure(jnp.asarray(x - away), TILTED)) / (
-            2 * step
-        )
+        seen = (_measure()(x + away, TILTED) - _measure()(x - away, TILTED)) / (2 * step)
         np.testing.assert_allclose(C[:, i], np.asarray(seen), atol=1e-9)
     for i in range(6):
         away = 0.1 * np.eye(6)[i]
@@ -122,8 +133,8 @@ def test_wind_acts_through_the_equations_with_the_slope_of_the_speeds_flown() ->
     """Against central differences of the step with the wind in its surroundings, averaged over many drawn speeds."""
     noise = Noise(wind=0.4, tau_wind=0.5, speed=0.1)
     model = stochastic_model(COAX, POSE, DT, noise=noise)
-    x, u = steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))
-    A, C, Q, _ = jax.jit(model.linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), noise, TILTED)
+    x, u = _steady()
+    A, C, Q, _ = once(model.linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), noise, TILTED)
     n = x.size
     assert A.shape == (n + 8 + 6, n + 8 + 6)
     assert C.shape == (6, n + 8 + 6)
@@ -158,7 +169,7 @@ def test_the_noise_has_its_units() -> None:
 
 def _filtered(y: np.ndarray, u: np.ndarray, nuisance: Nuisance, heading: float) -> tuple[np.ndarray, FilterState]:
     model = _model()
-    x0, u0 = steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))
+    x0, u0 = _steady()
 
     def run(y: Any, u: Any, heading: Any) -> Any:
         gain = model.gain(x0, u0, COAX.values(), jnp.asarray(VOLTAGE), Noise(), nuisance)
@@ -206,8 +217,8 @@ def test_the_filter_does_not_care_where_north_is() -> None:
 def test_without_a_surprise_the_filter_is_the_simulation_and_a_steady_push_becomes_a_drift() -> None:
     n = 150
     u = np.tile(trim(COAX, voltage=VOLTAGE).inputs, (n, 1))
-    x0 = np.asarray(steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))[0])
-    still = np.tile(np.asarray(_model().measure(jnp.asarray(x0), Nuisance())), (n, 1))
+    x0 = np.asarray(_steady()[0])
+    still = np.tile(np.asarray(_measure()(x0, Nuisance())), (n, 1))
     innovations, states = _filtered(still, u, Nuisance(), 0.0)
     assert np.abs(innovations).max() < 1e-9
     # Something pushes north with 0.3 m/s^2: what the filter believes of it is a gust or a drift of that size.

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from swashplate.models.catalogue import vehicle
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space_file import structure
 from swashplate.simulation.closed_loop import simulate_closed_loop
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.wind import INDOOR
 
@@ -41,6 +42,7 @@ HIDDEN = ("alpha_lower", "beta_lower", "eta_bar", "zeta_bar")
 COMPILER = shutil.which("cc")
 
 
+@lru_cache(maxsize=1)
 def made(*, bar: bool = True) -> Lqg:
     effort = {"motor_lower": 0.04, "motor_upper": 0.04, "servo_roll": 0.1, "servo_pitch": 0.1}  # of the numbers below
     return design(
@@ -64,15 +66,16 @@ def test_constant_gains_are_the_filters_after_a_long_time() -> None:
     estimate = ObserverEstimate(controller.first_estimate().mean, covariances[0])
     w = np.append(controller.start.inputs, controller.start.environment.voltage)[:, None]
 
-    def cycle(mean: Any, P: Any) -> Any:
+    @partial(jax.jit, compiler_options=RUN_RARELY)
+    def sample(mean: Any, P: Any, due: Any) -> Any:
         M = JaxMatrices()
-        for due in ([1.0, 1.0], [1.0, 0.0]):
-            y = M.value(lambda e, w: arriving(plan, numbers, e, w, M.xp), mean, w)
-            after, _, _ = corrected(plan, numbers, ObserverEstimate(mean, P), y, due, w, M)
-            mean, P = predicted(plan, numbers, after, w, due, M)
-        return mean, P
+        y = M.value(lambda e, w: arriving(plan, numbers, e, w, M.xp), mean, w)
+        after, _, _ = corrected(plan, numbers, ObserverEstimate(mean, P), y, list(due), w, M)
+        return predicted(plan, numbers, after, w, list(due), M)
 
-    mean, P = jax.jit(cycle, compiler_options=QUICK_TO_COMPILE)(*(jnp.asarray(part) for part in estimate))
+    mean, P = (jnp.asarray(part) for part in estimate)
+    for due in ([1.0, 1.0], [1.0, 0.0]):
+        mean, P = sample(mean, P, jnp.array(due))
     sigma = np.sqrt(np.diag(covariances[0]))
     assert np.max(np.abs(np.asarray(P) - covariances[0]) / np.outer(sigma, sigma)) < 1e-3
     assert np.max(np.abs(np.asarray(mean) - estimate.mean)[:, 0] / sigma) < 1e-3
@@ -155,6 +158,30 @@ def test_the_raptor_is_held_and_flown_to_ten_metres_a_second() -> None:
 
 
 # ---- its C -----------------------------------------------------------------------------------------------------------
+@lru_cache(maxsize=3)
+def in_python(which: str) -> tuple[Lqg, Any]:
+    """A controller, and its step: memory, measured, reference to the memory after it, commands."""
+    controller = {"flying": made, "steady": lambda: with_steady_gain(made()), "linear": linear}[which]()
+    plan, gains = controller.plan, jnp.asarray(controller.gains)
+
+    @partial(jax.jit, compiler_options=RUN_RARELY)
+    def step(memory: Any, measured: Any, reference: Any) -> Any:
+        M, (numbers, feedback) = JaxMatrices(), numbers_from(plan, 1, gains)
+        after, commands = lqg_step(
+            plan,
+            numbers,
+            feedback,
+            carried_from(plan, memory, M),
+            measured[:-1, None],
+            measured[-1],
+            [reference[i] for i in range(8)],
+            M,
+        )
+        return carried_row(after, M), jnp.stack(commands)
+
+    return controller, step
+
+
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 @pytest.mark.parametrize(
     ("which", "precision", "tolerance"),
@@ -174,7 +201,7 @@ def test_the_c_step_is_the_python_step(which: str, precision: str, tolerance: fl
     pytest.importorskip("casadi", reason="the extra 'export' is not installed")
     from swashplate.export.controller_c import controller_code
 
-    controller = {"flying": made, "steady": lambda: with_steady_gain(made()), "linear": linear}[which]()
+    controller, step = in_python(which)
     code = controller_code(controller, precision=precision)  # type: ignore[arg-type]
     assert set(code.calls) <= {"sin", "cos", "sqrt", "atan2"}
     assert "malloc" not in code.source
@@ -186,23 +213,7 @@ def test_the_c_step_is_the_python_step(which: str, precision: str, tolerance: fl
     function = ctypes.CDLL(str(library)).swash_step_in
     kind, real = (np.float64, ctypes.c_double) if precision == "double" else (np.float32, ctypes.c_float)
 
-    plan, gains = controller.plan, jnp.asarray(controller.gains)
-
-    def in_python(memory: Any, measured: Any, reference: Any) -> Any:
-        M, (numbers, feedback) = JaxMatrices(), numbers_from(plan, 1, gains)
-        after, commands = lqg_step(
-            plan,
-            numbers,
-            feedback,
-            carried_from(plan, memory, M),
-            measured[:-1, None],
-            measured[-1],
-            [reference[i] for i in range(8)],
-            M,
-        )
-        return carried_row(after, M), jnp.stack(commands)
-
-    step = jax.jit(in_python, compiler_options=QUICK_TO_COMPILE)
+    plan = controller.plan
     random, N = np.random.default_rng(0), len(plan.names)
     promised = steady_sigmas(controller) if plan.period else np.zeros(0)
     (work,) = (int(found) for found in re.findall(r"#define SWASH_WORK (\d+)", code.source))

@@ -132,9 +132,8 @@ def test_heave_damping_is_that_of_momentum_theory(form: str) -> None:
 
     def rates(inner: jax.Array) -> jax.Array:
         moved = jnp.asarray(row).at[jnp.array(places)].set(inner)
-        return jnp.stack(
-            [flown.rates(moved, (0.5, 0.5, 0.0, 0.0), flown.values(), Environment(), JaxBackend())[i] for i in places]
-        )
+        every = flown.rates(moved, (0.5, 0.5, 0.0, 0.0), flown.values(), Environment(), JaxBackend())
+        return jnp.stack([every[i] for i in places])
 
     A = np.asarray(jax.jacfwd(rates)(jnp.asarray(row[places])))
     found = A[0, 0] - A[0, 1:] @ np.linalg.solve(A[1:, 1:], A[1:, 0])

@@ -26,7 +26,7 @@ from swashplate.identification.recursive.fourier_regression import CLOCK, EARLY,
 from swashplate.identification.time.equation_error import EquationError
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.dynamics import enable_double_precision, equations_of, parameter_row
 from swashplate.simulation.trim import Trim, trim
 
@@ -214,7 +214,7 @@ class SlowParameters:
         )
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
 def _stepped(plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Any, y: Any, due: Any) -> Any:
     M = JaxMatrices()
     flags = [due[i] for i in range(len(plan.sensors))]

@@ -200,7 +200,7 @@ def _traced_filter(
     Outputs are taken in one by one, which their independent errors allow, in Joseph's form (Simon 2006, sec. 6.1).
     """
     local = _traced_local(plan, given, numbers, x)
-    s, o = x.shape[1], local.v.shape[1]
+    s = x.shape[1]
     q, r = jnp.exp(noise[:s]), jnp.exp(noise[s:])
     gathered = jnp.broadcast_to(jnp.diag(q * jnp.sqrt(plan.dt)), (len(local.w), s, s))
     right = jnp.concatenate([-local.before, gathered, -local.w[:, :, None]], axis=2)
@@ -210,21 +210,20 @@ def _traced_filter(
 
     def step(carry: Pair, now: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[Pair, Innovations]:
         (d, P), (v, c, move) = carry, now
-        seen = Innovations([], [], [], [])
-        for i in range(o):  # before any of this sample's outputs is taken in
-            seen.error.append(v[i] + c[i] @ d)
-            seen.spread.append(c[i] @ P @ c[i] + r[i] ** 2)
-        for i in range(o):
-            across = P @ c[i]
-            variance = c[i] @ across + r[i] ** 2
-            innovation, gain = v[i] + c[i] @ d, -across / variance
-            d = d + gain * innovation
-            kept = jnp.eye(s) + jnp.outer(gain, c[i])
-            P = kept @ P @ kept.T + r[i] ** 2 * jnp.outer(gain, gain)
-            seen.innovation.append(innovation)
-            seen.variance.append(variance)
+        before = v + c @ d, jnp.sum((c @ P) * c, axis=1) + r**2  # any of this sample's outputs is taken in
+
+        def taken(carry: Pair, one: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[Pair, Pair]:
+            (d, P), (v, c, r) = carry, one
+            across = P @ c
+            variance = c @ across + r**2
+            innovation, gain = v + c @ d, -across / variance
+            kept = jnp.eye(s) + jnp.outer(gain, c)
+            P = kept @ P @ kept.T + r**2 * jnp.outer(gain, gain)
+            return (d + gain * innovation, P), (innovation, variance)
+
+        (d, P), seen = jax.lax.scan(taken, (d, P), (v, c, r))
         phi, spread, offset = move[:, :s], move[:, s : 2 * s], move[:, -1]
-        return (phi @ d + offset, phi @ P @ phi.T + spread @ spread.T), Innovations(*map(jnp.stack, seen))
+        return (phi @ d + offset, phi @ P @ phi.T + spread @ spread.T), Innovations(*seen, *before)
 
     samples: Any = (local.v, local.here, moved)
     innovations: Innovations = jax.lax.scan(step, (jnp.zeros(s), first), samples)[1]

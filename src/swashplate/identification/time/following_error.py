@@ -40,12 +40,12 @@ from swashplate.identification.time.beginning import (
 from swashplate.identification.time.innovations import Filtered, RecordRun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
-from swashplate.identification.time.record_filter import STRETCH, stretches, whole
+from swashplate.identification.time.record_filter import FEW_PASSES, STRETCH, stretches, whole
 from swashplate.identification.time.start_states import measured_start, slopes_ahead, steady_flight
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
+from swashplate.simulation.compilation import RUN_RARELY, lengthened
 from swashplate.simulation.discretisation import held_series
 
 _LANES = 8
@@ -264,7 +264,7 @@ def _along_some(
     return jax.tree.map(lambda *rows: np.concatenate(rows, axis=1)[:, :n], *parts)  # type: ignore[no-any-return]
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
 def _begun(
     model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Float[jax.Array, "states states"]
 ) -> tuple[FilterState, Any]:
@@ -286,7 +286,7 @@ def _begun(
     return jax.vmap(one)(numbers)
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=FEW_PASSES)
 def _along(
     model: StochasticModel,
     state: FilterState,

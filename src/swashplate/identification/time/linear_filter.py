@@ -23,6 +23,7 @@ from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.time_likelihood import SPREAD, gust_entries
 from swashplate.identification.time.linear_likelihood import Batch, OutputErrors
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.gathered_noise import gathered_noise
 
@@ -143,4 +144,4 @@ def _filters() -> Any:
         phi, gathered = gathered_noise(a, jnp.diag(intensity), dt)
         return kalman_gain(phi, c, gathered, jnp.diag(sensors))
 
-    return jax.jit(jax.vmap(gain, in_axes=(0, 0, 0, 0, None)))
+    return jax.jit(jax.vmap(gain, in_axes=(0, 0, 0, 0, None)), compiler_options=RUN_RARELY)

@@ -31,7 +31,9 @@ from swashplate.identification.core.records import Record, logs
 from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import parameter_entries, stack_records
+from swashplate.identification.time.record_filter import FEW_PASSES
 from swashplate.identification.time.start_states import slopes, start_state
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 
 WINDOW = 4.0
 """Seconds of one shot: some periods of the fast modes, and short against the growth of unstable ones and of yaw."""
@@ -328,22 +330,24 @@ def _shoot(
     return jax.vmap(lambda x: model.measure(x, nuisance))(flown), flown
 
 
-@partial(jax.jit, static_argnums=0)
-def _residuals(plan: _Plan, data: Mapping[str, jax.Array], row: Float[jax.Array, " entries"]) -> tuple[Any, Any]:
+def _traced_residuals(plan: _Plan, data: Mapping[str, jax.Array], row: Float[jax.Array, " entries"]) -> tuple[Any, Any]:
     shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
     places = jnp.arange(initial.shape[0])
     outputs, states = jax.vmap(lambda i, x0: _shoot(plan, data, shared, x0, i))(places, initial)
     return data["outputs"] - outputs, states
 
 
+_residuals = jax.jit(_traced_residuals, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+
+
 def _traced_cost(plan: _Plan, data: Mapping[str, Any], row: jax.Array) -> Any:
     """Negative log-likelihood of the residuals at a given root of their covariance (traceable)."""
-    flat = _residuals(plan, data, row)[0].reshape(-1, data["root"].shape[0])
+    flat = _traced_residuals(plan, data, row)[0].reshape(-1, data["root"].shape[0])
     white = jax.scipy.linalg.solve_triangular(data["root"], flat.T, lower=True)
     return robust.losses(white, jnp).sum() + flat.shape[0] * jnp.log(jnp.diag(data["root"])).sum()
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=FEW_PASSES)
 def _with_tangents(plan: _Plan, data: Mapping[str, jax.Array], row: Float[jax.Array, " entries"]) -> tuple[Any, Any]:
     """Residuals and, per window, their derivatives by the shared entries and by the window's own initial state."""
     shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)

@@ -256,7 +256,7 @@ def _filter(plan: _Plan, given: Mapping[str, jax.Array], data: Mapping[str, jax.
 
     def predict(x: Any, now: tuple[Any, Any]) -> Any:
         w, after = now
-        return rk4_step(rates, x, lambda share: w + share * (after - w), plan.dt, looped=False)
+        return rk4_step(rates, x, lambda share: w + share * (after - w), plan.dt, looped=True)
 
     after = jnp.concatenate([driving[1:], driving[-1:]])
     return _Filter(start, (driving, after), correct, predict, expected)

@@ -97,14 +97,19 @@ def test_chains_that_never_meet_are_told() -> None:
     assert np.all(split_rhat(drifting) > 1.05)  # only halves against halves can tell
 
 
+@jax.jit
+def bent(data: Any, z: jax.Array) -> tuple[Any, Any, Any]:
+    """The number at a place on the bent scale, the logarithm of the stretch, and the slope."""
+    value, stretch = unbent(data, z, jnp)
+    return value, stretch, jax.jacfwd(lambda z: unbent(data, z, jnp)[0][0])(z)
+
+
 @pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (-1.0, np.inf), (-np.inf, 2.0), (-1.0, 2.0), (-0.1, 0.2)])
 def test_the_stretch_of_a_bent_scale_is_its_slope(bounds: tuple[float, float]) -> None:
     row = Row((Entry("one", "parameter", 0.0, 1.0, lower=bounds[0], upper=bounds[1]),))
     data = nuts._prepared(TracedCost(half_squares, (), {}), row, np.zeros(1), np.eye(1))
     for place in (-2.0, 0.0, 1.3):
-        z = jnp.array([place])
-        (value,), stretch = unbent(data, z, jnp)
-        (slope,) = jax.jacfwd(lambda z: unbent(data, z, jnp)[0][0])(z)
+        (value,), stretch, (slope,) = bent(data, jnp.array([place]))
         assert bounds[0] < value < bounds[1]
         np.testing.assert_allclose(stretch, np.log(slope), atol=1e-6)  # near one, 1 - sigmoid has few digits left
 
@@ -114,8 +119,7 @@ def test_the_logarithm_of_a_noise_is_as_wide_as_the_prior_where_it_is_not_seen()
     # One that a flight tells to 1 % keeps that width all the way.
     for sigma, wide in ((0.4, 2.0), (0.01, 0.01)):
         data = nuts._prepared(TracedCost(half_squares, (), {}), row, np.zeros(1), np.full((1, 1), sigma**2))
-        slope = jax.jacfwd(lambda z, data=data: unbent(data, z, jnp)[0][0])
         for place, expected in ((1.0, sigma), (0.0, sigma), (-6.0, wide)):
-            z = jnp.array([place])
-            np.testing.assert_allclose(slope(z), [expected], rtol=0.2)
-            np.testing.assert_allclose(unbent(data, z, jnp)[1], np.log(slope(z)[0] / sigma), rtol=1e-6, atol=1e-9)
+            _, stretch, slope = bent(data, jnp.array([place]))
+            np.testing.assert_allclose(slope, [expected], rtol=0.2)
+            np.testing.assert_allclose(stretch, np.log(slope[0] / sigma), rtol=1e-6, atol=1e-9)
