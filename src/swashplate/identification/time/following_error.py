@@ -40,12 +40,12 @@ from swashplate.identification.time.beginning import (
 from swashplate.identification.time.innovations import Filtered, RecordRun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
-from swashplate.identification.time.record_filter import FEW_PASSES, STRETCH, stretches, whole
+from swashplate.identification.time.record_filter import STRETCH, stretches, whole
 from swashplate.identification.time.start_states import measured_start, slopes_ahead, steady_flight
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.compilation import RUN_RARELY, lengthened
+from swashplate.simulation.compilation import FEW_PASSES, RUN_RARELY, lengthened
 from swashplate.simulation.discretisation import held_series
 
 _LANES = 8

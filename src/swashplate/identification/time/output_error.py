@@ -31,9 +31,8 @@ from swashplate.identification.core.records import Record, logs
 from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import parameter_entries, stack_records
-from swashplate.identification.time.record_filter import FEW_PASSES
 from swashplate.identification.time.start_states import slopes, start_state
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import FEW_PASSES, QUICK_TO_COMPILE
 
 WINDOW = 4.0
 """Seconds of one shot: some periods of the fast modes, and short against the growth of unstable ones and of yaw."""

@@ -28,11 +28,7 @@ from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, Fil
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.time.beginning import Begun, FilterNumbers, first_state
 from swashplate.identification.time.compiled_filter import FilterRun, compiled_filter
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
-
-FEW_PASSES = {**QUICK_TO_COMPILE, "xla_backend_optimization_level": 1}
-"""Options for `jax.jit` of runs and slopes along records: a seventh to a third less compiling than
-`QUICK_TO_COMPILE`, and as fast (slopes at all samples side by side 6 % slower)."""
+from swashplate.simulation.compilation import FEW_PASSES, QUICK_TO_COMPILE, lengthened
 
 STRETCH = 256
 """Samples that a compiled piece runs along."""
