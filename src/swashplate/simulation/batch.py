@@ -150,7 +150,7 @@ def _trajectories(
         w1: Float[jax.Array, " driving"],
         p: Float[jax.Array, " parameters"],
     ) -> Any:
-        def drive(fraction: Any) -> Any:
+        def drive(fraction: float | Float[jax.Array, ""]) -> Any:
             return w0 if held else w0 + fraction * (w1 - w0)
 
         return rk4_step(lambda x, w: rates(x, w, p), x, drive, dt, looped=looped)

@@ -7,6 +7,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float, Int
 
 Rates = Callable[[Any, Any], Any]
 """`f(x, w)`: the rates of a row (or column, or number) under what drives it."""
@@ -52,7 +53,7 @@ def rk4_step(rates: Rates, x: Any, w: Driving, dt: Any, *, looped: bool) -> Any:
     return x + rk4_change(rates, x, w, dt, looped=looped)
 
 
-def rk4_steps(rates: Rates, x: Any, w: Callable[[Any, Any], Any], dt: Any, count: Any) -> Any:
+def rk4_steps(rates: Rates, x: Any, w: Callable[[Any, Any], Any], dt: Any, count: int | Int[jax.Array, ""]) -> Any:
     """The state `count` steps later, each with its stages in a loop; `w(i, fraction)` drives step i."""
     if isinstance(count, int) and count == 1:
         return rk4_step(rates, x, lambda fraction: w(0.0, fraction), dt, looped=True)
@@ -63,13 +64,18 @@ def rk4_steps(rates: Rates, x: Any, w: Callable[[Any, Any], Any], dt: Any, count
     return jax.lax.fori_loop(0, count, step, x)
 
 
-def rk4_and_slope(rates: Callable[[Any], Any], x: Any, dt: Any, count: Any) -> tuple[Any, Any]:
+def rk4_and_slope(
+    rates: Callable[[Any], Any],
+    x: Float[jax.Array, " states"],
+    dt: Float[jax.Array, ""],
+    count: Int[jax.Array, ""],
+) -> tuple[Any, Any]:
     """The state `count` steps later, and its rates there: `rates` stands once in the compiled code.
 
     All stages are in one loop, and the first of the step that is not taken gives the rates.
     """
 
-    def evaluated(i: Any, carry: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+    def evaluated(i: Int[jax.Array, ""], carry: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
         x, k, total = carry
         stage = i % 4
         inner, last = (stage == 1) | (stage == 2), stage == 3
