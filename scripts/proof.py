@@ -1,6 +1,6 @@
 """Runs every proof and writes docs/proof.md from what came out: `make proof` (half an hour).
 
-    python scripts/proof.py [--assemble-only]
+    python scripts/proof.py [--assemble-only | --put FILE ...]
 
 Tests marked `proof` and the benchmarks leave JSON files in build/proof (the folder that SWASHPLATE_PROOF names):
 
@@ -8,6 +8,7 @@ Tests marked `proof` and the benchmarks leave JSON files in build/proof (the fol
 
 `rows` hold texts or numbers; `passed` may be left out. The benchmarks' file (build/proof/benchmarks.json) is what
 `python -m benchmarks.run --out` writes. Files of an earlier run are removed first, so that nothing old is reported.
+With `--put`, nothing runs: sections of the given files take the places of those of the same title, and say their day.
 What `make siege` wrote into the page (scripts/siege.py) is kept.
 """
 
@@ -130,11 +131,30 @@ def with_siege(page: str, siege: str) -> str:
     return f"{kept}\n\n{BEGIN}\n\n{siege}\n\n{END}\n" if siege else f"{kept}\n"
 
 
+def put(page: str, document: dict[str, Any], today: str) -> str:
+    """A page with one section anew, in its place or before those of the siege."""
+    fresh = section({**document, "text": f"Run by itself on {today}. {document.get('text', '')}"})
+    head, begin, siege = page.partition(BEGIN)
+    before, title, rest = head.partition(f"## {document['title']}\n")
+    _, following, after = rest.partition("\n## ") if title else ("", "", "")
+    parts = [before.strip(), fresh, f"## {after.strip()}" if following else "", begin + siege.rstrip()]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description="Run every proof and write docs/proof.md.")
     parser.add_argument("--assemble-only", action="store_true", help="write the page from build/proof as it is")
+    parser.add_argument("--put", nargs="+", type=Path, metavar="FILE", help="put the sections of these files anew")
+    options = parser.parse_args()
+    if options.put:
+        page, today = PAGE.read_text(encoding="utf-8"), datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+        for file in options.put:
+            document = json.loads(file.read_text(encoding="utf-8"))
+            page = put(page, benchmarks_as_section(document) if "results" in document else document, today)
+        PAGE.write_text(page, encoding="utf-8")
+        return 0
     runs = []
-    if not parser.parse_args().assemble_only:
+    if not options.assemble_only:
         FOLDER.mkdir(parents=True, exist_ok=True)
         for old in FOLDER.glob("*.json"):
             old.unlink()

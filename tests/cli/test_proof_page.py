@@ -43,3 +43,14 @@ def test_every_result_becomes_a_section(proof: Any, tmp_path: Path) -> None:
         "| `python -m pytest` | FAILED | 3 |",
     ):
         assert part in page, page
+
+
+def test_a_section_is_put_anew_and_the_others_stay(proof: Any) -> None:
+    sections = [{"title": title, "text": f"old {title}.", "passed": True} for title in ("A", "Speed", "Speed of B")]
+    page = "# Proof\n\n" + "\n\n".join(map(proof.section, sections)) + f"\n\n{proof.BEGIN}\n\nS\n\n{proof.END}\n"
+    again = proof.put(page, {"title": "Speed", "text": "new.", "passed": False}, "2026-11-27")
+    old, new = "**Passed.** old Speed.\n", "**Missed.** Run by itself on 2026-11-27. new.\n"
+    assert again == page.replace(old, new)
+    assert again != page
+    added = proof.put(page, {"title": "C", "text": "more."}, "2026-11-27")
+    assert added == page.replace(proof.BEGIN, f"## C\n\nRun by itself on 2026-11-27. more.\n\n{proof.BEGIN}")
