@@ -1,14 +1,13 @@
 """How long an identification takes: 15 parameters from 40 s of flight at 100 Hz, warm, cold, and by the paper's way.
 
-python -m benchmarks.identifying METHOD    one identification in this process; prints seconds and peak memory as JSON
-python -m benchmarks.identifying RIVAL     simplex or scipy: its row as JSON, with the peak memory of this process
+python -m benchmarks.identifying METHOD    one identification in this process; prints its seconds as JSON
+python -m benchmarks.identifying RIVAL     simplex or scipy: its row as JSON
 """
 
 from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -81,17 +80,8 @@ def warm(method: str, logged: sp.Flight, *, iterations: int = 60) -> Span:
 def cold(method: str) -> Span:
     """A new process with an empty compilation cache, imports and simulated flight included."""
     with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, "JAX_COMPILATION_CACHE_DIR": folder}
-        begin = time.perf_counter()
-        answer = subprocess.run(
-            [sys.executable, "-m", "benchmarks.identifying", method],
-            env=environment,
-            check=True,
-            capture_output=True,
-            text=True,
-        )
-        seconds = time.perf_counter() - begin
-    memory = json.loads(answer.stdout)["peak_gib"]
+        used, _ = _used(["benchmarks.identifying", method], {**os.environ, "JAX_COMPILATION_CACHE_DIR": folder})
+    seconds, memory = used["clock"], used["peak_gib"]
     note = f"new process, nothing compiled before; peak memory {memory:.2f} GiB (promised: {MEMORY:g})"
     return Span(f"{method}, 15 parameters, cold", seconds, COLD, note, kept=memory <= MEMORY)
 
@@ -112,7 +102,7 @@ def first_answers(logged: sp.Flight) -> list[Span]:
         flown = ["--vehicle", "raptor50", "--flight", str(folder / "heli.nc"), "--free", "rotor"]
         law = str(folder / "law.toml")
         check = ["control", "check", "coax", "--controller", law, "--out", str(folder / "check")]
-        _used(["simulate", "--vehicle", "raptor50", *fly, "--out", str(folder / "heli.nc")], folder / "flying")
+        _swash(["simulate", "--vehicle", "raptor50", *fly, "--out", str(folder / "heli.nc")], folder / "flying")
         spans = []
         for what, words in (
             ("identify", ["identify", *fit]),
@@ -122,23 +112,28 @@ def first_answers(logged: sp.Flight) -> list[Span]:
             ("control check", check),
         ):
             for state in ("cold", "warm"):  # a cache of its own: as if nothing had been compiled before
-                took, clock, memory = _used(words, folder / what.replace(" ", "-"))
-                note = f"processor time, {clock:.1f} s by the clock; peak {memory:.2f} GiB (promised: {FIRST_MEMORY:g})"
+                used = _swash(words, folder / what.replace(" ", "-"))
+                took, memory = used["processor"], used["peak_gib"]
+                told_of = f"peak {memory:.2f} GiB (promised: {FIRST_MEMORY:g})"
+                note = f"processor time, {used['clock']:.1f} s by the clock; {told_of}"
                 told = f"{what}, {state}"
                 spans.append(Span(f"swash {told}", took, FIRST[told], note, kept=memory <= FIRST_MEMORY))
     return spans
 
 
-def _used(words: list[str], cache: Path) -> tuple[float, float, float]:
-    """Processor time and time by the clock [s] and peak memory [GiB] of a command, its compiler's not in the memory."""
+def _swash(words: list[str], cache: Path) -> dict[str, float]:
+    """What a command of ours used, with its own cache."""
     environment = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR")}
-    environment["XDG_CACHE_HOME"] = str(cache)
-    begin = time.perf_counter()
-    run = subprocess.Popen([sys.executable, "-m", "swashplate", *words], env=environment, stdout=subprocess.DEVNULL)
-    _, status, used = os.wait4(run.pid, 0)
-    run.returncode = os.waitstatus_to_exitcode(status)
-    assert run.returncode == 0, f"swash {words[0]} ended with {run.returncode}"
-    return used.ru_utime + used.ru_stime, time.perf_counter() - begin, used.ru_maxrss / 2**20
+    return _used(["swashplate", *words], {**environment, "XDG_CACHE_HOME": str(cache)})[0]
+
+
+def _used(module: list[str], environment: dict[str, str]) -> tuple[dict[str, float], str]:
+    """What a module with its arguments used (see benchmarks/used.py), and what it said."""
+    measuring = [sys.executable, str(Path(__file__).with_name("used.py"))]
+    command = [*measuring, sys.executable, "-m", *module]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, f"{' '.join(module[:2])} ended with {run.returncode}: {run.stderr[-2000:]}"
+    return json.loads(run.stdout), run.stderr
 
 
 def scipy_least_squares(logged: sp.Flight) -> Span:
@@ -226,7 +221,8 @@ def nelder_mead(logged: sp.Flight) -> Span:
     told_of = f"and was still {above:,.0f} above in log-likelihood" if above > 1.0 else "to the same cost"
     note = f"processor time; output error took {ours:.2f} s, the simplex {theirs:.1f} s {told_of}"
     kept = above > 1.0 or theirs >= RATIO * ours
-    return Span(f"output error to where the simplex is after {RATIO:g} times as long", ours, theirs / RATIO, note, kept)
+    target = theirs / RATIO if above <= 1.0 else ours  # one that ends above gets there at no time
+    return Span(f"output error to where the simplex is after {RATIO:g} times as long", ours, target, note, kept)
 
 
 RIVALS = {"simplex": nelder_mead, "scipy": scipy_least_squares}
@@ -235,9 +231,9 @@ RIVALS = {"simplex": nelder_mead, "scipy": scipy_least_squares}
 
 def beside(rival: str) -> Span:
     """A rival's row from a process of its own, for its peak memory."""
-    command = [sys.executable, "-m", "benchmarks.identifying", rival]
-    row = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    note = f"{row['note']}; peak of both in one process {row['peak_gib']:.2f} GiB"
+    used, said = _used(["benchmarks.identifying", rival], dict(os.environ))
+    row = json.loads(said.splitlines()[-1])
+    note = f"{row['note']}; peak of both in one process {used['peak_gib']:.2f} GiB"
     return Span(row["name"], row["seconds"], row["target"], note, row["kept"])
 
 
@@ -271,5 +267,4 @@ def measure(*, short: bool) -> list[Span]:
 
 if __name__ == "__main__":
     asked = sys.argv[1]
-    told = RIVALS[asked](flight()).as_json() if asked in RIVALS else {"seconds": identify(asked, flight())}
-    print(json.dumps({**told, "peak_gib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20}))
+    print(json.dumps(RIVALS[asked](flight()).as_json() if asked in RIVALS else {"seconds": identify(asked, flight())}))

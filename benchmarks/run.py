@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 import platform
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
@@ -30,7 +31,7 @@ from benchmarks import (
     state_space,
 )
 from benchmarks.rotor_options import rotor_options
-from benchmarks.timing import Result
+from benchmarks.timing import Result, Span
 from swashplate.simulation.compilation import enable_compilation_cache
 
 JSBSIM_RATIO = 2.0
@@ -107,9 +108,18 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="also write the results as JSON")
     options = parser.parse_args()
     enable_compilation_cache()
-    where, results = machine(), measure(short=options.short)
+    found: dict[str, object] = {"machine": machine()}
+
+    def keep(part: str, measured: Sequence[Result | Span | live.Punctual]) -> None:
+        """Write what there is so far: minutes of measuring outlive an error in a later part."""
+        found[part] = [one.as_json() for one in measured]
+        if options.out is not None:
+            options.out.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+    results = measure(short=options.short)
+    keep("results", results)
     show(
-        f"Steps per second, best of several ({where['processor']}, {where['cores']} cores)",
+        f"Steps per second, best of several ({_processor()}, {os.cpu_count()} cores)",
         ("what", "rate", "promised", "", "note"),
         [
             (
@@ -131,6 +141,7 @@ def main() -> None:
         frequency.fit(repeats=1),
         state_space.against_subspaces(seconds=20.0 if options.short else state_space.SECONDS),
     ]
+    keep("spans", spans)
     show(
         "Seconds",
         ("what", "seconds", "promised", "", "note"),
@@ -140,6 +151,7 @@ def main() -> None:
         ],
     )
     flown = live.measure(short=options.short)
+    keep("live", flown)
     show(
         "Live: 500 Hz physics and 100 Hz controller in real time",
         ("page", "late %", "promised", "", "note"),
@@ -154,14 +166,6 @@ def main() -> None:
             for run in flown
         ],
     )
-    if options.out is not None:
-        document = {
-            "machine": where,
-            "results": [result.as_json() for result in results],
-            "spans": [span.as_json() for span in spans],
-            "live": [run.as_json() for run in flown],
-        }
-        options.out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
