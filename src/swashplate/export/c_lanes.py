@@ -32,7 +32,7 @@ _TURNING = {"SIN": "sine", "COS": "cosine", "TAN": "tangent"}
 
 
 def lane_code(equations: Equations, precision: Precision) -> str:
-    """C of `fly_lanes`, which flies vehicles `first` to `last` of `total`; rows as in `simulation.batch`.
+    """C of `fly_lanes`, which flies vehicles `first` to `last` of `total`; rows as in `simulation.batch.trajectories`.
 
     Args:
         equations: of which vehicle.

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from swashplate.flights.flight import Flight
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import Equations, row_rates
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_step
@@ -28,8 +27,8 @@ Precision = Literal["float64", "float32"]
 _MANY_STEPS = 1_000_000
 """Steps of all vehicles together from which the four stages are written out instead of looped.
 
-Written out, a CoaX is traced and compiled in 5.5 instead of 1.7 s and a raptor50 in 9 instead of 2.6 s; looped, a step
-takes up to 2 us longer in float32.
+Written out, a CoaX is traced and compiled in 5.0 instead of 1.9 s and a raptor50 in 8.1 instead of 2.9 s; looped, a
+step takes up to 2 us longer in float32.
 """
 
 BLOCK = 1024
@@ -87,7 +86,7 @@ class FlyBatch(Protocol):
         keep: int,
         held: bool,
     ) -> NDArray[Any]:
-        """States at every `keep`-th sample; arguments as of `_trajectories`."""
+        """As `trajectories`."""
 
 
 def fly_batch(
@@ -100,24 +99,25 @@ def fly_batch(
     keep: int,
     held: bool,
 ) -> NDArray[Any]:
-    """`_trajectories`, on a CPU in blocks of `BLOCK` vehicles spread over the cores by threads; arguments as there."""
+    """`trajectories`, on a CPU in blocks of `BLOCK` vehicles spread over the cores by threads; arguments as there."""
     count, on_cpu = x0.shape[1], jax.default_backend() == "cpu"
-    fly = _few if on_cpu and (len(rows) - 1) * count < _MANY_STEPS else trajectories
+    fly = partial(trajectories, keep=keep, held=held, looped=on_cpu and (len(rows) - 1) * count < _MANY_STEPS)
     if not on_cpu or count <= BLOCK:
-        return np.asarray(fly(equations, x0, rows, p, dt, keep=keep, held=held))
+        return np.asarray(fly(equations, x0, rows, p, dt))
 
     def part(values: NDArray[Any], first: int) -> NDArray[Any]:
         return values if values.shape[-1] == 1 else values[..., first : first + BLOCK]
 
     def block(first: int) -> NDArray[Any]:
         arguments = (part(values, first) for values in (x0, rows, p))
-        return np.asarray(fly(equations, *arguments, dt, keep=keep, held=held))
+        return np.asarray(fly(equations, *arguments, dt))
 
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         return np.concatenate(list(threads.map(block, range(0, count, BLOCK))), axis=2)
 
 
-def _trajectories(
+@partial(jax.jit, static_argnums=0, static_argnames=("keep", "held", "looped"))
+def trajectories(
     equations: Equations,
     x0: Float[jax.Array, "states vehicles"],
     rows: Float[jax.Array, "samples driving shared"],
@@ -171,13 +171,3 @@ def _trajectories(
     ends = tuple(part[: n * keep].reshape(n, keep, *part.shape[1:]) for part in (flat_rows[:-1], flat_rows[1:]))
     _, later = jax.lax.scan(block, x0, ends)
     return jnp.concatenate([x0[None], later])
-
-
-trajectories = jax.jit(_trajectories, static_argnums=0, static_argnames=("keep", "held", "looped"))
-"""`_trajectories` for many steps."""
-_few = jax.jit(
-    partial(_trajectories, looped=True),
-    static_argnums=0,
-    static_argnames=("keep", "held"),
-    compiler_options=QUICK_TO_COMPILE,
-)
