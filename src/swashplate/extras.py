@@ -26,6 +26,7 @@ EXTRA_OF: Mapping[str, str] = {
     "mcap": "mcap",
     "gymnasium": "rl",
     "distributed": "scale",
+    "pyarrow": "scale",
 }
 """Extras of `pyproject.toml` by the module that they bring; `all` brings every one."""
 

@@ -22,7 +22,7 @@ from swashplate.links.web.libraries import PAGE
 pytest.importorskip("starlette", reason="the extra `live` is not installed")
 
 SIZES = {"desk": (1280, 860), "telephone": (390, 844)}
-_WAIT = 30_000.0  # ms; a busy machine draws slowly
+_WAIT = 90_000.0  # ms; a busy machine draws slowly
 
 
 @pytest.fixture(scope="module")

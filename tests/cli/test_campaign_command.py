@@ -57,11 +57,11 @@ def test_from_a_dry_run_to_a_report(file: Path, tmp_path: Path, monkeypatch: pyt
     looked = json.loads(swash("campaign", "status", tmp_path / "out", "--json").out)
     assert (looked["done"], looked["rows"], looked["failed"]) == (2, 2, {})
     assert swash("campaign", "resume", tmp_path / "out", "-q").code == 0
-    for name in ("r.html", "t.csv", "t.nc"):
+    for name in ("r.html", "t.csv", "t.nc", "t.parquet"):
         assert swash("campaign", "report", tmp_path / "out", "-o", tmp_path / name).code == 0
         assert (tmp_path / name).stat().st_size > 0
     refused = swash("campaign", "report", tmp_path / "out", "-o", tmp_path / "r.pdf")
-    assert "ends in '.pdf', expected .html, .nc or .csv" in one_message(refused)
+    assert "ends in '.pdf', expected .html, .nc, .csv or .parquet" in one_message(refused)
     assert (tmp_path / "t.csv").read_text().splitlines()[1].endswith(",a.nc,good,2.5,2.5,2.5,2.5,2.5")
 
 

@@ -185,7 +185,8 @@ def test_closed_streams_are_no_bug_and_no_file_takes_their_place(tmp_path: Path)
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path, number: signal.Signals) -> None:
     code = (
-        "import time\nfrom swashplate.cli import identify\nfrom swashplate.cli.app import main\n"
+        "import signal, time\nfrom swashplate.cli import identify\nfrom swashplate.cli.app import main\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"  # `nohup make test` would hand down that it is ignored
         "from swashplate.api import identification\n"
         "def slow(*_, **__):\n    print('fitting', flush=True)\n    time.sleep(60)\n"
         "identification.identify = slow\nmain()"

@@ -110,6 +110,7 @@ class Siege:
         places = [str(ROOT / "tests"), str(ROOT), os.environ.get("PYTHONPATH", "")]
         environment = {**os.environ, "LD_PRELOAD": str(shim), "PYTHONPATH": os.pathsep.join(places)}
         environment |= {"TMPDIR": str(self.temporary), "NO_COLOR": "1"}
+        environment["JE_ARROW_MALLOC_CONF"] = "background_thread:false"  # pandas loads pyarrow; no fork has its thread
         self._process = subprocess.Popen(
             [sys.executable, "-m", "tests.siege.zygote", *loaded],
             cwd=ROOT,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import tempfile
 from collections.abc import Callable, Mapping
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.api.campaigns.plan import plan_campaign, planned_in
+from swashplate.api.campaigns.result_files import NUMPY, PARQUET, packed
 from swashplate.api.campaigns.store import PLAN, RESULTS, CampaignStore
 from swashplate.links.ardupilot.gains import read_parameter_file
 from swashplate.models.conventional.aerofoil_file import parse_aerofoil
@@ -61,16 +61,15 @@ def _use_campaign(path: Path) -> None:
     plan_campaign(path)
 
 
-def _result() -> bytes:
-    file = io.BytesIO()
-    np.savez(file, seed=np.arange(4), verdict=np.array(["found", "lost"] * 2), tau=np.linspace(0.0, 1.0, 4))
-    return file.getvalue()
+def _result(ending: str) -> bytes:
+    table = {"seed": np.arange(4), "verdict": np.array(["found", "lost"] * 2), "tau": np.linspace(0.0, 1.0, 4)}
+    return packed(table, ending=ending)
 
 
 def _use_result(path: Path) -> None:
-    folder = path.parent / "store"
+    folder = path.parent / f"store{path.suffix}"
     (folder / RESULTS).mkdir(parents=True, exist_ok=True)
-    (folder / RESULTS / "task.npz").write_bytes(path.read_bytes())
+    (folder / RESULTS / f"task{path.suffix}").write_bytes(path.read_bytes())
     CampaignStore(folder).columns("task")
 
 
@@ -100,5 +99,6 @@ MORE: Mapping[str, Callable[[], Target]] = {
     "published derivatives": _of(".csv", lambda: PUBLISHED, read_published),
     "campaign": _of(".toml", lambda: (CAMPAIGN.encode(),), _use_campaign),
     "plan of a campaign": _of(".json", lambda: (_plan(),), _use_plan),
-    "result of a task": _of(".npz", lambda: (_result(),), _use_result),
+    "result of a task": _of(PARQUET, lambda: (_result(PARQUET),), _use_result),
+    "result of a task without the extra": _of(NUMPY, lambda: (_result(NUMPY),), _use_result),
 }

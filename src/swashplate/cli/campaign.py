@@ -103,14 +103,16 @@ def status(folder: Store, json: options.Json = False) -> None:
 @app.command("report", short_help="Write the results of a campaign as a page or a table.")
 def report(
     folder: Store,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="A page (.html), or the table: .nc, .csv.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="A page (.html), or the table: .nc, .csv, .parquet.")
+    ],
     quiet: options.Quiet = False,
 ) -> None:
     """Distributions, worst rows with the command that shows each again, convergence of the quantiles, and failures."""
     import swashplate as sp
 
-    if out.suffix not in (".html", ".nc", ".csv"):
-        raise SwashError(f"ends in '{out.suffix}', expected .html, .nc or .csv.", where=out, channel="--out")
+    if out.suffix not in (".html", ".nc", ".csv", ".parquet"):
+        raise SwashError(f"ends in '{out.suffix}', expected .html, .nc, .csv or .parquet.", where=out, channel="--out")
     study = sp.campaign_results(folder)
     written = sp.report(study, path=out) if out.suffix == ".html" else study.save(out)
     if not quiet:

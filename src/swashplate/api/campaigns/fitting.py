@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.api.campaigns.flown import vehicle_of
 from swashplate.api.campaigns.kind import CampaignSettings, NamedFile
@@ -19,6 +21,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.result import Result, bounds_of
+from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -39,6 +42,14 @@ class FitCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, fr
     outputs: list[str] | None = None
     ties: list[str] = msgspec.field(default_factory=list)
     wind: bool = False
+
+    def check_names(self) -> None:
+        """That what the file names is known, as far as no model is needed for it.
+
+        Raises:
+            IdentificationError: for a method that nobody has.
+        """
+        check_method(self.method)
 
     def free_of(self, model: Vehicle) -> tuple[str, ...]:
         """Names of the numbers of a model that a fit moves.
@@ -146,6 +157,16 @@ def outcome_columns(attempts: Sequence[Attempt]) -> Columns:
         "converged": np.array([attempt.converged for attempt in attempts], dtype=np.int64),
         "problem": np.array([attempt.problem for attempt in attempts], dtype=np.str_),
     }
+
+
+def unusable(table: Columns, usable: NDArray[np.bool_]) -> list[str]:
+    """What a reader must know of fits that are left out, with the reason that most of them have; empty for none."""
+    lost = int(np.sum(~usable))
+    if not lost:
+        return []
+    told = f"{lost} fits may not be used and are in no figure below"
+    reasons = Counter(filter(None, map(str, table["problem"][~usable]))) if "problem" in table else Counter()
+    return [told, *(f"most often ({count} of {lost}): {reason}" for reason, count in reasons.most_common(1))]
 
 
 def _identified(model: Vehicle) -> Vehicle | StateSpaceModel:

@@ -15,6 +15,7 @@ import xarray as xr
 from swashplate import atomic
 from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings, settings_of
 from swashplate.api.campaigns.plan import planned_in
+from swashplate.api.campaigns.result_files import PARQUET, packed
 from swashplate.api.campaigns.shares import quantile
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import Columns
@@ -159,10 +160,11 @@ class Campaign(Shown):
         )  # fmt: skip
 
     def save(self, path: str | Path) -> Path:
-        """Write the table: .nc (netCDF) or .csv.
+        """Write the table: .nc (netCDF), .csv or .parquet.
 
         Raises:
             CampaignError: another ending.
+            MissingLibraryError: for .parquet without the extra `scale`.
             WriteError: where it cannot be written.
         """
         place = Path(path)
@@ -171,8 +173,10 @@ class Campaign(Shown):
             stream = io.BytesIO()
             data.to_netcdf(stream, engine="h5netcdf")
             return atomic.write_bytes(place, stream.getvalue())
+        if place.suffix == PARQUET:
+            return atomic.write_bytes(place, packed(self.table, ending=PARQUET))
         if place.suffix != ".csv":
-            raise CampaignError(f"ends in '{place.suffix}', expected .nc or .csv.", where=place)
+            raise CampaignError(f"ends in '{place.suffix}', expected .nc, .csv or {PARQUET}.", where=place)
         lines = [",".join(self.table)]
         lines += [",".join(map(_cell, row)) for row in zip(*self.table.values(), strict=True)]
         return atomic.write_text(place, "\n".join(lines) + "\n")

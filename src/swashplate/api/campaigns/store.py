@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-import io
 import json
 import os
 import platform
 import time
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -17,18 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from swashplate import atomic, documents
+from swashplate.api.campaigns.result_files import ENDINGS, LARGEST, packed, unpacked, usual_ending
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
-from swashplate.errors import CampaignError
+from swashplate.errors import CampaignError, MissingLibraryError
 from swashplate.files import read_bytes
 
 FILE, PLAN, LOCK = "campaign.toml", "plan.json", "lock"
 RESULTS, FAILED, INPUTS = "results", "failed", "inputs"
 TURNED_AWAY = "turned-away.json"
 _SCHEMA = 1
-_LARGEST_RESULT = 2 << 30  # bytes
 
 
 class _Plan(msgspec.Struct):
@@ -45,8 +42,9 @@ class _Plan(msgspec.Struct):
 class CampaignStore:
     """Results by the names of their tasks.
 
-    A result is one file, `results/NAME.npz`, that appears by rename when it is complete and is never written again: a
-    task that two workers have done after all is in the table once. What failed for good is `failed/NAME.json`.
+    A result is one file, `results/NAME.parquet` (`.npz` without the extra `scale`), that appears by rename when it is
+    complete and is never written again: a task that two workers have done after all is in the table once. What failed
+    for good is `failed/NAME.json`.
 
     Args:
         folder: of the campaign; it need not be there.
@@ -114,7 +112,7 @@ class CampaignStore:
     # ---- results ---------------------------------------------------------------------------------------------------
     def done(self) -> frozenset[str]:
         """Names of the tasks whose result is here."""
-        return self._names(RESULTS, ".npz")
+        return self._names(RESULTS, *ENDINGS)
 
     def failed(self) -> dict[str, dict[str, Any]]:
         """What failed for good, by the task's name: see `give_up`."""
@@ -123,12 +121,17 @@ class CampaignStore:
             failures[name] = documents.read_document(self.folder / FAILED / f"{name}.json", form="json")
         return failures
 
-    def _names(self, folder: str, ending: str) -> frozenset[str]:
+    def _names(self, folder: str, *endings: str) -> frozenset[str]:
         place = self.folder / folder
         if not place.is_dir():
             return frozenset()
-        names = (entry.name for entry in os.scandir(place))
-        return frozenset(n.removesuffix(ending) for n in names if n.endswith(ending) and not n.startswith("."))
+        names = (Path(entry.name) for entry in os.scandir(place))
+        return frozenset(n.stem for n in names if n.suffix in endings and not n.name.startswith("."))
+
+    def _result(self, name: str) -> Path | None:
+        """The file of a task's result, where it is here."""
+        paths = (self.folder / RESULTS / f"{name}{ending}" for ending in ENDINGS)
+        return next((path for path in paths if path.exists()), None)
 
     def keep(self, task: CampaignTask, columns: Columns) -> None:
         """Write a task's result, once: where it is there already, nothing happens.
@@ -136,15 +139,14 @@ class CampaignStore:
         Raises:
             WriteError: a full disk and the like; nothing of this result is left then, and everything before it is.
         """
-        path = self.folder / RESULTS / f"{task.name}.npz"
-        if path.exists():
+        if self._result(task.name):
             return
-        objects = [column for column, values in columns.items() if values.dtype.kind not in "biufU"]
-        if objects:
-            raise CampaignError("is neither numbers nor texts.", where=f"task {task.name}", channel=", ".join(objects))
-        stream = io.BytesIO()
-        np.savez(stream, **columns)  # type: ignore[arg-type]
-        atomic.write_bytes(path, stream.getbuffer())
+        ending = usual_ending()
+        try:
+            content = packed(columns, ending=ending)
+        except CampaignError as error:
+            raise CampaignError(error.problem, where=f"task {task.name}", channel=error.channel) from None
+        atomic.write_bytes(self.folder / RESULTS / f"{task.name}{ending}", content)
         (self.folder / FAILED / f"{task.name}.json").unlink(missing_ok=True)
 
     def give_up(self, task: CampaignTask, words: Sequence[str]) -> None:
@@ -168,15 +170,13 @@ class CampaignStore:
 
         Raises:
             CampaignError: a file that is none.
+            MissingLibraryError: a result in Parquet, without the extra `scale`.
         """
-        path = self.folder / RESULTS / f"{name}.npz"
+        path = self._result(name) or self.folder / RESULTS / f"{name}{usual_ending()}"
         try:
-            content = io.BytesIO(read_bytes(path, most=_LARGEST_RESULT))
-            with zipfile.ZipFile(content) as packed:
-                if sum(entry.file_size for entry in packed.infolist()) > _LARGEST_RESULT:
-                    raise ValueError("it claims more than it can hold")
-            with np.load(content, allow_pickle=False) as arrays:
-                return {key: arrays[key] for key in arrays.files}
+            return unpacked(read_bytes(path, most=LARGEST), ending=path.suffix)
+        except MissingLibraryError:
+            raise
         except Exception as error:  # whatever the libraries raise on damaged bytes is the file's fault
             raise CampaignError(
                 f"is no result of a task: {error or type(error).__name__}.",

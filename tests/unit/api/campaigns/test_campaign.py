@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import io
 import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -18,6 +18,7 @@ import rolling
 import swashplate as sp
 from made_campaigns import InProcess
 from swashplate.api.campaigns import verbs, worker
+from swashplate.api.campaigns.result_files import ENDINGS, packed
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.errors import CampaignError
 from swashplate.reporting.structure import Figure, Table
@@ -82,14 +83,15 @@ def test_stopped_and_gone_on_with_it_is_as_in_one_go(
 
     # What it says.
     assert "Reached it: 2 of 2" in repr(whole)
-    for ending in (".nc", ".csv"):
+    for ending in (".nc", ".csv", ".parquet"):
         whole.save(tmp_path / f"t{ending}")
     with xr.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as data:
         np.testing.assert_array_equal(data["Lb"], whole.table["Lb"])
     with (tmp_path / "t.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["cost"]) for row in rows] == list(whole.table["cost"])
-    with pytest.raises(CampaignError, match=r"ends in '\.txt', expected \.nc or \.csv"):
+    assert pd.read_parquet(tmp_path / "t.parquet")["cost"].tolist() == list(whole.table["cost"])
+    with pytest.raises(CampaignError, match=r"ends in '\.txt', expected \.nc, \.csv or \.parquet"):
         whole.save(tmp_path / "t.txt")
     assert sp.report(whole, path=tmp_path / "r.html").stat().st_size > 10_000
     assert whole.to_document()["done"] == 2
@@ -166,14 +168,14 @@ def test_a_damaged_result_is_named(tmp_path: Path) -> None:
     (tmp_path / "results" / "x.npz").write_bytes(b"half of")
     with pytest.raises(CampaignError, match=r"x\.npz: is no result of a task: .*resume"):
         store.columns("x")
-    whole = io.BytesIO()
-    np.savez(whole, a=np.arange(4))
-    for at in range(0, len(whole.getvalue()), 7):  # libraries raise all kinds of errors for a bit in a header
-        content = bytearray(whole.getvalue())
-        content[at] ^= 0xFF
-        (tmp_path / "results" / "x.npz").write_bytes(content)
-        with contextlib.suppress(CampaignError):
-            assert set(store.columns("x"))
+    for ending in ENDINGS:
+        whole = packed({"a": np.arange(4), "b": np.array(["one", "two"] * 2)}, ending=ending)
+        for at in range(0, len(whole), 7):  # libraries raise all kinds of errors for a bit in a header
+            content = bytearray(whole)
+            content[at] ^= 0xFF
+            (tmp_path / "results" / f"{ending[1:]}{ending}").write_bytes(content)
+            with contextlib.suppress(CampaignError):
+                assert set(store.columns(ending[1:]))
     kept = next((tmp_path / "inputs").iterdir())
     assert store.input(kept.name) == b"content"
     kept.write_bytes(b"other")

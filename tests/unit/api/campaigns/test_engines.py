@@ -19,6 +19,7 @@ from swashplate.api.campaigns import program
 from swashplate.api.campaigns.dask_engine import DaskEngine
 from swashplate.api.campaigns.engine import TRIES, CampaignStanding, TaskEngine, carry_out
 from swashplate.api.campaigns.pool import ProcessPool
+from swashplate.api.campaigns.result_files import usual_ending
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
 from swashplate.errors import CampaignError, WriteError
@@ -26,7 +27,7 @@ from swashplate.errors import CampaignError, WriteError
 
 def bits(store: CampaignStore) -> dict[str, bytes]:
     """Content of every result by its task's name."""
-    return {name: (store.folder / "results" / f"{name}.npz").read_bytes() for name in sorted(store.done())}
+    return {path.stem: path.read_bytes() for path in sorted((store.folder / "results").glob("[!.]*"))}
 
 
 def expected(every: tuple[CampaignTask, ...], folder: Path) -> dict[str, bytes]:
@@ -101,7 +102,7 @@ def test_a_full_disk_ends_it_with_what_is_done(tmp_path: Path, monkeypatch: pyte
     every, replaced = made_campaigns.tasks(), os.replace
 
     def full(source: str | Path, target: str | Path) -> None:
-        if len(list((tmp_path / "results").glob("[0-9a-f]*.npz"))) == 3 and str(target).endswith(".npz"):
+        if len(list((tmp_path / "results").glob("[0-9a-f]*"))) == 3 and Path(target).parent.name == "results":
             raise OSError(28, "No space left on device", str(source))
         replaced(source, target)
 
@@ -111,7 +112,7 @@ def test_a_full_disk_ends_it_with_what_is_done(tmp_path: Path, monkeypatch: pyte
             done(every, made_campaigns.InProcess(made_campaigns.numbers), tmp_path)
     store = CampaignStore(tmp_path)
     assert len(store.done()) == 3
-    assert sorted(path.suffix for path in (tmp_path / "results").iterdir()) == [".npz"] * 3
+    assert sorted(path.suffix for path in (tmp_path / "results").iterdir()) == [usual_ending()] * 3
     left = tuple(task for task in every if task.name not in store.done())
     store, _ = done(left, made_campaigns.InProcess(made_campaigns.numbers), tmp_path)
     assert bits(store) == expected(every, tmp_path / "here")

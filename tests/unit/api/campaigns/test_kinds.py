@@ -135,7 +135,7 @@ def test_lost_fits_are_in_no_share_and_said() -> None:
     off = np.concatenate([np.zeros(30), np.full(30, np.nan)])
     usable = np.repeat([1, 0], 30)
     says = found("recovery", {"Lb.off": off, "usable": usable}, vehicle="coax", maneuver="hover:1s")
-    assert says.careful[0] == "30 fits may not be used and are in no share below"
+    assert says.careful[0] == "30 fits may not be used and are in no figure below"
     assert says.summary[0][1].startswith("30 of 60")
     assert says.tables[0][2][0][1] == "100.0"
     assert judged(0, 0) == "nothing is known"
@@ -167,7 +167,7 @@ def test_starts_are_sorted_by_the_optimum_they_end_at() -> None:
     alone = found("multi-start", table | {"cost": np.array([5, 1, 3, 7, 9, 11.0])}, vehicle="coax", flights=["a"])
     assert "reached by one start only" in alone.careful[0]
     none = found("multi-start", table | {"usable": np.zeros(6)}, vehicle="coax", flights=["a"])
-    assert none.careful == ("no fit may be used",)
+    assert none.careful == ("6 fits may not be used and are in no figure below",)
     assert MULTI_START.rows == "fit"
 
 

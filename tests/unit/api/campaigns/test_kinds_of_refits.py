@@ -11,11 +11,12 @@ import pytest
 import rolling
 import swashplate as sp
 from swashplate.api.campaigns import worker
+from swashplate.api.campaigns.fitting import unusable
 from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings, settings_of
 from swashplate.api.campaigns.kinds import monte_carlo as of_flights
 from swashplate.api.campaigns.kinds.bootstrap import compared, pieces_of
 from swashplate.api.campaigns.tasks import Columns, Portion
-from swashplate.errors import CampaignError
+from swashplate.errors import CampaignError, SwashError
 
 FITS = """
 kind = "campaign"
@@ -186,3 +187,35 @@ def test_a_sweep_that_means_nothing_is_refused(change: dict[str, Any], said: str
 def test_refits_of_nothing_are_refused(of: str, change: dict[str, Any], said: str) -> None:
     with pytest.raises(CampaignError, match=said):
         CAMPAIGNS[of].parts(settings_of(of, {"vehicle": "coax", **change}), Path())
+
+
+@pytest.mark.parametrize(
+    ("of", "settings"),
+    [
+        ("recovery", {"maneuver": "hover:4s"}),
+        ("multi-start", {"flights": ["a"]}),
+        ("cross-validation", {"flights": ["a", "b"]}),
+        ("bootstrap", {"flights": ["a"]}),
+    ],
+)
+def test_a_method_that_nobody_has_is_refused_before_anything_is_computed(of: str, settings: dict[str, Any]) -> None:
+    with pytest.raises(SwashError, match="method is 'predicton-error', expected one of "):
+        CAMPAIGNS[of].parts(settings_of(of, {"vehicle": "coax", "method": "predicton-error", **settings}), Path())
+
+
+def test_a_sweep_over_methods_is_held_against_those_there_are() -> None:
+    each = {"vehicle": "coax", "maneuver": "hover:4s"}
+    over = {"method": ["output-error", "predicton-error"]}
+    with pytest.raises(SwashError, match="method is 'predicton-error', expected one of "):
+        CAMPAIGNS["sweep"].parts(settings_of("sweep", {"campaign": "recovery", "each": each, "over": over}), Path())
+
+
+def test_the_reason_of_most_unusable_fits_is_told() -> None:
+    table: Columns = {"problem": np.array(["", "flat", "it diverged", "flat", ""])}
+    usable = np.array([True, False, False, False, False])
+    assert unusable(table, usable) == [
+        "4 fits may not be used and are in no figure below",
+        "most often (2 of 4): flat",
+    ]
+    assert unusable({}, usable) == ["4 fits may not be used and are in no figure below"], "without the column"
+    assert unusable(table, usable | True) == []

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from swashplate.api.campaigns.fitting import Attempt, LogsCampaign, outcome_columns
+from swashplate.api.campaigns.fitting import Attempt, LogsCampaign, outcome_columns, unusable
 from swashplate.api.campaigns.kind import CampaignFindings, NamedFile, in_batches
 from swashplate.api.campaigns.shares import SURE, share_words
 from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
@@ -40,6 +40,7 @@ class BootstrapKind:
         return settings.logs
 
     def parts(self, settings: BootstrapCampaign, folder: Path) -> tuple[Portion, ...]:
+        settings.check_names()
         if not settings.flights:
             raise CampaignError("expected one log or more.", channel="flights")
         if not settings.piece >= 0.0:
@@ -70,7 +71,7 @@ class BootstrapKind:
         usable, first = table["usable"] == 1, table["number"] == 0
         drawn, every = usable & ~first, len(usable)
         lost, pieces = int(np.sum(~usable)), int(table["pieces"][0])
-        careful = [f"{lost} fits may not be used and are in no figure below"] if lost else []
+        careful = unusable(table, usable)
         summary = (
             ("Usable fits", share_words(every - lost, every), "caution" if lost else "good"),
             ("Pieces", f"{pieces}, as many drawn for each fit", "plain"),

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from swashplate.api.campaigns.fitting import Attempt, LogsCampaign, outcome_columns
+from swashplate.api.campaigns.fitting import Attempt, LogsCampaign, outcome_columns, unusable
 from swashplate.api.campaigns.kind import CampaignFindings, NamedFile
 from swashplate.api.campaigns.shares import share_words
 from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
@@ -47,6 +47,7 @@ class CrossValidationKind:
         return settings.logs
 
     def parts(self, settings: CrossValidationCampaign, folder: Path) -> tuple[Portion, ...]:
+        settings.check_names()
         if len(set(settings.flights)) < max(2, len(settings.flights)):
             raise CampaignError("expected two or more different logs.", channel="flights")
         if not 2 <= _folds(settings) <= len(settings.flights):
@@ -82,7 +83,7 @@ class CrossValidationKind:
             return CampaignFindings((), {})
         usable = table["usable"] == 1
         every, lost = len(usable), int(np.sum(~usable))
-        careful = [f"{lost} fits may not be used and are in no figure below"] if lost else []
+        careful = unusable(table, usable)
         names = [name.removesuffix(".sigma") for name in table if name.endswith(".sigma")]
         folds = [str(name) for name in table.get("left_out", table["number"])]
         told = []

@@ -15,6 +15,7 @@ from swashplate.api.campaigns.fitting import (
     outcome_columns,
     spreads_of,
     started,
+    unusable,
     values_of,
     within_bounds,
 )
@@ -57,6 +58,7 @@ class MultiStartKind:
         return (*settings.logs, *measured)
 
     def parts(self, settings: MultiStartCampaign, folder: Path) -> tuple[Portion, ...]:
+        settings.check_names()
         if bool(settings.flights) == (settings.responses is not None):
             raise CampaignError("expected either flights or responses.", channel="flights")
         if not settings.factor > 1.0 or not settings.same >= 0.0:
@@ -91,7 +93,9 @@ class MultiStartKind:
         every, cost = len(usable), np.asarray(table["cost"], dtype=np.float64)
         groups = optima(np.where(usable, cost, np.inf), same=settings.same)
         if not groups:
-            return CampaignFindings((("Best cost", "no fit may be used", "bad"),), {}, careful=("no fit may be used",))
+            return CampaignFindings(
+                (("Best cost", "no fit may be used", "bad"),), {}, careful=tuple(unusable(table, usable))
+            )
         best, careful = groups[0], []
         if len(best) == 1 and every > 1:
             careful.append("the best optimum was reached by one start only: more starts may find a better one")

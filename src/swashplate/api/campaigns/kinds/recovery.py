@@ -16,6 +16,7 @@ from swashplate.api.campaigns.fitting import (
     FitCampaign,
     outcome_columns,
     started,
+    unusable,
     values_of,
     within_bounds,
 )
@@ -69,6 +70,7 @@ class RecoveryKind:
         return given if settings.controller is None else (*given, NamedFile("controller", settings.controller))
 
     def parts(self, settings: RecoveryCampaign, folder: Path) -> tuple[Portion, ...]:
+        settings.check_names()
         gusts_of(settings.gusts)
         parse_maneuver(settings.maneuver)
         if not 0.0 <= settings.start < 1.0:
@@ -114,8 +116,7 @@ class RecoveryKind:
         if narrow:
             careful.append(f"bounds are too narrow: {', '.join(narrow)}")
         lost = int(np.sum(~usable))
-        if lost:
-            careful.append(f"{lost} fits may not be used and are in no share below")
+        careful += unusable(table, usable)
         summary = (("Usable fits", share_words(len(usable) - lost, len(usable)), "caution" if lost else "good"),)
         head = ("parameter", "truth inside 95 % [%]", "which is", "mean off [sigma]", "scatter [sigma]", "the bounds")
         shown = {f"{name}.off": ("sigma", 1.0) for name in names}

@@ -1,0 +1,104 @@
+"""Files of results: the same values back, the same bytes again, damage told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from made_campaigns import tasks
+from swashplate.api.campaigns import result_files
+from swashplate.api.campaigns.result_files import ENDINGS, NUMPY, PARQUET, packed, unpacked
+from swashplate.api.campaigns.store import CampaignStore
+from swashplate.errors import CampaignError, MissingLibraryError
+
+TABLE = {
+    "number": np.arange(5),
+    "seed": np.array([0, 1, 2**48, 2**63 - 1, 7]),
+    "lost": np.array([True, False, True, False, False]),
+    "place": np.array([0.1, np.nan, -np.inf, -0.0, 5e-324]),
+    "short": np.array([0.1, 2.0, 3.0, np.nan, 1e-40], dtype=np.float32),
+    "verdict": np.array(["good", "", "poor fit", 'Übergang, "so"', "good"]),
+}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_table_comes_back_to_the_bit(ending: str) -> None:
+    content = packed(TABLE, ending=ending)
+    assert packed(dict(TABLE), ending=ending) == content
+    back = unpacked(content, ending=ending)
+    assert list(back) == list(TABLE)
+    for name, values in TABLE.items():
+        assert back[name].dtype.kind == values.dtype.kind
+        assert back[name].flags.writeable
+        if name == "verdict":
+            assert back[name].tolist() == values.tolist()
+        else:
+            assert back[name].dtype == values.dtype
+            assert back[name].tobytes() == values.tobytes()
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_no_rows_are_a_table_too(ending: str) -> None:
+    back = unpacked(packed({name: values[:0] for name, values in TABLE.items()}, ending=ending), ending=ending)
+    assert {name: (len(values), values.dtype.kind) for name, values in back.items()} == {
+        name: (0, values.dtype.kind) for name, values in TABLE.items()
+    }
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_what_is_neither_number_nor_text_is_refused(ending: str) -> None:
+    with pytest.raises(CampaignError, match="odd: is neither numbers nor texts"):
+        packed({"number": np.arange(2), "odd": np.array([None, {}], dtype=object)}, ending=ending)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_changed_number_is_told(ending: str) -> None:
+    content = packed({"a": np.linspace(1.0, 2.0, 200)}, ending=ending)
+    inside = content.index(np.linspace(1.0, 2.0, 200)[100:102].tobytes())
+    with pytest.raises(Exception, match=r"(?i)crc"):
+        unpacked(content[:inside] + b"\x00" + content[inside + 1 :], ending=ending)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_file_that_claims_too_much_is_refused(ending: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    content = packed(TABLE, ending=ending)
+    monkeypatch.setattr(result_files, "LARGEST", 100)
+    with pytest.raises(ValueError, match="claims more than it can hold"):
+        unpacked(content, ending=ending)
+
+
+def test_a_store_reads_what_it_wrote_with_and_without_the_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, (first, second, *_) = CampaignStore(tmp_path), tasks()
+    store.begin("", {}, {})
+    store.keep(first, TABLE)
+    with monkeypatch.context() as without:
+        without.setattr("swashplate.api.campaigns.store.usual_ending", lambda: NUMPY)
+        store.keep(first, TABLE)  # it is there
+        store.keep(second, TABLE)
+    endings = {path.stem: path.suffix for path in (tmp_path / "results").iterdir()}
+    assert endings == {first.name: PARQUET, second.name: NUMPY}
+    assert store.done() == set(endings)
+    one, other = store.columns(first.name), store.columns(second.name)
+    assert all(one[name].tolist() == other[name].tolist() for name in ("number", "seed", "verdict"))
+
+    def absent(module: str, **_: object) -> None:
+        raise MissingLibraryError(f"{module} is not installed here.")
+
+    monkeypatch.setattr(result_files, "library", absent)
+    with pytest.raises(MissingLibraryError):
+        store.columns(first.name)
+
+
+def test_the_folder_of_results_is_one_table_for_others(tmp_path: Path) -> None:
+    store = CampaignStore(tmp_path)
+    store.begin("", {}, {})
+    for k, task in enumerate(tasks()[:3]):
+        store.keep(task, {"number": np.arange(2) + 2 * k, "verdict": np.array(["good", "lost"])})
+    table = pd.read_parquet(tmp_path / "results").sort_values("number")
+    assert table["number"].tolist() == [0, 1, 2, 3, 4, 5]
+    assert table["verdict"].tolist() == ["good", "lost"] * 3
