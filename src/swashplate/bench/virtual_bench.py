@@ -29,7 +29,7 @@ from swashplate.physics.ground_effect import thrust_gain
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, enable_compilation_cache
+from swashplate.simulation.compilation import QUICK_FLIGHT, enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision, jax_backend
 from swashplate.simulation.runge_kutta import rk4_step
 
@@ -180,7 +180,7 @@ def _flat(force: Vector, moment: Vector) -> Any:
     return jnp.stack([*force, *moment])
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_FLIGHT)
 def _run(plan: _Held, start: Any, driving: Any, parameters: Any) -> tuple[Any, Any]:
     """States (records, n, 6) and loads (records, n, 6) for driving rows (records, n, 11).
 

@@ -19,7 +19,7 @@ from swashplate.flights.maneuvers.series import parse as parse_maneuver
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened, shared_length
+from swashplate.simulation.compilation import QUICK_FLIGHT, lengthened, shared_length
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -277,7 +277,7 @@ def _arrived(sent: Float[jax.Array, "commands inputs"], late: Int[jax.Array, " i
     return jnp.take_along_axis(sent, late[None, :], axis=0)[0]
 
 
-_fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_TO_COMPILE)
+_fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_FLIGHT)
 
 
 def told(

@@ -20,7 +20,7 @@ from swashplate.physics.environment import Environment
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.batch import Batch
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened, shared_length
+from swashplate.simulation.compilation import QUICK_FLIGHT, lengthened, shared_length
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -298,4 +298,4 @@ def _flying_many(
     return record  # type: ignore[no-any-return]
 
 
-_fly_many = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5, 6, 7), compiler_options=QUICK_TO_COMPILE)
+_fly_many = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5, 6, 7), compiler_options=QUICK_FLIGHT)

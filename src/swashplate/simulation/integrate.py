@@ -18,7 +18,7 @@ from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.earth import Earth
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened, shared_length
+from swashplate.simulation.compilation import QUICK_FLIGHT, lengthened, shared_length
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -140,7 +140,7 @@ def simulate(
     return observe(flight, vehicle, sensors=sensors, seed=seed)
 
 
-@partial(jax.jit, static_argnums=0, static_argnames="held", compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, static_argnames="held", compiler_options=QUICK_FLIGHT)
 def trajectory(
     equations: Equations,
     x0: Float[jax.Array, " states"],

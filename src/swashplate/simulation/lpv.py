@@ -34,7 +34,7 @@ from swashplate.models.linear.stitching import stitch_points
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import QUICK_FLIGHT
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -181,7 +181,7 @@ def _linear_step(
     return total
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_FLIGHT)
 def _printed(
     equations: Equations,
     trimmed: tuple[Float[jax.Array, " states"], Float[jax.Array, " inputs"]],

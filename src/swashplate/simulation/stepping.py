@@ -27,7 +27,7 @@ from swashplate.physics.backend import Backend, FloatBackend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector, body_to_local
 from swashplate.physics.rigid_body import RigidBody, gravity
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import QUICK_FLIGHT
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -186,7 +186,7 @@ def at_standstill(states: Array | Sequence[float], g: float) -> Motion:
 
 @lru_cache(maxsize=16)
 def _compiled(equations: Equations) -> Any:
-    return jax.jit(partial(_advance, equations), donate_argnums=0, compiler_options=QUICK_TO_COMPILE)
+    return jax.jit(partial(_advance, equations), donate_argnums=0, compiler_options=QUICK_FLIGHT)
 
 
 def _advance(

@@ -35,7 +35,7 @@ from swashplate.identification.core.records import uniform_table
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import QUICK_FLIGHT
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.runge_kutta import rk4_steps
 
@@ -168,7 +168,7 @@ def _measured_body(pose: Array, rates: Array, dt: float) -> Array:
     return np.column_stack([pose[:, :3], velocity, pose[:, 3:], rates])
 
 
-@partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_FLIGHT)
 def _along(
     plan: ObserverPlan,
     steps: int,

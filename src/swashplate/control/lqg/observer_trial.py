@@ -21,7 +21,7 @@ from swashplate.control.lqg.constant_gain import steady_sigmas
 from swashplate.control.lqg.controller import Lqg, SensedStep
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import REFERENCES, told
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import QUICK_FLIGHT
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -157,7 +157,7 @@ def trial(
     return ObserverTrial(made, place, height, truth, estimates, sigmas)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
 def _fly(
     equations: Equations,
     control: SensedStep,

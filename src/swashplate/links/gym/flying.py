@@ -21,7 +21,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, enable_compilation_cache
+from swashplate.simulation.compilation import QUICK_FLIGHT, enable_compilation_cache
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -272,7 +272,7 @@ def _observed(x: Any, target: Any, angles: Any) -> Any:
     return jax.vmap(lambda x, target: _clipped(_errors(x, target, angles)))(x, target)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
 def _advance(
     equations: Equations, substeps: int, free: tuple[int, ...], x: Any, actions: Any, p: Any, target: Any, rest: Any
 ) -> Any:

@@ -25,7 +25,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import Controller, Step
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import QUICK_FLIGHT
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -54,7 +54,7 @@ _HELD_WITHIN = 3.0
 """Roll or pitch at which the flight of a linear model ends: its angles are small ones."""
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
 def advance(
     equations: Equations,
     law: Step,
