@@ -7,6 +7,7 @@ import zipfile
 from importlib.util import find_spec
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.api.campaigns.tasks import Columns
 from swashplate.errors import CampaignError
@@ -28,18 +29,23 @@ def packed(columns: Columns, *, ending: str) -> bytes:
     """The file of a table.
 
     The same bytes for the same table and version of the library. In Parquet no value is compressed or replaced by an
-    index into a dictionary, and every page has a checksum.
+    index into a dictionary, and every page has a checksum. What is no character in a text (a byte of a log's name) is
+    written as its number, `\\udcff`.
 
     Args:
         columns: numbers or texts, all of the same length.
         ending: one of `ENDINGS`.
 
     Raises:
-        CampaignError: columns that are neither numbers nor texts.
+        CampaignError: columns that are neither numbers nor texts, or not of one length.
         MissingLibraryError: for Parquet without the extra `scale`.
     """
     if others := [column for column, values in columns.items() if values.dtype.kind not in "biufU"]:
         raise CampaignError("is neither numbers nor texts.", channel=", ".join(others))
+    if len({values.shape for values in columns.values()}) > 1 or any(values.ndim != 1 for values in columns.values()):
+        shapes = ", ".join(f"{column} {values.shape}" for column, values in columns.items())
+        raise CampaignError(f"columns of one length are expected, found {shapes}.")
+    columns = {name: _characters(values) if values.dtype.kind == "U" else values for name, values in columns.items()}
     stream = io.BytesIO()
     if ending == NUMPY:
         np.savez(stream, **columns)  # type: ignore[arg-type]
@@ -72,6 +78,10 @@ def unpacked(content: bytes, *, ending: str) -> Columns:
         column = values.to_numpy()
         columns[name] = np.asarray(column, dtype=np.str_) if column.dtype == np.object_ else np.array(column)
     return columns
+
+
+def _characters(texts: NDArray[np.str_]) -> NDArray[np.str_]:
+    return np.array([text.encode("utf-8", "backslashreplace").decode() for text in texts.tolist()], dtype=np.str_)
 
 
 def _check(size: int) -> None:

@@ -55,6 +55,20 @@ def test_what_is_neither_number_nor_text_is_refused(ending: str) -> None:
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("odd", [np.arange(3), np.zeros((2, 2)), np.array(1.0)])
+def test_columns_that_are_no_table_are_refused(ending: str, odd: np.ndarray) -> None:
+    with pytest.raises(CampaignError, match=r"columns of one length are expected, found number \(2,\), odd \("):
+        packed({"number": np.arange(2), "odd": odd}, ending=ending)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_name_of_a_log_need_not_be_text(ending: str) -> None:
+    name = b"flight \xff.bin".decode("utf-8", "surrogateescape")
+    back = unpacked(packed({"log": np.array([name, "b.bin"])}, ending=ending), ending=ending)
+    assert back["log"].tolist() == ["flight \\udcff.bin", "b.bin"]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_a_changed_number_is_told(ending: str) -> None:
     content = packed({"a": np.linspace(1.0, 2.0, 200)}, ending=ending)
     inside = content.index(np.linspace(1.0, 2.0, 200)[100:102].tobytes())
