@@ -156,8 +156,9 @@ def carry_out(
             standing.failed += 1
             tell(standing)
             if standing.done == 0 and standing.failed >= min(TRIES, standing.total):
+                why = outcome.error.removesuffix(".")
                 raise CampaignError(
-                    f"none of its tasks can be done; the first of {standing.failed}: {outcome.error}",
+                    f"none of its tasks can be done; the first of {standing.failed}: {why}.",
                     where=store.folder,
                     hint="Mend the campaign's file, and run it into another folder.",
                 )
