@@ -73,9 +73,11 @@ class DaskEngine:
         except (OSError, TimeoutError, RuntimeError) as error:
             self.close()
             raise CampaignError(
-                f"no worker answers: {in_words(error)}.",
+                f"no worker answers: {in_words(error).removesuffix('.')}.",
                 where=scheduler or "the cluster of this machine",
-                hint="Start it with `dask scheduler`, workers with `dask worker ADDRESS --nthreads 1`.",
+                hint="Start it with `dask scheduler`, workers with `dask worker ADDRESS --nthreads 1`."
+                if scheduler
+                else "What is done is kept: run the same command again, or with --engine processes.",
             ) from None
         if scheduler is not None:
             self._check_workers()

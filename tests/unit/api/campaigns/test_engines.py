@@ -222,6 +222,20 @@ def test_nobody_at_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
         DaskEngine(made_campaigns.numbers, workers=1, scheduler="nonsense://x")
 
 
+def test_workers_here_that_do_not_start_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    starts = []
+
+    def failing(**_: object) -> None:
+        starts.append(1)
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr("distributed.LocalCluster", failing)
+    said = r"this machine: no worker answers: RuntimeError: Nanny failed to start\. What is done is kept: run the same"
+    with pytest.raises(CampaignError, match=said):
+        DaskEngine(made_campaigns.numbers, workers=1)
+    assert len(starts) == 3
+
+
 def test_time_left_is_counted_from_the_second_task_of_each_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter([100.0, 110.0, 112.0, 114.0])
     monkeypatch.setattr(time, "monotonic", lambda: next(clock))
