@@ -89,7 +89,7 @@ class Visit:
         self.page.on("pageerror", lambda error: self.said.append(f"error: {error}"))
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.url = url
-        self.page.goto(url)
+        self.page.goto(url, timeout=_WAIT)
 
     def flies(self) -> Visit:
         self.until("window.swash?.now?.t > 0 && Number(document.documentElement.dataset.drawn) > 3")

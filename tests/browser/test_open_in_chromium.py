@@ -69,7 +69,7 @@ class Visit:
         self.page.on("pageerror", lambda error: self.said.append(f"error: {error}"))
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.url, self.width = url, width
-        self.page.goto(url)
+        self.page.goto(url, timeout=1000.0 * _WAIT)
         self.until("document.documentElement.dataset.ready")
         if clear and self.of("swash.state.logs.size"):  # an earlier test failed half way
             self.of("Promise.all([...swash.state.logs.keys()].map(log => swash.post('/close', {log})))")

@@ -25,8 +25,8 @@ QUICK_FLIGHT = {
     **QUICK_TO_COMPILE,
     "xla_disable_hlo_passes": "simplify-while-loops,while-loop-invariant-code-motion,while-loop-constant-sinking",
 }
-"""Of flights: passes are left out that look for what may leave a loop, and find nothing in the equations of a vehicle.
-A tenth to two fifths less compiling than `QUICK_TO_COMPILE`, and steps as fast."""
+"""Of flights: passes are left out that look for what may leave a loop. A tenth to two fifths less compiling than
+`QUICK_TO_COMPILE`, and steps as fast."""
 
 FEW_PASSES = {**QUICK_TO_COMPILE, "xla_backend_optimization_level": 1}
 """Options for `jax.jit` of runs and slopes along records: a seventh to a third less compiling than

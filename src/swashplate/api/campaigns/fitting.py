@@ -21,7 +21,6 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.result import Result, bounds_of
-from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -42,14 +41,6 @@ class FitCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, fr
     outputs: list[str] | None = None
     ties: list[str] = msgspec.field(default_factory=list)
     wind: bool = False
-
-    def check_names(self) -> None:
-        """That what the file names is known, as far as no model is needed for it.
-
-        Raises:
-            IdentificationError: for a method that nobody has.
-        """
-        check_method(self.method)
 
     def free_of(self, model: Vehicle) -> tuple[str, ...]:
         """Names of the numbers of a model that a fit moves.

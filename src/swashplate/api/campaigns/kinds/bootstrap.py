@@ -18,6 +18,7 @@ from swashplate.arrays import Array
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
+from swashplate.identification.estimators import check_method
 
 
 class BootstrapCampaign(LogsCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
@@ -40,7 +41,7 @@ class BootstrapKind:
         return settings.logs
 
     def parts(self, settings: BootstrapCampaign, folder: Path) -> tuple[Portion, ...]:
-        settings.check_names()
+        check_method(settings.method)
         if not settings.flights:
             raise CampaignError("expected one log or more.", channel="flights")
         if not settings.piece >= 0.0:

@@ -16,6 +16,7 @@ from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
 from swashplate.errors import CampaignError
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.spans import CALIBRATION, HORIZONS
+from swashplate.identification.estimators import check_method
 from swashplate.validation.validation import Validation
 from swashplate.validation.verb import validate
 
@@ -47,7 +48,7 @@ class CrossValidationKind:
         return settings.logs
 
     def parts(self, settings: CrossValidationCampaign, folder: Path) -> tuple[Portion, ...]:
-        settings.check_names()
+        check_method(settings.method)
         if len(set(settings.flights)) < max(2, len(settings.flights)):
             raise CampaignError("expected two or more different logs.", channel="flights")
         if not 2 <= _folds(settings) <= len(settings.flights):

@@ -26,6 +26,7 @@ from swashplate.arrays import Array
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
+from swashplate.identification.estimators import check_method
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.vehicle import Vehicle
 
@@ -58,7 +59,7 @@ class MultiStartKind:
         return (*settings.logs, *measured)
 
     def parts(self, settings: MultiStartCampaign, folder: Path) -> tuple[Portion, ...]:
-        settings.check_names()
+        check_method(settings.method)
         if bool(settings.flights) == (settings.responses is not None):
             raise CampaignError("expected either flights or responses.", channel="flights")
         if not settings.factor > 1.0 or not settings.same >= 0.0:

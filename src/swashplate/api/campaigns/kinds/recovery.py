@@ -29,6 +29,7 @@ from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
 from swashplate.identification.core.result import Result
+from swashplate.identification.estimators import check_method
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import simulate_maneuver
 from swashplate.simulation.sensors import QUIET, Sensors, observe
@@ -70,7 +71,7 @@ class RecoveryKind:
         return given if settings.controller is None else (*given, NamedFile("controller", settings.controller))
 
     def parts(self, settings: RecoveryCampaign, folder: Path) -> tuple[Portion, ...]:
-        settings.check_names()
+        check_method(settings.method)
         gusts_of(settings.gusts)
         parse_maneuver(settings.maneuver)
         if not 0.0 <= settings.start < 1.0:
