@@ -157,7 +157,10 @@ def unusable(table: Columns, usable: NDArray[np.bool_]) -> list[str]:
         return []
     told = f"{lost} fits may not be used and are in no figure below"
     reasons = Counter(filter(None, map(str, table["problem"][~usable]))) if "problem" in table else Counter()
-    return [told, *(f"most often ({count} of {lost}): {reason}" for reason, count in reasons.most_common(1))]
+    return [
+        told,
+        *(f"their most frequent problem ({count} of {lost}): {reason}" for reason, count in reasons.most_common(1)),
+    ]
 
 
 def _identified(model: Vehicle) -> Vehicle | StateSpaceModel:

@@ -215,7 +215,7 @@ def test_the_reason_of_most_unusable_fits_is_told() -> None:
     usable = np.array([True, False, False, False, False])
     assert unusable(table, usable) == [
         "4 fits may not be used and are in no figure below",
-        "most often (2 of 4): flat",
+        "their most frequent problem (2 of 4): flat",
     ]
     assert unusable({}, usable) == ["4 fits may not be used and are in no figure below"], "without the column"
     assert unusable(table, usable | True) == []
