@@ -63,8 +63,9 @@ def _bounded_toml(text: str) -> None:
                 raise _RefusedError(f"has a dotted key of more than {DEEPEST} parts.")
             continue
         dots = 0
-        if kind == "open_text":  # never closed: the parser says so, and reads no further
-            return
+        if kind == "open_text":  # a parser reads on to the end of the file, slowly, and says less
+            line = text.count("\n", 0, token.start()) + 1
+            raise _RefusedError(f"is not TOML: the text that opens with {token[0]} in line {line:,} never closes.")
         if kind == "open":
             depth, entries = depth + 1, entries + 1
             if depth > DEEPEST:

@@ -14,6 +14,7 @@ import pytest
 from heli_autopilot import servo_packet
 from link_bench import QUICK, Bench, bench
 from swashplate.errors import LinkError
+from swashplate.links.ardupilot import frames
 from swashplate.links.ardupilot.runner import serve
 from swashplate.links.sockets import is_loopback, listen_tcp, listen_udp
 
@@ -89,7 +90,8 @@ def test_lockstep_with_losses_and_duplicates(coax: Bench) -> None:
             client.socket.recv(100)  # nothing more than one answer a question was sent
 
 
-def test_restarts_of_either_side(coax: Bench) -> None:
+def test_restarts_of_either_side(coax: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(frames, "SILENT", 60.0)  # only asking again and again is left
     with served(forgotten(coax)) as port, Client(port) as client:
         for count in range(50):
             client.ask(servo_packet(400, count, IDLE))
@@ -99,11 +101,11 @@ def test_restarts_of_either_side(coax: Bench) -> None:
         with Client(port) as other:  # the autopilot anew, from another port: it repeats itself until it is answered
             other.socket.settimeout(0.3)
             begun, told = time.monotonic(), None
-            while told is None and time.monotonic() - begun < 10.0:
+            while told is None and time.monotonic() - begun < 30.0:
                 with suppress(TimeoutError):
                     told = other.ask(servo_packet(400, 0, IDLE))
-            assert 1.5 <= time.monotonic() - begun < 2.9, "asked for again and again: sooner than after SILENT"
             assert told is not None
+            assert time.monotonic() - begun >= 1.5
             assert told["timestamp"] == pytest.approx(1 / 400)
             assert other.ask(servo_packet(400, 1, IDLE))["timestamp"] == pytest.approx(2 / 400)
 
