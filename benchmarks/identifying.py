@@ -255,9 +255,9 @@ def reports(logged: sp.Flight) -> list[Span]:
 
 
 def measure(*, short: bool) -> list[Span]:
-    """The short form fits a short flight by output error alone."""
+    """The short form fits a short flight by prediction error alone."""
     if short:
-        return [warm("output-error", flight(4.0), iterations=1)]
+        return [warm("prediction-error", flight(4.0), iterations=1)]
     logged = flight()
     return [
         *first_answers(logged),

@@ -47,7 +47,7 @@ def measure(*, short: bool) -> list[Result]:
         single.numpy_loop(steps=20 * scale, repeats=repeats),
         single.c_loop(steps=20_000 * scale, repeats=repeats),
         export.step("coax", steps=20_000 * scale, repeats=repeats),
-        export.step("raptor50", steps=4_000 * scale, repeats=repeats, bar=True, inflow="pitt-peters"),
+        *([] if short else [export.step("raptor50", steps=100_000, repeats=repeats, bar=True, inflow="pitt-peters")]),
         export.environments(steps=20 * scale, repeats=repeats),
         *many.batches("coax", "float64", steps=10 * scale, repeats=repeats),
         *([] if short else many.batches("coax", "float32", steps=10 * scale, repeats=repeats)),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,9 +21,9 @@ gc.set_threshold(200_000, 50, 1000)
 # The runner builds the whole command line anew at every call, a quarter of a second each; it does not change.
 typer.testing._get_command = lru_cache(typer.main.get_command)  # type: ignore[attr-defined]
 
-_MEMORY = 2.5e9
-"""Bytes of a test process above which compiled programs are given back: several such processes share a machine."""
 _PAGE = os.sysconf("SC_PAGE_SIZE")
+_MEMORY = max(2.5e9, os.sysconf("SC_PHYS_PAGES") * _PAGE / 6)
+"""Bytes of a test process above which compiled programs are given back: several such processes share a machine."""
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -30,6 +32,8 @@ def _bounded_memory() -> Iterator[None]:
     if "jax" in sys.modules and int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE > _MEMORY:
         sys.modules["jax"].clear_caches()
         gc.collect()
+        with suppress(OSError, AttributeError):  # another C library
+            ctypes.CDLL(None).malloc_trim(0)  # otherwise the process stays as large, and every module clears anew
 
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -182,7 +182,7 @@ def test_closed_streams_are_no_bug_and_no_file_takes_their_place(tmp_path: Path)
     assert (ended.returncode, (tmp_path / "said").read_text()) == (0, "")
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.proof)])
 def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path, number: signal.Signals) -> None:
     code = (
         "import signal, time\nfrom swashplate.cli import identify\nfrom swashplate.cli.app import main\n"

@@ -15,7 +15,7 @@ from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 
-few = settings(max_examples=80, deadline=None, derandomize=True)
+few = settings(max_examples=40, deadline=None, derandomize=True)
 _RAMP = np.arange(60)
 WHOLE = made.rotorflight({"gyroADC[0]": _RAMP, "mixer[0]": -3 * _RAMP}, between={20: made.event(30, 1, 0)})
 HEADER = WHOLE[: WHOLE.index(b"H gyro_lpf1_static_hz:100\n") + 26]

@@ -74,7 +74,7 @@ def july(flight_july: Path) -> Along:
     return observed(flight_july, servo=0.07, motor=0.09, lever=(0.005, 0.165, 0.009), heading=-0.076)
 
 
-@pytest.mark.parametrize("name", ["august", "july"])
+@pytest.mark.parametrize("name", ["august", pytest.param("july", marks=pytest.mark.proof)])
 def test_rates_are_predicted_better_than_by_the_raw_model(name: str, request: pytest.FixtureRequest) -> None:
     """A tenth of a second ahead; roll and pitch rate also far better than calling them zero."""
     found: Along = request.getfixturevalue(name)

@@ -227,7 +227,8 @@ def test_an_ekf_that_is_never_ready(faults: str, ekf: float, words: str, tmp_pat
 def test_what_happens_in_the_air_is_a_line(
     faults: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(trial, "_STALLED", 2.0)
+    if "frozen" in faults:  # the others may be slow on a busy machine
+        monkeypatch.setattr(trial, "_STALLED", 2.0)
     found = accept(tmp_path / "t", faults=faults)
     assert not found.passed
     assert any(words in text for text in found.problems), found.problems

@@ -24,7 +24,9 @@ from swashplate.simulation.stepping import Stepping, motion_row
 
 
 @pytest.mark.parametrize(
-    ("name", "options"), [("raptor50", {"rotor_speed": "throttle"}), ("coax", {})], ids=["raptor50", "coax"]
+    ("name", "options"),
+    [pytest.param("raptor50", {"rotor_speed": "throttle"}, marks=pytest.mark.proof), ("coax", {})],
+    ids=["raptor50", "coax"],
 )
 def test_steps_are_those_of_the_simulation(name: str, options: dict[str, object]) -> None:
     flown = vehicle(name, **options)

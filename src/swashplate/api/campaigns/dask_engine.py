@@ -86,14 +86,18 @@ class DaskEngine:
     @property
     def workers(self) -> int:
         if time.monotonic() - self._counted > _COUNTED:  # asked of the scheduler: not for every task
-            self._counted, self._count = time.monotonic(), max(1, len(self._known()))
+            self._counted = time.monotonic()
+            with suppress(Exception):  # between two connections it knows nothing: as many as before
+                self._count = len(self._client.scheduler_info(n_workers=-1)["workers"])
         return self._count
 
     @property
     def words(self) -> str:
         place = f"of the scheduler {self._address}" if self._address else "of Dask on this machine"
         told = f" ({len(self.turned_away)} came and went)" if self.turned_away else ""
-        return f"{self.workers} workers {place}{told}"
+        if not self.workers:
+            return f"no worker {place}{told}, it waits for one"
+        return f"{self.workers} worker{'s' if self.workers > 1 else ''} {place}{told}"
 
     @property
     def processes(self) -> list[int]:

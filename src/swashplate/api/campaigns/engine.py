@@ -44,7 +44,7 @@ class TaskEngine(Protocol):
 
     @property
     def workers(self) -> int:
-        """How many there are now, at least one."""
+        """How many there are now; none where all have gone and it waits for others."""
         ...
 
     @property
@@ -72,7 +72,7 @@ class TaskEngine(Protocol):
 
 @dataclass
 class CampaignStanding:
-    """How far a campaign is, told after every task.
+    """How far a campaign is, told after every task and when workers come and go.
 
     Attributes:
         total, done, failed: tasks of the campaign; done and failed ones of earlier runs too.
@@ -120,7 +120,7 @@ def carry_out(
         engine: who does them.
         store: where results go; held by the caller.
         standing: counted up.
-        tell: told of it after every task.
+        tell: told of it after every task, and when workers come and go.
 
     Raises:
         CampaignError: where nothing can succeed, or the engine is gone; what is done is in the store.
@@ -130,14 +130,16 @@ def carry_out(
     said: dict[str, list[str]] = {}
     flying = 0
     while waiting or flying:
-        standing.workers = engine.workers
-        while waiting and flying < 2 * engine.workers:
+        if engine.workers != standing.workers:
+            standing.workers = engine.workers
+            tell(standing)
+        while waiting and flying < 2 * max(engine.workers, 1):
             engine.submit(waiting.popleft())
             flying += 1
         for outcome in engine.outcomes(1.0):
             task = outcome.task
             flying -= 1
-            if waiting and flying < 2 * engine.workers:  # before the disk is waited for
+            if waiting and flying < 2 * max(engine.workers, 1):  # before the disk is waited for
                 engine.submit(waiting.popleft())
                 flying += 1
             if outcome.columns is not None:

@@ -170,6 +170,7 @@ def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int]
         return
     say("starting the workers")
     engine = make(worker.work, len(left))
+    standing.workers = engine.workers
     try:
         tell = partial(_told, say, made, engine)
         tell(standing)
@@ -182,7 +183,7 @@ def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int]
 
 
 def _told(say: Say, made: CampaignPlan, engine: TaskEngine, standing: CampaignStanding) -> None:
-    left = "" if standing.seconds_left is None else f", {duration(standing.seconds_left)} left"
+    left = "" if standing.seconds_left is None or not standing.workers else f", {duration(standing.seconds_left)} left"
     failed = f", {standing.failed} failed" if standing.failed else ""
     say(
         f"{made.of} on {engine.words}",

@@ -81,7 +81,13 @@ def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
         engine._heard((at, {"action": action, "worker": address, "expected": False}))
     assert list(engine.turned_away) == ["a"], "one that worked for a minute, and one that was there before, are none"
     assert engine.turned_away["a"].startswith("went 1.5 s after it had joined; swashplate may be missing there")
-    assert engine.words.endswith("(1 came and went)")
+    assert engine.words == "1 worker of Dask on this machine (1 came and went)"
+    with monkeypatch.context() as scheduler:
+        scheduler.setattr(engine._client, "scheduler_info", lambda n_workers: {"workers": {}})
+        scheduler.setattr(engine, "_counted", float("-inf"))
+        assert engine.workers == 0
+        assert engine.words == "no worker of Dask on this machine (1 came and went), it waits for one"
+    engine._counted = float("-inf")
     store.turn_away(engine.turned_away)
     assert store.turned_away() == engine.turned_away
     other = tuple(replace(task, program=dict(task.program) | {"numpy": "1.0"}) for task in made_campaigns.tasks(2))
@@ -89,6 +95,22 @@ def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
     with pytest.raises(CampaignError, match=r"another program: numpy is \S+, expected 1\.0"):
         done(other, engine, tmp_path / "other")
     assert CampaignStore(tmp_path / "other").failed() == {}, "a worker of another program is no try of the task"
+
+
+def test_it_is_told_when_workers_come_and_go(tmp_path: Path) -> None:
+    class Coming(made_campaigns.InProcess):
+        workers = property(lambda self: (2, 0, 1)[min(len(self.did), 2)])  # type: ignore[assignment]
+
+    store, told = CampaignStore(tmp_path), []
+    store.begin("", {}, {})
+    every = made_campaigns.tasks()
+    standing = CampaignStanding(total=len(every), done=0, failed=0, workers=2)
+    with store.held():
+        carry_out(
+            every, Coming(made_campaigns.numbers), store, standing=standing, tell=lambda s: told.append(s.workers)
+        )
+    assert told == [2, 0, 0, 1, 1, 1, 1, 1], "six tasks, and two changes"
+    assert standing.done == len(every)
 
 
 def test_a_campaign_whose_first_tasks_all_fail_is_ended(tmp_path: Path) -> None:

@@ -109,6 +109,7 @@ def test_a_linear_vehicle_is_fitted_ahead_as_the_linear_model() -> None:
     assert other["Lb"].value != once["Lb"].value
 
 
+@pytest.mark.proof
 def test_bounds_of_errors_ahead_cover_the_truth_in_some_seeds() -> None:
     """Overlapping predictions are no independent ones: the corrected bound knows, the plain one does not."""
     apart, plainly = [], []

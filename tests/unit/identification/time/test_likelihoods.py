@@ -83,6 +83,7 @@ def test_the_gradient_is_the_slope_of_the_cost(likelihood: OutputError | Predict
         assert gradient[place] == pytest.approx(slope, rel=1e-3, abs=1e-3 * size[place]), likelihood.row.names[place]
 
 
+@pytest.mark.proof
 def test_derivatives_along_tangent_planes_are_those_of_the_filter() -> None:
     """The two passes against derivatives that are carried through the equations sample by sample."""
     likelihood = _prediction_error()
