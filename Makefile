@@ -6,6 +6,10 @@ BIN := .venv/bin
 STAMP := .venv/.complete
 # One more than the two cores that are usual: while a test waits, another one runs.
 WORKERS ?= 3
+# Little compiling, and threads that do not fight for cores; compiled programs are shared.
+QUICK := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
+	XLA_FLAGS="$$XLA_FLAGS --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1" \
+	JAX_COMPILATION_CACHE_DIR="$(CURDIR)/build/jax" JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3
 # Three test processes and many started programs would each compile every module anew.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -51,13 +55,10 @@ layers: $(STAMP)
 	$(BIN)/lint-imports
 
 unit: $(STAMP)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
-	XLA_FLAGS="$$XLA_FLAGS --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1" \
-	JAX_COMPILATION_CACHE_DIR="$(CURDIR)/build/jax" JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3 \
-	$(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+	$(QUICK) $(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 speed: $(STAMP)
-	$(BIN)/python -m benchmarks.run --short
+	$(QUICK) $(BIN)/python -m benchmarks.run --short
 
 proof: $(STAMP)
 	$(BIN)/python scripts/proof.py
