@@ -176,6 +176,8 @@ class DaskEngine:
             self._check_scheduler(seconds)
             return
         self._lost_for = 0.0
+        if not self._count:  # somebody did it: counted anew
+            self._counted = float("-inf")
         task = self._tasks.pop(future)
         if future.status == "finished":
             columns, error, fatal = future.result()

@@ -208,6 +208,36 @@ def test_a_scheduler_by_its_address_and_then_it_is_gone(tmp_path: Path, monkeypa
 
 
 @pytest.mark.proof
+def test_a_campaign_whose_workers_have_all_gone_waits_and_says_so(tmp_path: Path) -> None:
+    every, store, told = made_campaigns.tasks(), CampaignStore(tmp_path / "dask"), []
+    came: list[subprocess.Popen[bytes]] = []
+    store.begin("", {}, {})
+    with cluster() as (address, _, worker):
+        words = [sys.executable, "-m", "dask", "worker", address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
+        here = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+        engine = DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+        standing = CampaignStanding(total=len(every), done=0, failed=0, workers=engine.workers)
+        worker.kill()
+
+        def tell(standing: CampaignStanding) -> None:
+            told.append((standing.workers, engine.words))
+            if not standing.workers and not came:
+                came.append(subprocess.Popen(words, env=here, stderr=subprocess.DEVNULL))
+
+        try:
+            with store.held():
+                carry_out(every, engine, store, standing=standing, tell=tell)
+        finally:
+            engine.close()
+            for process in came:
+                process.kill()
+                process.wait()
+    assert told[0] == (0, f"no worker of the scheduler {address}, it waits for one")
+    assert told[-1][0] == 1
+    assert bits(store) == expected(every, tmp_path / "here")
+
+
+@pytest.mark.proof
 def test_a_worker_that_joins_late_without_the_package_costs_nothing_but_time(tmp_path: Path) -> None:
     (tmp_path / "swashplate.py").write_text("raise ModuleNotFoundError(\"No module named 'swashplate'\")")
     every = made_campaigns.tasks(150, batch=1, wait=0.1)
