@@ -33,10 +33,9 @@ DEEPEST = 24
 
 _NAMES = {"toml": "TOML", "json": "JSON"}
 _TOKEN = re.compile(
-    r'''(?P<text>"""(?:[^"\\]|\\.|"(?!""))*+"{3,5}|\'\'\'(?:[^']|'(?!''))*+'{3,5})
-    |(?P<open_text>"""|\'\'\')
-    |(?P<key>"(?:[^"\\\n]|\\[^\n])*+"|'[^'\n]*+'|[A-Za-z0-9_+:-]++|[ \t]++)
-    |(?P<comment>\#[^\n]*+)
+    r'''(?P<quote>"""|\'\'\'|"|')
+    |(?P<key>[A-Za-z0-9_+:-]+|[ \t]+)
+    |(?P<comment>\#[^\n]*)
     |(?P<dot>\.)
     |(?P<open>[\[{])
     |(?P<close>[\]}])
@@ -44,6 +43,13 @@ _TOKEN = re.compile(
     |(?P<other>.)''',
     re.DOTALL | re.VERBOSE,
 )
+_CLOSING = {
+    '"""': re.compile(r'\\.|"{3,5}', re.DOTALL),
+    "'''": re.compile(r"'{3,5}"),
+    '"': re.compile(r'\\[^\n]|["\n]'),
+    "'": re.compile(r"['\n]"),
+}
+"""What ends a text that opens so; escapes are passed over, and a line's end ends no text."""
 
 
 class _RefusedError(ValueError):
@@ -52,10 +58,12 @@ class _RefusedError(ValueError):
 
 def _bounded_toml(text: str) -> None:
     """Refuses what `tomllib` takes minutes or gigabytes for: its cost grows with the square of a dotted key's parts."""
-    depth = dots = entries = 0
-    for token in _TOKEN.finditer(text):
-        kind = token.lastgroup
-        if kind == "key":
+    depth = dots = entries = place = 0
+    while token := _TOKEN.match(text, place):
+        kind, place = token.lastgroup, token.end()
+        if kind == "quote":
+            place = _closed(text, token)
+        if kind in ("quote", "key"):
             continue
         if kind == "dot":
             dots += 1
@@ -63,9 +71,6 @@ def _bounded_toml(text: str) -> None:
                 raise _RefusedError(f"has a dotted key of more than {DEEPEST} parts.")
             continue
         dots = 0
-        if kind == "open_text":  # a parser reads on to the end of the file, slowly, and says less
-            line = text.count("\n", 0, token.start()) + 1
-            raise _RefusedError(f"is not TOML: the text that opens with {token[0]} in line {line:,} never closes.")
         if kind == "open":
             depth, entries = depth + 1, entries + 1
             if depth > DEEPEST:
@@ -75,6 +80,16 @@ def _bounded_toml(text: str) -> None:
         elif kind == "part":
             entries += 1
     _bounded_count(entries, "toml")
+
+
+def _closed(text: str, opening: re.Match[str]) -> int:
+    """Where the text that opens here has ended. A parser reads an open one to the file's end, slowly, and says less."""
+    marks = (mark for mark in _CLOSING[opening[0]].finditer(text, opening.end()) if mark[0][0] != "\\")
+    mark = next(marks, None)
+    if mark is None or mark[0] == "\n":
+        line = text.count("\n", 0, opening.start()) + 1
+        raise _RefusedError(f"is not TOML: the text that opens with {opening[0]} in line {line:,} never closes.")
+    return mark.end()
 
 
 def _bounded_json(text: str) -> None:

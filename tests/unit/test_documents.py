@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import random
 import tomllib
 import tracemalloc
+from collections import Counter
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -45,6 +47,8 @@ BOMBS = {
     "size": ("toml", "#" * (5 << 20), "has 5,242,880 characters"),
     "escapes that never close": ("toml", '\na = """' + '\\"""' * 300_000, 'opens with """ in line 2 never closes'),
     "quotes that never close": ("toml", "a = '''" + "''x" * 300_000, "opens with ''' in line 1 never closes"),
+    "escapes of one line": ("toml", 'a = "' + '\\"' * 300_000, 'opens with " in line 1 never closes'),
+    "a quote that meets the line's end": ("toml", "a = 'b\nc = 'd'", "opens with ' in line 1 never closes"),
     "not finite": ("toml", "a = [1.0, nan]", "a[1]: is nan, expected a finite number"),
     "beyond a double": ("json", '{"a": {"b": 1e999}}', "a.b: is inf, expected a finite number"),
     "huge": ("toml", "a = -1e101", "a: is -1e+101, expected a number of at most 1e+100"),
@@ -82,11 +86,46 @@ def test_what_takes_parsers_down_is_refused_before_they_see_it(name: str, monkey
 def test_what_only_looks_dangerous_is_read() -> None:
     dots = ".".join("a" * 40)
     text = f'x.y = {{p.q = 1.5}}\n# {dots}\nz = "{dots}"\nw = """{dots}\n[[["""\n'
+    values = (
+        '""',
+        '"' * 6,
+        f'"""{dots}\\""" "" """""',
+        f"'''{dots}\\''''",
+        f'"{dots}\\""',
+        f"'{dots}\\'",
+        f'"""\\\n{dots}"""',
+    )
+    for k, value in enumerate(values):
+        text += f'"{dots} {k}" = {value}\n'
     text += "v = [1.5, 2.5, 3.5]\n['a.b'.c]\nd = 0.1"
     found = documents.parse(text, form="toml")
     assert found["z"] == dots
     assert found["a.b"] == {"c": {"d": 0.1}}
     assert found["x"] == {"y": {"p": {"q": 1.5}}}
+
+
+def test_no_text_is_called_open_that_a_parser_closes() -> None:
+    """Random quotes, escapes, ends of lines and comments: what is refused as open, the parser refuses too."""
+    chance, counts = random.Random(1), Counter[str]()
+    for _ in range(4_000):
+        inside = "".join(
+            chance.choices(['"', "'", '"""', "'''", "\\", "\n", "a", ".", "#", "[", "n"], k=chance.randint(0, 9))
+        )
+        quote = chance.choice(['"', "'", '"""', "'''", ""])
+        text = f"a = {quote}{inside}{quote}\nb = 1\n"
+        try:
+            tomllib.loads(text)
+            parsed = True
+        except tomllib.TOMLDecodeError:
+            parsed = False
+        try:
+            documents.parse(text, form="toml")
+            outcome = "read"
+        except DocumentError as refused:
+            outcome = "open" if "never closes" in str(refused) else "refused"
+        assert parsed == (outcome == "read"), text
+        counts[outcome] += 1
+    assert min(counts[outcome] for outcome in ("read", "open", "refused")) > 200, counts
 
 
 @pytest.mark.parametrize(
