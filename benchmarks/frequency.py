@@ -1,4 +1,4 @@
-"""How long frequency responses and a state-space fit take."""
+"""How long reading a log, frequency responses and a state-space fit take."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from scipy.signal import lfilter
 from benchmarks.timing import Span
 from swashplate.arrays import Array
 from swashplate.flights.flight import Flight, stream
+from swashplate.flights.readers.read import read
 from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, fit_transfer_function
 from swashplate.identification.responses.frequency_response import FrequencyResponse
@@ -27,12 +28,17 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure
 
 SECONDS, RATE = 600.0, 100.0
-RESPOND_WITHIN, FIT_WITHIN = 2.0, 15.0
+READ_WITHIN, RESPOND_WITHIN, FIT_WITHIN = 1.0, 2.0, 15.0
 X8_BAND, X8_WITHIN, FASTER = (0.25 / np.pi, 25.0 / np.pi), 1.0, 10.0
 """Hz: 0.5 to 50 rad/s, as in the example of AircraftIden for this record."""
 X8_FORM, X8_FITTED = "2/4", (1.0 / np.pi, 10.0 / np.pi)
 """Form, and band of the fit [Hz]: 2 to 20 rad/s as there."""
 ROOT = Path(__file__).resolve().parent.parent
+
+
+def _data() -> Path:
+    """The folder of real flights; it may be missing."""
+    return Path(os.environ.get("SWASHPLATE_DATA", ROOT.parent / "shared" / "data"))
 
 
 def _best(run, repeats: int) -> float:  # type: ignore[no-untyped-def]
@@ -71,6 +77,16 @@ def responses(*, repeats: int) -> Span:
     return Span("responses 4 x 9, 5 windows, 600 s at 100 Hz", seconds, RESPOND_WITHIN, note)
 
 
+def reading(*, repeats: int) -> list[Span]:
+    """A real log of ArduPilot; nothing is measured where it is missing."""
+    file = _data() / "ardupilot_sitl" / "heli_sid_roll_mix.BIN"
+    if not file.is_file():
+        return []
+    read(file)  # imports are not counted
+    seconds = _best(lambda: read(file), repeats)
+    return [Span("a log of ArduPilot read", seconds, READ_WITHIN, f"{file.stat().st_size / 1e6:.1f} MB")]
+
+
 def x8(*, repeats: int) -> list[Span]:
     """Responses and a transfer function of a real roll sweep (106 s at 100 Hz), beside AircraftIden where it is there.
 
@@ -78,7 +94,7 @@ def x8(*, repeats: int) -> list[Span]:
     bnsgeyer/pyAircraftIden) on the path, with sympy, and run again. Both get its windows and as many frequencies as it
     takes, and the fit is that of its own example. Nothing is measured where the record is missing.
     """
-    file = Path(os.environ.get("SWASHPLATE_DATA", ROOT.parent / "shared" / "data")) / "x8" / "x8roll.csv"
+    file = _data() / "x8" / "x8roll.csv"
     if not file.is_file():
         return []
     time_, command, degrees = np.loadtxt(file, delimiter=",").T

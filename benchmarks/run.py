@@ -47,7 +47,11 @@ def measure(*, short: bool) -> list[Result]:
         single.numpy_loop(steps=20 * scale, repeats=repeats),
         single.c_loop(steps=20_000 * scale, repeats=repeats),
         export.step("coax", steps=20_000 * scale, repeats=repeats),
-        *([] if short else [export.step("raptor50", steps=100_000, repeats=repeats, bar=True, inflow="pitt-peters")]),
+        *(
+            []
+            if short
+            else [export.step("raptor50", steps=4_000 * scale, repeats=repeats, bar=True, inflow="pitt-peters")]
+        ),
         export.environments(steps=20 * scale, repeats=repeats),
         *many.batches("coax", "float64", steps=10 * scale, repeats=repeats),
         *([] if short else many.batches("coax", "float32", steps=10 * scale, repeats=repeats)),
@@ -137,6 +141,7 @@ def main() -> None:
         closed_loops.flights(count=16 if options.short else 1000, one_by_one=1 if options.short else 5),
         *identifying.measure(short=options.short),
         frequency.responses(repeats=repeats),
+        *frequency.reading(repeats=repeats),
         *frequency.x8(repeats=repeats),
         frequency.fit(repeats=1),
         state_space.against_subspaces(seconds=20.0 if options.short else state_space.SECONDS),

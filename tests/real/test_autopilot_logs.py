@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -80,21 +79,6 @@ def test_hover_has_the_right_signs(logs: dict[str, Flight]) -> None:
     command, rate = (np.interp(t, roll.time(n), roll.values(n)) for n in ("mixer_roll", "p"))
     assert np.corrcoef(command, rate)[0, 1] > 0.9
     assert np.polyfit(command, rate, 1)[0] == pytest.approx(3.6, rel=0.2)
-
-
-def test_a_log_is_read_by_columns(shared_data: Path) -> None:
-    """Five megabytes: in less than five times what Python takes to add up its bytes, on the same machine just then."""
-    log = shared_data / "ardupilot_sitl" / "heli_sid_roll_mix.BIN"
-    reading, looking = [], []
-    for _ in range(3):
-        begin = time.process_time()
-        read(log)
-        reading.append(time.process_time() - begin)
-        begin, total = time.process_time(), 0
-        for byte in log.read_bytes():
-            total += byte
-        looking.append(time.process_time() - begin)
-    assert min(reading) < 5.0 * min(looking), (reading, looking)
 
 
 def test_an_early_px4_log(shared_data: Path) -> None:

@@ -88,16 +88,17 @@ class DaskEngine:
         if time.monotonic() - self._counted > _COUNTED:  # asked of the scheduler: not for every task
             self._counted = time.monotonic()
             with suppress(Exception):  # between two connections it knows nothing: as many as before
-                self._count = len(self._client.scheduler_info(n_workers=-1)["workers"])
+                self._count = len(self._known())
         return self._count
 
     @property
     def words(self) -> str:
         place = f"of the scheduler {self._address}" if self._address else "of Dask on this machine"
         told = f" ({len(self.turned_away)} came and went)" if self.turned_away else ""
-        if not self.workers:
+        count = self.workers
+        if not count:
             return f"no worker {place}{told}, it waits for one"
-        return f"{self.workers} worker{'s' if self.workers > 1 else ''} {place}{told}"
+        return f"{count} worker{'s' if count > 1 else ''} {place}{told}"
 
     @property
     def processes(self) -> list[int]:
@@ -120,10 +121,7 @@ class DaskEngine:
                 )
 
     def _known(self) -> dict[str, Any]:
-        workers: dict[str, Any] = {}
-        with suppress(Exception):  # between two connections it knows nothing
-            workers = self._client.scheduler_info(n_workers=-1)["workers"]
-        return workers
+        return dict(self._client.scheduler_info(n_workers=-1)["workers"])
 
     def _check_workers(self) -> None:
         """That the scheduler and every worker are the same program as this one, and work at one task at a time.

@@ -130,16 +130,17 @@ def carry_out(
     said: dict[str, list[str]] = {}
     flying = 0
     while waiting or flying:
-        if engine.workers != standing.workers:
-            standing.workers = engine.workers
+        workers = engine.workers
+        if workers != standing.workers:
+            standing.workers = workers
             tell(standing)
-        while waiting and flying < 2 * max(engine.workers, 1):
+        while waiting and flying < 2 * max(workers, 1):
             engine.submit(waiting.popleft())
             flying += 1
         for outcome in engine.outcomes(1.0):
             task = outcome.task
             flying -= 1
-            if waiting and flying < 2 * max(engine.workers, 1):  # before the disk is waited for
+            if waiting and flying < 2 * max(workers, 1):  # before the disk is waited for
                 engine.submit(waiting.popleft())
                 flying += 1
             if outcome.columns is not None:
