@@ -58,12 +58,6 @@ def coax(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str
         yield url
 
 
-@pytest.fixture(scope="module")
-def raptor(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with _served("live", "raptor50", "--option", "bar=true", cwd=tmp_path_factory.mktemp("raptor")) as url:
-        yield url
-
-
 @pytest.fixture
 def visit_(browser: Any) -> Iterator[Any]:
     """Opens pages, and closes them also where a test fails: a page that goes on drawing keeps a processor busy."""
@@ -253,11 +247,10 @@ def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...], how: str
     report.close()
 
 
-def test_what_is_recorded_is_identified_and_reported(visit_: Any, raptor: str) -> None:
-    visit = visit_(raptor).flies()
-    visit.page.click("[data-mode=position]")
+def test_what_is_recorded_is_identified_and_reported(visit_: Any, coax: str) -> None:
+    visit = visit_(coax).flies()
+    visit.page.click("[data-mode=held]")
     _identified(visit, seconds=10.0, axes=("roll", "pitch"), how="responses")
-    assert visit.of("swash.scene.crafts.own.model.bar !== null")
     visit.done()
 
 
@@ -270,11 +263,12 @@ def test_a_coax_flown_by_hand_is_identified(visit_: Any, coax: str) -> None:
 
 
 def test_replay_scrubs_and_shows_the_prediction(visit_: Any, tmp_path: Path) -> None:
-    raptor = sp.vehicle("raptor50")
+    raptor = sp.vehicle("raptor50", bar=True)
+    raptor.save(tmp_path / "barred.toml")
     sp.simulate_maneuver(raptor, "doublet:roll,0.5s,0.02", controller=sp.state_hold, lead=1, tail=2).save(
         tmp_path / "flight.nc"
     )
-    with _served("replay", tmp_path / "flight.nc", "--model", "raptor50", "--ahead", "1", cwd=tmp_path) as url:
+    with _served("replay", tmp_path / "flight.nc", "--model", "barred.toml", "--ahead", "1", cwd=tmp_path) as url:
         visit = visit_(url)
         visit.page.wait_for_selector("html[data-ready]", state="attached", timeout=_WAIT)
         visit.of("swash.go(1.3)")
@@ -282,6 +276,7 @@ def test_replay_scrubs_and_shows_the_prediction(visit_: Any, tmp_path: Path) -> 
         drawn = visit.of("swash.scene.crafts.own.model.group.rotation.x")
         assert drawn == pytest.approx(visit.of("swash.flight.moments[65][0][6]"), abs=1e-9)
         assert visit.of("'ghost' in swash.scene.crafts")
+        assert visit.of("swash.scene.crafts.own.model.bar !== null")
         visit.page.click("#play")
         visit.until("swash.time > 1.5")
         visit.page.click("#play")

@@ -127,22 +127,38 @@ def first_state(model: StochasticModel, x: Any, nuisance: Array | jax.Array) -> 
 
 def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
     """Slopes of `begun` along directions, which come first."""
-    k = len(directions.parameters)
-    rows = FilterNumbers(
+    rows = _aside(numbers, directions)
+    matrices = joined_at(model, rows, seen)
+    here = A, C, Q, R = tuple(part[0] for part in matrices)
+    P = steady_gain(A, C, Q, R)[2]
+    dK, dS = steady_gain_moved(here, P, tuple(map(_slope_aside, matrices)))  # type: ignore[arg-type]
+    return Begun(model.gain_of(dK, dS), _slope_aside(_starts(model, rows, seen)))
+
+
+def start(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Array:
+    """The state that a run begins with; its noise and the mean velocity do not count."""
+    return np.asarray(_starts(model, FilterNumbers(*(np.asarray(row)[None] for row in numbers)), seen)[0])
+
+
+def start_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Array:
+    """Slopes of `start` along directions, which come first."""
+    return _slope_aside(_starts(model, _aside(numbers, directions), seen))
+
+
+def _aside(numbers: FilterNumbers, directions: FilterNumbers) -> FilterNumbers:
+    """Rows of numbers: themselves, then all directions at each of the points around them."""
+    return FilterNumbers(
         *(
             np.concatenate([np.asarray(at)[None], *(at + _ASIDE * point * to for point in _POINTS)])
             for at, to in zip(numbers, directions, strict=True)
         )
     )
 
-    def moved(runs: Array) -> Array:
-        return np.tensordot(_WEIGHTS, runs[1:].reshape(len(_POINTS), k, *runs.shape[1:]), 1) / _ASIDE
 
-    matrices = joined_at(model, rows, seen)
-    here = A, C, Q, R = tuple(part[0] for part in matrices)
-    P = steady_gain(A, C, Q, R)[2]
-    dK, dS = steady_gain_moved(here, P, tuple(map(moved, matrices)))  # type: ignore[arg-type]
-    return Begun(model.gain_of(dK, dS), moved(_starts(model, rows, seen)))
+def _slope_aside(rows: Array) -> Array:
+    """Slopes by direction of what the rows of `_aside` lead to."""
+    around = rows[1:].reshape(len(_POINTS), -1, *rows.shape[1:])
+    return np.asarray(np.tensordot(_WEIGHTS, around, 1) / _ASIDE)
 
 
 def traced_begin(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:

@@ -136,6 +136,8 @@ def identify_flight(
     settings: dict[str, Any] = {}
     if isinstance(likelihood, PredictionError):
         settings["filter by"] = likelihood.compiled_by
+    else:
+        settings["simulated by"] = likelihood.compiled_by
     if residual is not None:
         if residual.kept and horizon is not None:
             wanders = {"noise": {k: float(v) for k, v in residual.noise._asdict().items()}}

@@ -7,32 +7,32 @@ residuals (Jategaonkar 2015, ch. 4; Bock 1983 for the shooting).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.filtering.arriving_commands import commands
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel, stochastic_model
+from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import robust
+from swashplate.identification.core.called_cost import called_cost
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.parameters import Layout, Parameterization
+from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record, logs
 from swashplate.identification.core.scoring import TracedCost
+from swashplate.identification.time import traced_shooting
+from swashplate.identification.time.beginning import FirstMotion
+from swashplate.identification.time.compiled_filter import compiled_filter
+from swashplate.identification.time.compiled_shooting import CompiledShooting, FlownWindow, Window
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import parameter_entries, stack_records
-from swashplate.identification.time.start_states import slopes, start_state
-from swashplate.simulation.compilation import FEW_PASSES, QUICK_TO_COMPILE
+from swashplate.identification.time.start_states import slopes
+from swashplate.identification.time.traced_shooting import ShootingPlan
 
 WINDOW = 4.0
 """Seconds of one shot: some periods of the fast modes, and short against the growth of unstable ones and of yaw."""
@@ -123,10 +123,12 @@ class OutputError:
             for name, (scale, sigma) in self._own.items():
                 entries.append(Entry(f"{name} at window {place}", "initial", 0.0, scale, sigma=sigma))
         self.row = Row(tuple(entries), table.prior_correlations)
-        self._plan = _Plan(
+        self._plan = ShootingPlan(
             self.model, table.layout, len(self.logs), self.nuisances, drifting, self.length, self._shared
         )
         self._data = self._windows()
+        self._outputs = np.asarray(self._data["outputs"])
+        self._shooting = self._compiled()
         self._L = np.eye(len(pieces[0].output_names))
 
     def _windows(self) -> dict[str, Any]:
@@ -153,13 +155,52 @@ class OutputError:
             "initial_scale": jnp.asarray([scale for scale, _ in self._own.values()]),
         }
 
+    def _compiled(self) -> CompiledShooting | None:
+        """The windows in C; None where that cannot be had here."""
+        if (in_c := compiled_filter(self.model)) is None:
+            return None
+        windows = []
+        for place, (number, first) in enumerate(self._places):
+            piece, here = self.pieces[number], slice(first, first + self.length)
+            value, rate = (np.asarray(self._data[name][place]) for name in ("value", "rate"))
+            voltage = piece.voltage[here]
+            seen = FirstMotion(value, rate, np.zeros(3), np.array([voltage[0]]), float(piece.time[first]))
+            windows.append(Window(int(self._log[number]), first, piece.inputs, voltage, seen))
+        return CompiledShooting(
+            self._plan,
+            in_c,
+            tuple(windows),
+            card=np.asarray(self.table.card_row),
+            scale=self.row.scale[: self._shared],
+            own_scale=np.array([scale for scale, _ in self._own.values()]),
+        )
+
+    @property
+    def compiled_by(self) -> str:
+        """What makes the code that simulates the windows: a C compiler or XLA."""
+        return "XLA" if self._shooting is None else "C"
+
     def unpack(self, shared: Array) -> tuple[Any, Nuisance]:
         """Equations' parameters and nuisances (one array entry per record) of the shared part of a scaled row."""
-        return _unpack(self._plan, self._data, jnp.asarray(shared))
+        return traced_shooting.unpack_shared(self._plan, self._data, jnp.asarray(shared))
 
     def residuals(self, row: Array) -> tuple[Any, Any]:
         """Residuals (windows, n, outputs) and states (windows, n, states)."""
-        return _residuals(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
+        if self._shooting is not None:
+            return self._beside(self._shooting.flown(np.asarray(row)))
+        return traced_shooting.residuals(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
+
+    def _beside(self, flown: list[FlownWindow]) -> tuple[Array, Array]:
+        """Residuals and states of simulated windows."""
+        return self._outputs - np.stack([run.outputs for run in flown]), np.stack([run.run.states.x for run in flown])
+
+    def _with_slopes(self, row: Array) -> tuple[Array, Array]:
+        """Residuals, and their slopes by the shared entries and by each window's own (windows, entries, n, outputs)."""
+        if self._shooting is None:
+            values, tangents = traced_shooting.residuals_moved(self._plan, self._data, jnp.asarray(row))
+            return np.asarray(values), np.asarray(tangents)
+        flown = self._shooting.flown(np.asarray(row))
+        return self._beside(flown)[0], -self._shooting.moved(np.asarray(row), flown)
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def cost(self, row: Array) -> float:
@@ -175,8 +216,15 @@ class OutputError:
         return robust.huber(np.asarray(white, dtype=np.float64)) + flat.shape[0] * float(np.log(np.diag(self._L)).sum())
 
     def traced(self) -> TracedCost:
-        """The cost as a function that JAX differentiates, with the covariance of the last accepted row."""
-        return TracedCost(_traced_cost, self._plan, self._data | {"root": jnp.asarray(self._L)})
+        """The cost as a function that JAX differentiates, or calls: with the covariance of the last accepted row."""
+        if self._shooting is not None:
+            return TracedCost(called_cost, self, {})
+        return TracedCost(traced_shooting.shooting_cost, self._plan, self._data | {"root": jnp.asarray(self._L)})
+
+    def slope(self, row: Array) -> tuple[float, Array]:
+        """Cost and gradient, for samplers, from several threads too."""
+        residual, gradient, _, _ = self._accumulate(row)
+        return self._cost(residual), gradient
 
     def refresh(self, row: Array) -> None:
         """Covariance of the residuals at an accepted row, outliers weighed down."""
@@ -195,8 +243,7 @@ class OutputError:
         return self._cost(residual), gradient, information
 
     def _accumulate(self, row: Array) -> tuple[Array, Array, Array, Array]:
-        values, tangents = _with_tangents(self._plan, self._data, jnp.asarray(row))
-        residual, derivative = np.asarray(values), np.asarray(tangents)
+        residual, derivative = self._with_slopes(row)
         Li = np.linalg.inv(self._L)
         white = residual @ Li.T
         weight = robust.weights(white)
@@ -263,100 +310,3 @@ class OutputError:
     def places(self) -> list[tuple[int, int]]:
         """Record number and first sample of each window."""
         return list(self._places)
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """What compiled code depends on: everything but numbers."""
-
-    model: StochasticModel
-    layout: Layout
-    logs: int
-    nuisances: tuple[str, ...]
-    drifting: tuple[str, ...]
-    length: int
-    shared: int
-
-
-def _unpack(plan: _Plan, data: Mapping[str, jax.Array], shared: Float[jax.Array, " shared"]) -> tuple[Any, Nuisance]:
-    numbers = shared * data["scale"]
-    k, n, m = len(plan.layout.free), plan.logs, len(plan.nuisances)
-    block = numbers[k : k + n * m].reshape(n, m)[data["log"]]
-    nuisance = Nuisance(**{name: jnp.zeros(len(block)) for name in Nuisance._fields})._replace(
-        **{name: block[:, i] for i, name in enumerate(plan.nuisances)}
-    )
-    return plan.layout.values(data["card"], numbers[:k]), nuisance
-
-
-def _shoot(
-    plan: _Plan,
-    data: Mapping[str, jax.Array],
-    shared: Float[jax.Array, " shared"],
-    initial: Float[jax.Array, " initial"],
-    place: Int[jax.Array, ""],
-) -> tuple[Any, Any]:
-    """Outputs and states of one window."""
-    model, vehicle = plan.model, plan.model.vehicle
-    parameters, nuisances = _unpack(plan, data, shared)
-    record, first = data["record"][place], data["first"][place]
-    nuisance = jax.tree.map(lambda values: values[record], nuisances)
-    own = initial * data["initial_scale"]
-    states = len(vehicle.state_names)
-    nuisance = nuisance._replace(
-        **{name: getattr(nuisance, name) + own[states + i] for i, name in enumerate(plan.drifting)}
-    )
-    reaching = commands(vehicle, model.dt, data["inputs"][record], nuisance)
-    cut = jax.lax.dynamic_slice_in_dim(reaching, first, plan.length)
-    voltage = jax.lax.dynamic_slice_in_dim(data["voltage"][record], first, plan.length)
-    start = start_state(
-        vehicle,
-        model.output_names,
-        parameters,
-        nuisance,
-        value=data["value"][place],
-        rate=data["rate"][place],
-        inputs=cut[0],
-        voltage=voltage[0],
-        running=data["running"][place],
-    )
-    calm = jnp.zeros(N_DISTURBANCES)
-
-    def sample(x: Float[jax.Array, " states"], now: tuple[jax.Array, jax.Array]) -> tuple[Any, Any]:
-        u, volts = now
-        return model.step(x, calm, u, parameters, volts), x
-
-    _, flown = jax.lax.scan(sample, start + own[:states], (cut, voltage))
-    return jax.vmap(lambda x: model.measure(x, nuisance))(flown), flown
-
-
-def _traced_residuals(plan: _Plan, data: Mapping[str, jax.Array], row: Float[jax.Array, " entries"]) -> tuple[Any, Any]:
-    shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
-    places = jnp.arange(initial.shape[0])
-    outputs, states = jax.vmap(lambda i, x0: _shoot(plan, data, shared, x0, i))(places, initial)
-    return data["outputs"] - outputs, states
-
-
-_residuals = jax.jit(_traced_residuals, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-
-
-def _traced_cost(plan: _Plan, data: Mapping[str, Any], row: jax.Array) -> Any:
-    """Negative log-likelihood of the residuals at a given root of their covariance (traceable)."""
-    flat = _traced_residuals(plan, data, row)[0].reshape(-1, data["root"].shape[0])
-    white = jax.scipy.linalg.solve_triangular(data["root"], flat.T, lower=True)
-    return robust.losses(white, jnp).sum() + flat.shape[0] * jnp.log(jnp.diag(data["root"])).sum()
-
-
-@partial(jax.jit, static_argnums=0, compiler_options=FEW_PASSES)
-def _with_tangents(plan: _Plan, data: Mapping[str, jax.Array], row: Float[jax.Array, " entries"]) -> tuple[Any, Any]:
-    """Residuals and, per window, their derivatives by the shared entries and by the window's own initial state."""
-    shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
-
-    def one(place: Int[jax.Array, ""], x0: Float[jax.Array, " initial"]) -> Any:
-        def outputs(both: Float[jax.Array, " entries"]) -> Any:
-            return _shoot(plan, data, both[: plan.shared], both[plan.shared :], place)[0]
-
-        both = jnp.concatenate([shared, x0])
-        return jax.vmap(lambda t: jax.jvp(outputs, (both,), (t,)), out_axes=(None, 0))(jnp.eye(both.shape[0]))
-
-    values, tangents = jax.vmap(one)(jnp.arange(initial.shape[0]), initial)
-    return data["outputs"] - values, -tangents

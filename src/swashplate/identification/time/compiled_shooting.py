@@ -1,0 +1,177 @@
+"""Windows simulated from their own starts, and how they move, by the C of the filter with a gain of zero.
+
+Without a gain the filter is the simulation: what it is told to expect is what the model would measure. It carries the
+slopes of its innovations along; told to read just what it expects, these are the slopes of the outputs, in the axes of
+the simulated heading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.filtering.arriving_commands import commands_moved, motors
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.time.beginning import IMAGINARY, Begun, FilterNumbers, FirstMotion, start, start_moved
+from swashplate.identification.time.compiled_filter import CompiledFilter, FilterRun
+from swashplate.identification.time.traced_shooting import ShootingPlan
+from swashplate.physics.backend import ArrayBackend
+
+_XP = ArrayBackend()
+
+
+@dataclass(frozen=True)
+class Window:
+    """One window of a record.
+
+    Attributes:
+        log: which flight it is of.
+        first: its first sample in the record.
+        inputs: of the whole record: delays reach beyond the window.
+        voltage: by sample of the window.
+        seen: of its beginning.
+    """
+
+    log: int
+    first: int
+    inputs: Array
+    voltage: Array
+    seen: FirstMotion
+
+
+@dataclass(frozen=True)
+class FlownWindow:
+    """A window as it was simulated at a row.
+
+    Attributes:
+        numbers: what it depends on.
+        commands: as they arrive. late: their slopes by the delay.
+        run: of the filter. outputs: what the model measures (n, outputs).
+    """
+
+    numbers: FilterNumbers
+    commands: Array
+    late: Array
+    begin: Begun
+    run: FilterRun
+    outputs: Array
+
+
+class CompiledShooting:
+    """All windows of a fit.
+
+    Args:
+        plan: of the fit. in_c: its model's filter.
+        windows: in the order of the row.
+        card: parameters of the card.
+        scale, own_scale: of the row's shared entries, and of the entries of a window.
+    """
+
+    def __init__(
+        self,
+        plan: ShootingPlan,
+        in_c: CompiledFilter,
+        windows: tuple[Window, ...],
+        *,
+        card: Array,
+        scale: Array,
+        own_scale: Array,
+    ) -> None:
+        self._plan, self._c, self._windows = plan, in_c, windows
+        self._card, self._scale, self._own_scale = card, scale, own_scale
+        self._nuisances = np.array([Nuisance._fields.index(name) for name in plan.nuisances], dtype=np.intp)
+        self._drifting = np.array([Nuisance._fields.index(name) for name in plan.drifting], dtype=np.intp)
+        self._noise = np.array(Noise(), dtype=np.float64)
+
+    def flown(self, row: Array) -> list[FlownWindow]:
+        """Every window as simulated at a scaled row."""
+        return [self._flown(window, *self._parts(row, place)) for place, window in enumerate(self._windows)]
+
+    def moved(self, row: Array, flown: list[FlownWindow]) -> Array:
+        """Slopes of the outputs by the shared entries and by the window's own (windows, entries, n, outputs)."""
+        shared = row[: self._plan.shared] * self._scale
+        return np.array([self._moved(*each, shared) for each in zip(self._windows, flown, strict=True)])
+
+    def _parts(self, row: Array, place: int) -> tuple[Array, Array]:
+        """The shared numbers and those of a window, in their units."""
+        shared, size = self._plan.shared, self._own_scale.size
+        own = row[shared + place * size : shared + (place + 1) * size]
+        return row[:shared] * self._scale, own * self._own_scale
+
+    def _flown(self, window: Window, shared: Array, own: Array) -> FlownWindow:
+        model, n = self._plan.model, len(self._plan.model.vehicle.state_names)
+        k, m = len(self._plan.layout.free), self._nuisances.size
+        nuisance = np.zeros(len(Nuisance._fields))
+        nuisance[self._nuisances] = shared[k + window.log * m : k + (window.log + 1) * m]
+        nuisance[self._drifting] += own[n:]
+        reaching, late = commands_moved(model.vehicle, model.dt, window.inputs, Nuisance(*nuisance), np)
+        here = slice(window.first, window.first + self._plan.length)
+        parameters = np.array(self._plan.layout.values(self._card, shared[:k]), dtype=np.float64)
+        numbers = FilterNumbers(parameters, self._noise, nuisance, reaching[window.first])
+        begin = Begun(self._no_gain(), start(model, numbers, window.seen) + own[:n])
+        nothing = np.zeros((self._plan.length, model.n_outputs))
+        run = self._c.along(begin, numbers, (nothing, reaching[here], window.voltage))
+        outputs = np.asarray(model.measure(np.asarray(run.states.x).T, Nuisance(*nuisance), _XP)).T
+        return FlownWindow(numbers, reaching[here], late[here], begin, run, outputs)
+
+    def _moved(self, window: Window, flown: FlownWindow, shared: Array) -> Array:
+        """Directions of the filter: parameters, the flight's numbers, the window's drifts, its states."""
+        plan, model, numbers = self._plan, self._plan.model, flown.numbers
+        n, k, m, d = len(model.vehicle.state_names), len(plan.layout.free), self._nuisances.size, self._drifting.size
+        count, own = k + m + d + n, k + window.log * m
+        scale = np.concatenate([self._scale[:k], self._scale[own : own + m], self._own_scale[n:], self._own_scale[:n]])
+        by_command = self._commands_moved(flown)
+        parts = FilterNumbers(*(np.zeros((count, np.size(part))) for part in numbers))
+        for i in range(k):
+            step = shared[:k] + 1j * IMAGINARY * (np.arange(k) == i)
+            parts.parameters[i] = np.imag(np.array(plan.layout.values(self._card, step))) / IMAGINARY
+        for i, place in enumerate([*self._nuisances, *self._drifting]):
+            parts.nuisance[k + i, place] = 1.0
+        parts.inputs[k : k + m + d] = by_command[:, 0]
+        directions = FilterNumbers(*(scale[:, None] * part for part in parts))
+        begins = np.zeros((count, n))
+        begins[: k + m + d] = start_moved(
+            model, numbers, window.seen, FilterNumbers(*(part[: k + m + d] for part in directions))
+        )
+        begins[k + m + d :] = np.diag(scale[k + m + d :])
+        late = by_command * scale[k : k + m + d, None, None]
+        series = flown.outputs, flown.commands, window.voltage
+        begin = Begun(self._no_gain(count), begins)
+        roots = np.asarray(flown.run.roots)
+        slopes = -self._turned(self._c.moved(flown.begin, begin, numbers, directions, series, roots, (k, late)), flown)
+        every = np.zeros((plan.shared + n + d, *slopes.shape[1:]))
+        every[:k], every[own : own + m] = slopes[:k], slopes[k : k + m]
+        every[plan.shared : plan.shared + n], every[plan.shared + n :] = slopes[k + m + d :], slopes[k + m : k + m + d]
+        return every
+
+    def _commands_moved(self, flown: FlownWindow) -> Array:
+        """Slopes of the arriving commands by each of the flight's numbers and of the window's drifts."""
+        vehicle = self._plan.model.vehicle
+        motor = np.array(motors(vehicle))
+        ways = {"delay_motor": flown.late * motor, "delay_servo": flown.late * ~motor}
+        for j, name in enumerate(vehicle.input_names):
+            ways[f"trim_{name}"] = np.tile(np.arange(len(motor)) == j, (len(flown.late), 1)).astype(float)
+        names = (*self._plan.nuisances, *self._plan.drifting)
+        return np.stack([ways.get(name, np.zeros_like(flown.late)) for name in names])
+
+    def _no_gain(self, *front: int) -> FilterGain:
+        model = self._plan.model
+        joined = len(model.vehicle.state_names) + model.n_gusts + N_DISTURBANCES
+        return model.gain_of(np.zeros((*front, joined, model.n_outputs)), np.eye(model.n_outputs))
+
+    def _turned(self, slopes: Array, flown: FlownWindow) -> Array:
+        """Slopes of innovations (count, n, outputs) with their horizontal part back in local axes."""
+        names = list(self._plan.model.output_names)
+        if not {"x", "y"} <= set(names):
+            return slopes
+        i, j = names.index("x"), names.index("y")
+        psi = np.asarray(flown.run.states.x)[:, self._plan.model.vehicle.index("psi")]
+        c, s = np.cos(psi), np.sin(psi)
+        turned = slopes.copy()
+        turned[:, :, i] = c * slopes[:, :, i] - s * slopes[:, :, j]
+        turned[:, :, j] = s * slopes[:, :, i] + c * slopes[:, :, j]
+        return turned
