@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -125,6 +126,7 @@ def biased_of(card: Card) -> Vehicle:
     return replace(biased(), card=card, traits=Traits(effects=lambda card: (OFF_CENTRE,)))
 
 
+@lru_cache(maxsize=16)
 def gusty(seed: int = 11, offset: float = 0.0) -> Flight:
     """Six seconds at 50 Hz in gusts that act on the roll rate."""
     random, dt, n = np.random.default_rng(seed), 0.02, 300

@@ -162,6 +162,7 @@ def test_published_numbers_give_the_published_innovations(hfb: dict[str, np.ndar
     np.testing.assert_allclose(np.diag(likelihood.covariance), PUBLISHED_VARIANCES, rtol=0.005)  # worst: 0.3 %
 
 
+@pytest.mark.proof
 def test_hfb_320_by_filter_error_is_the_published(hfb: dict[str, np.ndarray]) -> None:
     """His equations and noise model from his start values: all eleven estimates within their bounds, or nearly.
 
@@ -179,6 +180,7 @@ def test_hfb_320_by_filter_error_is_the_published(hfb: dict[str, np.ndarray]) ->
     assert fit.model.card.parameters["Cmq"].sigma == fit["Cmq"].sigma
 
 
+@pytest.mark.proof
 def test_hfb_320_linearised_is_near_the_published(hfb: dict[str, np.ndarray]) -> None:
     """Linearised with the thrust as an input: 0.2, 1.0, 0.3, 0.4, 1.1, 0.9, 2.3 and 1.9 bounds off.
 

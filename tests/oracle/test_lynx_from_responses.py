@@ -92,6 +92,7 @@ def fit(matrices: tuple[Array, Array]) -> StateSpaceFit:
 
 def test_the_modes_without_start_values(matrices: tuple[Array, Array], fit: StateSpaceFit) -> None:
     assert fit.cost < 8.0, fit
+    assert fit.settings["started_from"] == "regression on the responses"
     assert not any("not all of the aircraft" in text for text in fit.warnings), fit.warnings
     found = fit.solution.eigenvalues()
     for value in np.linalg.eigvals(matrices[0]):

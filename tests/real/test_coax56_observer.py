@@ -84,7 +84,9 @@ def test_rates_are_predicted_better_than_by_the_raw_model(name: str, request: py
             assert by_observer < 0.7 * size, (axis, found.rms())
 
 
-@pytest.mark.parametrize(("name", "tilt", "height"), [("august", 0.18, 0.3), ("july", 0.30, 0.65)])
+@pytest.mark.parametrize(
+    ("name", "tilt", "height"), [("august", 0.18, 0.3), pytest.param("july", 0.30, 0.65, marks=pytest.mark.proof)]
+)
 def test_innovations_are_near_white(name: str, tilt: float, height: float, request: pytest.FixtureRequest) -> None:
     """Largest correlation over 20 lags (white: 0.08 and 0.11) and sizes.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ def _nanobench(path: Path, *, attitude: tuple[str, str, str] = ("roll", "pitch",
     return read(path, mapping={"channels": channels})
 
 
+@lru_cache(maxsize=1)
 def _logs(data: Path) -> dict[str, Flight]:
     found = {"trex550": read(data / "trex550" / "trex550_flight.csv", units=_TREX)}
     found |= {path.stem: read(path) for path in sorted((data / "ardupilot_sitl").glob("*.BIN"))}

@@ -88,6 +88,15 @@ def _holds(inside: float, ratio: dict[str, float], scatter: tuple[float, float])
     assert all(scatter[0] < value < scatter[1] for value in ratio.values()), ratio
 
 
+def test_the_parameters_of_a_bench_come_back_as_near_as_their_bounds_say(bench: Bench, aircraft: Vehicle) -> None:
+    """Of one bench; how each of them scatters needs the seeds below."""
+    errors, sigmas = _away([bench], aircraft.card.values())
+    assert np.mean(np.abs(errors) < 2.0 * sigmas) >= 0.85
+    assert 0.4 < np.mean((errors / sigmas) ** 2) < 2.0
+    assert np.all(np.abs(errors) < 4.0 * sigmas)
+
+
+@pytest.mark.proof
 def test_every_parameter_comes_back_within_its_bounds(aircraft: Vehicle) -> None:
     """Eight seeds; scatter / sigma of each parameter is then known to 27 %, hence its limits (2.5 times that)."""
     found = [evaluate(_records(aircraft, seed), sp.vehicle("coax")) for seed in range(8)]

@@ -35,12 +35,14 @@ def test_an_unstable_model_is_recovered_from_zero() -> None:
         assert constant.value == pytest.approx(value, abs=3.0 * constant.sigma), name
 
 
+@pytest.mark.proof
 def test_output_error_does_not_get_there_from_zero() -> None:
     flown = tipped(1)
     fit = sp.identify(tipping(), flown, free=list(TRUTH), outputs=OUTPUTS, method="output-error", iterations=40)
     assert all(abs(fit[name].value - value) > 0.5 * abs(value) for name, value in TRUTH.items()), fit
 
 
+@pytest.mark.proof
 def test_a_few_seeds_lie_within_their_bounds() -> None:
     found = distances(range(2, 8))
     assert np.mean(np.abs(found) < 2.0) >= 0.8

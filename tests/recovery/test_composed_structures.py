@@ -11,7 +11,7 @@ import pytest
 from coupled_helicopter import LAG, PITCH, ROLL, THRUST_BY_W, matrices, measured
 from proof_page import leave
 from swashplate.arrays import Array
-from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.frequency.state_space_fit import STARTED, fit_state_space
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.structure_search import search_structures
 from swashplate.identification.responses.frequency_response import FrequencyResponse
@@ -28,12 +28,12 @@ def responses() -> FrequencyResponse:
     return measured(*matrices(), noise=0.02, averages=20.0)
 
 
-@pytest.fixture(scope="module")
-def found(responses: FrequencyResponse) -> StateSpaceFit:
-    return fit_state_space(structure(RIGHT), responses)
-
-
-def test_the_right_parts_find_the_helicopter_from_the_start_values_of_the_package(found: StateSpaceFit) -> None:
+@pytest.mark.parametrize("starts", [1, pytest.param(STARTED, marks=pytest.mark.proof)])
+def test_the_right_parts_find_the_helicopter_from_the_start_values_of_the_package(
+    starts: int, responses: FrequencyResponse
+) -> None:
+    """From these alone, and among the starting points of a usual fit."""
+    found: StateSpaceFit = fit_state_space(structure(RIGHT), responses, starts=starts)
     assert found.cost < 5.0
     assert max(found.costs) < 50.0
     known = np.linalg.eigvals(matrices()[0])

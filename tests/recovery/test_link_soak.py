@@ -137,6 +137,7 @@ def nothing_is_lost(soak: Soak) -> list[tuple[float, float]]:
     return pairs
 
 
+@pytest.mark.proof
 def test_a_short_soak_loses_nothing(tmp_path: Path) -> None:
     """Each side is killed once."""
     soak = Soak(tmp_path, seed=2)

@@ -91,6 +91,7 @@ def mode_errors(fit: StateSpaceFit, truth: StateSpaceModel) -> dict[str, float]:
     }
 
 
+@pytest.mark.proof
 def test_conditioned_responses_are_right_where_single_ones_are_not(
     truth: StateSpaceModel, sweeps: list[Flight], responses: FrequencyResponse
 ) -> None:
@@ -102,6 +103,7 @@ def test_conditioned_responses_are_right_where_single_ones_are_not(
     assert sum(error > 2.0 for error in wrong.values()) >= 3, wrong
 
 
+@pytest.mark.proof
 def test_the_model_is_found_from_start_values_thirty_percent_off(
     truth: StateSpaceModel, responses: FrequencyResponse
 ) -> None:

@@ -33,6 +33,7 @@ def inside(recoveries: Sequence[Recovery]) -> float:
     return float(np.mean([np.abs(r.distance) < 2.0 for r in recoveries]))
 
 
+@pytest.mark.proof
 def test_a_closed_loop_is_flown_from_the_readings_that_the_log_holds() -> None:
     """It stays at its place by them, and another seed's cameras read something else."""
     flight = flown_in_gusts(0, sigma=0.3, controller=seen_hold(0, duration=40.0))

@@ -70,9 +70,8 @@ def counted(truth: StateSpaceModel, found: FrequencyResponse, kind: str) -> Coun
     return Count(usable, usable & near)
 
 
-@pytest.mark.parametrize(
-    ("kind", "gust"), [pytest.param("automatic", "moderate", marks=pytest.mark.proof), ("by hand", "strong")]
-)
+@pytest.mark.proof
+@pytest.mark.parametrize(("kind", "gust"), [("automatic", "moderate"), ("by hand", "strong")])
 def test_what_is_called_usable_is_right_and_nothing_is_lost(truth: StateSpaceModel, kind: str, gust: str) -> None:
     flights = flown(truth, kind, gust, seed=0)
     found = responses(truth, flights)
@@ -89,7 +88,8 @@ def test_what_is_called_usable_is_right_and_nothing_is_lost(truth: StateSpaceMod
     assert any("feedback biases the direct estimate" in text for text in found.warnings)
 
 
-@pytest.mark.parametrize(("factor", "left"), [(0.45, 0.03), pytest.param(2.2, 0.9, marks=pytest.mark.proof)])
+@pytest.mark.proof
+@pytest.mark.parametrize(("factor", "left"), [(0.45, 0.03), (2.2, 0.9)])
 def test_a_reference_that_follows_the_wrong_frequency_makes_nothing_wrong_usable(
     truth: StateSpaceModel, monkeypatch: pytest.MonkeyPatch, factor: float, left: float
 ) -> None:

@@ -129,10 +129,10 @@ def other_structures(fit: StateSpaceFit) -> dict[str, StateSpaceModel]:
     return made
 
 
-FOUR_OR_A_DOZEN = pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.proof)], ids=["four", "dozen"])
+TWO_OR_A_DOZEN = pytest.mark.parametrize("every", [6, pytest.param(1, marks=pytest.mark.proof)], ids=["two", "dozen"])
 
 
-@FOUR_OR_A_DOZEN
+@TWO_OR_A_DOZEN
 def test_a_dozen_wrong_models_are_refuted(every: int, fit: StateSpaceFit, unseen: list[Piece]) -> None:
     names = strong(fit)
     assert len(names) >= 8, names
@@ -143,7 +143,7 @@ def test_a_dozen_wrong_models_are_refuted(every: int, fit: StateSpaceFit, unseen
     assert set(verdicts.values()) == {REFUTED}, verdicts
 
 
-@FOUR_OR_A_DOZEN
+@TWO_OR_A_DOZEN
 def test_a_dozen_models_within_their_own_bounds_are_not(
     every: int, truth: StateSpaceModel, fit: StateSpaceFit, unseen: list[Piece]
 ) -> None:
@@ -170,8 +170,9 @@ def test_what_the_record_cannot_tell_is_said(truth: StateSpaceModel, fit: StateS
         fit.solution,
         parameters={n: replace(p, cramer_rao=100.0 * abs(p.value)) for n, p in fit.solution.parameters.items()},
     )
-    assert said(vague, unseen).verdict == OPEN
-    assert "too wide" in " ".join(said(vague, unseen).reasons) or "so wide" in " ".join(said(vague, unseen).reasons)
+    judged = said(vague, unseen)
+    assert judged.verdict == OPEN
+    assert "too wide" in " ".join(judged.reasons) or "so wide" in " ".join(judged.reasons)
     short = replace(unseen[0], inputs=unseen[0].inputs[:60], outputs=unseen[0].outputs[:60])
     assert said(fit.solution, [short]).verdict == OPEN
 

@@ -129,6 +129,7 @@ def test_the_joined_system_is_the_slope_of_one_sample() -> None:
     assert not C[:, n:].any()
 
 
+@pytest.mark.proof
 def test_wind_acts_through_the_equations_with_the_slope_of_the_speeds_flown() -> None:
     """Against central differences of the step with the wind in its surroundings, averaged over many drawn speeds."""
     noise = Noise(wind=0.4, tau_wind=0.5, speed=0.1)

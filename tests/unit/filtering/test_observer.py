@@ -56,9 +56,10 @@ def linear() -> Lqg:
 
 
 # ---- constant gains --------------------------------------------------------------------------------------------------
-def test_constant_gains_are_the_filters_after_a_long_time() -> None:
+@pytest.mark.parametrize("which", ["linear", pytest.param("flying", marks=pytest.mark.proof)])
+def test_constant_gains_are_the_filters_after_a_long_time(which: str) -> None:
     """The doubled Riccati map against the filter's own covariance, sample by sample, at rest."""
-    controller = made()
+    controller = {"flying": made, "linear": linear}[which]()
     plan, numbers = controller.plan, controller.numbers
     gains, covariances = steady_gains(plan, numbers, linearize(controller.vehicle, controller.start), 2)
     assert gains.shape == (2, len(plan.names), 12)
@@ -115,6 +116,7 @@ def test_constant_gains_that_cannot_be(options: dict[str, Any], said: str) -> No
         with_steady_gain(design(vehicle("coax"), **options))
 
 
+@pytest.mark.proof
 def test_the_observer_is_as_sure_as_it_may_be() -> None:
     """Hidden states within three sigmas 98 % of the time and (error / sigma)^2 of 0.5 to 2, in gusts, held on it."""
     controller = made()
@@ -186,8 +188,8 @@ def in_python(which: str) -> tuple[Lqg, Any]:
 @pytest.mark.parametrize(
     ("which", "precision", "tolerance"),
     [
-        ("flying", "double", 1e-12),
-        ("flying", "float", 3e-4),
+        pytest.param("flying", "double", 1e-12, marks=pytest.mark.proof),
+        pytest.param("flying", "float", 3e-4, marks=pytest.mark.proof),
         ("steady", "double", 1e-12),
         ("steady", "float", 2e-4),
         ("linear", "double", 1e-12),

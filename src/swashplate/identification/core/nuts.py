@@ -76,17 +76,17 @@ def sample(
         target = _evened(target, pool)
         warmed = [pool.submit(_warmed, target, warmup, keys[c], _alive(target, starts[c])) for c in range(chains)]
         states = [job.result()[0] for job in warmed]
-        # The metric is one, and so is the step.
-        steps = np.full(chains, np.exp(np.mean([np.log(job.result()[1]) for job in warmed])))
+        # The metric is one, and so is the step; a float as while they warmed, for which it is compiled.
+        step = float(np.exp(np.mean([np.log(job.result()[1]) for job in warmed])))
         done, chain = 0, None
         while done < most:
             size = min(block, most - done)
-            jobs = [pool.submit(_drawn, target, keys[c], states[c], steps[c], done, size) for c in range(chains)]
+            jobs = [pool.submit(_drawn, target, keys[c], states[c], step, done, size) for c in range(chains)]
             for c, job in enumerate(jobs):
                 states[c], rows, stats = job.result()
                 parts[c].append((rows, stats))
             done += size
-            chain = _together(parts, steps)
+            chain = _together(parts, np.full(chains, step))
             if progress is not None:
                 progress(done, most)
             if enough(chain):

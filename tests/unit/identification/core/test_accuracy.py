@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from swashplate.errors import IdentificationError
 from swashplate.identification.core import accuracy
@@ -18,9 +19,7 @@ def _first_order(rng: np.random.Generator, shape: tuple[int, int], rho: float) -
     """AR(1) columns of unit variance."""
     noise = np.sqrt(1.0 - rho**2) * rng.standard_normal(shape)
     noise[0] /= np.sqrt(1.0 - rho**2)
-    for k in range(1, shape[0]):
-        noise[k] += rho * noise[k - 1]
-    return noise
+    return np.asarray(lfilter([1.0], [1.0, -rho], noise, axis=0))
 
 
 @pytest.mark.parametrize("n", [7, 24, 61])

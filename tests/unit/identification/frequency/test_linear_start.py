@@ -68,12 +68,18 @@ def test_rates_and_accelerations_tell_every_derivative_without_a_start() -> None
     assert all(np.min(np.abs(modes - v)) < 0.1 * max(abs(v), 0.5) for v in truth.eigenvalues())
 
 
+@pytest.mark.proof
 def test_a_fit_from_a_start_with_wrong_signs_ends_at_the_truth() -> None:
     truth = shaken("six_dof_coupled", seed=2)
     responses = measured(truth, ("p", "q", "r", "ax", "ay", "az"), noise=0.01)
     fit = fit_state_space(structure("six_dof_coupled"), responses, starts=2)
     assert fit.settings["started_from"] == "regression on the responses"
     assert fit.cost < 1.0
+
+
+@pytest.mark.proof
+def test_without_the_regression_such_a_fit_ends_elsewhere() -> None:
+    responses = measured(shaken("six_dof_coupled", seed=2), ("p", "q", "r", "ax", "ay", "az"), noise=0.01)
     alone = fit_state_space(structure("six_dof_coupled"), responses, starts=1, iterations=30)
     assert alone.cost > 50.0
 

@@ -73,19 +73,28 @@ def test_one_notch_is_no_wrong_structure(truth: StateSpaceModel) -> None:
     assert misfits(truth, [replace(seen[0], measured=notched), *seen[1:]]) == ()
 
 
-def test_a_ceiling_that_is_too_low_is_given_up_and_named(truth: StateSpaceModel) -> None:
+def damaged(truth: StateSpaceModel) -> FrequencyResponse:
     """The roll angle's response came out far too small at low coherence; it has to be the roll rate's integral."""
     responses = measured(truth, noise=0.02)
     o, i = responses.place("phi", "lateral")
     low, coherence = responses.response.copy(), responses.coherence.copy()
     low[:, o, i] *= 1e-3
     coherence[:, o, i] = 0.1
-    damaged = replace(responses, response=low, coherence=coherence)
-    limit = ceiling(damaged, "phi", "lateral")
-    assert limit is not None
-    fit = fit_state_space(truth, damaged, starts=2)
+    return replace(responses, response=low, coherence=coherence)
+
+
+def test_a_ceiling_that_is_too_low_is_given_up_and_named(truth: StateSpaceModel) -> None:
+    fit = fit_state_space(truth, damaged(truth), starts=2)
     assert fit.cost < 10.0, fit  # a notch between two lines of v / lateral costs most of it
     assert any("where the flight shows nothing: phi / lateral" in text for text in fit.warnings), fit.warnings
-    end, cost = best_end(truth, (*fit.targets, limit), starts=1, iterations=30, seed=0, progress=None)
+
+
+@pytest.mark.proof
+def test_with_such_a_ceiling_nothing_fits(truth: StateSpaceModel) -> None:
+    responses = damaged(truth)
+    limit = ceiling(responses, "phi", "lateral")
+    assert limit is not None
+    every = targets(responses, [(o, i) for o in responses.outputs for i in responses.inputs])
+    end, cost = best_end(truth, (*every, limit), starts=1, iterations=30, seed=0, progress=None)
     together = [j for j, t in zip(cost.each(end.row), cost.targets, strict=True) if not t.ceiling]
     assert np.mean(together) > 50.0

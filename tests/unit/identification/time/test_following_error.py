@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache, partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -17,13 +18,16 @@ from simulated_flights import FREE, TIE, ten_seconds
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
+from swashplate.identification.core import robust
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
+from swashplate.identification.time import following_error
 from swashplate.identification.time.beginning import seen_at_start
 from swashplate.identification.time.calibration import first_part
 from swashplate.identification.time.following_error import (
     _AWAY,
     _SHARES,
+    Followed,
     FollowingError,
     _begun,
     _corrected,
@@ -39,6 +43,12 @@ def _likelihood() -> FollowingError:
     (record,) = records(ten_seconds().condition(rate=100.0, cutoff=0.0), sp.vehicle("coax"))
     noise = Noise(wind=0.1, speed=0.2, line_hertz=-34.4, sensor_heading=1e-3)
     return FollowingError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [first_part(record, 2.5)], noise=noise)
+
+
+@pytest.fixture
+def one_lane(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows one after the other: one program where eight lanes would be a second."""
+    monkeypatch.setattr(following_error, "_LANES", 1)
 
 
 def test_a_step_carries_the_covariance_by_the_slopes_of_the_equations() -> None:
@@ -144,6 +154,37 @@ def test_a_record_that_begins_in_a_maneuver_says_how_far_off_its_states_may_be()
     assert not np.any(_off(likelihood.table.vehicle, piece, run, lost))
 
 
+@pytest.mark.parametrize("name", [*FREE, "wind", "line_angle"])
+def test_scores_are_slopes_of_the_cost_whatever_the_filter(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Innovations and covariances that bend with all numbers, in the place of the filter's own."""
+    likelihood = FollowingError(_likelihood().table, _likelihood().pieces, noise=_likelihood().noise)
+
+    def some(model: Any, run: Any, readings: Any, spread: Any, placed: list[tuple[Any, Any]]) -> Followed:
+        told = np.array([np.concatenate([n.parameters, n.noise, n.nuisance]) for _, n in placed])
+        rng, (count, outputs) = np.random.default_rng(6), readings.shape
+        bent = np.sin(told * 10.0 ** -np.round(np.log10(np.abs(told) + 1e-6)) + 1.0)
+        ways = rng.standard_normal((bent.shape[1], count + outputs, outputs))
+        turned = np.tensordot(bent, ways, 1)
+        nu = rng.standard_normal((count, outputs)) + 0.3 * turned[:, :count]
+        root = np.eye(outputs) + 0.03 * np.tril(turned[:, count:])
+        S = np.repeat((root @ np.swapaxes(root, 1, 2))[:, None], count, axis=1)
+        return Followed(nu, S, FilterState(*[nu] * 4))
+
+    monkeypatch.setattr(following_error, "_along_some", some)
+    row = likelihood.row.starts() + 0.05 * np.random.default_rng(1).standard_normal(len(likelihood.row))
+    cost, gradient, information = likelihood.scores(row)
+    assert cost == pytest.approx(likelihood.cost(row), rel=1e-12)
+    place = likelihood.row.names.index(name)
+    step = 1e-4 * (np.arange(row.size) == place)
+    slope = (likelihood.cost(row + step) - likelihood.cost(row - step)) / 2e-4
+    assert gradient[place] == pytest.approx(slope, rel=1e-3, abs=1e-3 * np.sqrt(information[place, place]))
+    white, moved, rest = likelihood.whitened(row)
+    weighed = robust.weights(white[0])[None]
+    assert information == pytest.approx(np.einsum("pno,qno->pq", weighed * moved[0], moved[0]) + rest, rel=1e-9)
+
+
+@pytest.mark.proof
+@pytest.mark.usefixtures("one_lane")
 def test_the_gradient_is_the_slope_of_the_cost() -> None:
     likelihood = _likelihood()
     row = likelihood.row.starts() + 0.05 * np.random.default_rng(1).standard_normal(len(likelihood.row))
@@ -158,6 +199,42 @@ def test_the_gradient_is_the_slope_of_the_cost() -> None:
         assert gradient[place] == pytest.approx(slope, rel=0.01, abs=0.02 * size[place]), name
 
 
+@pytest.mark.proof
+def test_rows_side_by_side_are_those_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    likelihood = _likelihood()
+    row = likelihood.row.starts()
+    rows = [row, *(row + step for step in 1e-3 * np.eye(len(row)))]
+    (eight,) = likelihood._followed(rows)
+    monkeypatch.setattr(following_error, "_LANES", 1)
+    (one,) = likelihood._followed(rows)
+    for side, alone in zip(jax.tree.leaves(eight), jax.tree.leaves(one), strict=True):
+        np.testing.assert_allclose(side, alone, rtol=1e-9, atol=1e-11 * np.abs(alone).max())
+
+
+@pytest.mark.parametrize("count", [1, 3, 8, 11])
+def test_every_row_comes_back_in_its_place(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lanes that are left over repeat the last row; a row alone has one lane."""
+    likelihood, lanes = _likelihood(), []
+
+    def some(
+        model: object, run: object, readings: object, spread: object, placed: list[tuple[object, Any]]
+    ) -> Followed:
+        lanes.append(len(placed))
+        parameters = np.array([numbers.parameters for _, numbers in placed])
+        return Followed(parameters, parameters, FilterState(*[parameters] * 4))
+
+    monkeypatch.setattr(following_error, "_along_some", some)
+    row = likelihood.row.starts()
+    rows = [row * (1.0 + 0.01 * k) for k in range(count)]
+    (found,) = likelihood._followed(rows)
+    given = likelihood.table.card_row, np.array(likelihood.noise)
+    expected = [likelihood._runs[0].placed(*given, one * likelihood.row.scale)[1].parameters for one in rows]
+    np.testing.assert_array_equal(found.innovations, expected)
+    assert lanes == ([1] if count == 1 else [8] * -(-count // 8))
+
+
+@pytest.mark.proof
+@pytest.mark.usefixtures("one_lane")
 def test_slopes_whiten_as_the_scores_count_them() -> None:
     likelihood = _likelihood()
     row = likelihood.row.starts()

@@ -149,13 +149,18 @@ def test_slopes_by_differences_of_runs_are_those_along_tangent_planes() -> None:
     np.testing.assert_allclose(information / np.outer(size, size), curved / np.outer(size, size), atol=1e-4)
 
 
-def test_records_longer_than_a_stretch_and_beside_others_are_run_alike() -> None:
-    """Two records in one likelihood cost what each costs alone, and a stretch's end leaves no trace."""
+def test_records_beside_others_are_run_alike() -> None:
+    """Two records in one likelihood cost what each costs alone."""
     whole = _prediction_error()
     row = _somewhere(whole)
-    piece = _start()
-    both = PredictionError(whole.table, [piece, piece])
+    both = PredictionError(whole.table, [_start(), _start()])
     assert both.cost(row) == pytest.approx(2.0 * whole.cost(row), rel=1e-12)
+
+
+@pytest.mark.proof
+def test_the_end_of_a_stretch_leaves_no_trace() -> None:
+    whole, piece = _prediction_error(), _start()
+    row = _somewhere(whole)
     assert piece.time.size > STRETCH
     values = jax.jit(traced_innovations, static_argnums=0, compiler_options=RUN_RARELY)(
         *whole.traced_at(), jnp.asarray(row)
