@@ -92,7 +92,8 @@ def test_a_dropped_log_gives_gains_within_a_minute_and_four_clicks(
         visit.close()
 
 
-# ---- two: a student with a CSV of his own, in a notebook -------------------------------------------------------------
+# ---- two: a student with a CSV of his own, in a notebook; its cells run always, as a page (test_pages.py) ------------
+@pytest.mark.proof
 def test_a_notebook_is_told_of_a_flipped_gyro_mends_it_and_identifies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -144,7 +145,8 @@ def installed(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return there / "bin" / "python"
 
 
-@pytest.mark.parametrize("seconds", [5.0, pytest.param(MINUTE, marks=pytest.mark.proof)])
+@pytest.mark.proof  # that a wheel runs elsewhere is always tried by tests/cli/test_wheel.py, the keys on the live page
+@pytest.mark.parametrize("seconds", [5.0, MINUTE])
 def test_an_installed_wheel_is_flown_by_keys(seconds: float, installed: Path, browser: Any, tmp_path: Path) -> None:
     """A newcomer's first flight: the Raptor, short presses of every key, nothing falls, nothing complains."""
     where = [str(installed), "-c", "import swashplate; print(swashplate.__file__)"]

@@ -127,9 +127,14 @@ def test_the_helicopter_moves_under_the_stick_and_charts_advance(visit_: Any, co
     visit.until(f"swash.scene.crafts.own.model.phases[0] !== {turned}")
     visit.stick()
     visit.until("Math.abs(swash.now.stick) > 1")
+    visit.page.click("#record")
+    visit.until("swash.now.recording > 0.1")
+    visit.page.click("#record")
+    visit.until("swash.now.recording === null")
     visit.done()
 
 
+@pytest.mark.proof
 def test_a_linear_model_moves_under_the_stick_and_says_what_it_is(visit_: Any, tmp_path: Path) -> None:
     with _served("live", "thirteen_state", cwd=tmp_path) as url:
         visit = visit_(url).flies()
@@ -247,6 +252,7 @@ def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...], how: str
     report.close()
 
 
+@pytest.mark.proof
 def test_what_is_recorded_is_identified_and_reported(visit_: Any, coax: str) -> None:
     visit = visit_(coax).flies()
     visit.page.click("[data-mode=held]")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from swashplate.reporting.control_check import compose_check
 from swashplate.reporting.html import write_page
 from swashplate.reporting.report import report
 from swashplate.reporting.straightness import compose_straightness
+from swashplate.reporting.structure import Report
 
 NASTY = "<script>document.title='broken'</script><img src=x onerror=\"document.title='broken'\">.mat"
 SIZES = {"desk": (1200, 900), "telephone": (390, 844)}
@@ -39,37 +41,45 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.fixture(scope="module")
-def controllers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Reports about a controller: its check, and the paper's comparison of paths."""
+def controllers(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Reports about a controller, each made when it is asked for: its check, and the paper's comparison of paths."""
     folder = tmp_path_factory.mktemp("controllers")
     coax = sp.vehicle("coax")
     hover = sp.trim(coax)
-    runs = {
-        name: step_run(coax, sp.autopilot(coax, hover, mode="manual", decoupled=law), hover, command=0.2)
-        for name, law in (("without", False), ("with", True))
-    }
-    check = check_controller(coax, sp.autopilot(coax, hover), hover, duration=6.0)
-    return {
-        "check": write_page(folder / "check.html", compose_check(check)),
-        "path": write_page(folder / "path.html", compose_straightness(coax, runs, command=0.2, lag=17.0)),
-    }
+
+    def composed(name: str) -> Report:
+        if name == "check":
+            return compose_check(check_controller(coax, sp.autopilot(coax, hover), hover, duration=6.0))
+        runs = {
+            law: step_run(coax, sp.autopilot(coax, hover, mode="manual", decoupled=by), hover, command=0.2)
+            for law, by in (("without", False), ("with", True))
+        }
+        return compose_straightness(coax, runs, command=0.2, lag=17.0)
+
+    return lru_cache(lambda name: write_page(folder / f"{name}.html", composed(name)))
 
 
 @pytest.fixture(scope="module")
-def visit(browser: Any, written: dict[str, Path]) -> Any:
+def visit(browser: Any, written: dict[str, Path], controllers: Callable[[str], Path]) -> Any:
     """Opens a report at a size, once for all tests: reading plotly takes a browser seconds."""
     visits: dict[tuple[str, str], Visit] = {}
 
     def open_(name: str, size: str) -> Visit:
         if (name, size) not in visits:
-            visits[name, size] = Visit(browser, written[name], SIZES[size])
+            visits[name, size] = Visit(browser, written.get(name) or controllers(name), SIZES[size])
         return visits[name, size]
 
     return open_
 
 
 @pytest.mark.parametrize(
-    ("name", "size"), [("both", "desk"), ("both", "telephone"), ("failed", "telephone"), ("validation", "desk")]
+    ("name", "size"),
+    [
+        ("both", "desk"),
+        ("failed", "telephone"),
+        pytest.param("both", "telephone", marks=pytest.mark.proof),
+        pytest.param("validation", "desk", marks=pytest.mark.proof),
+    ],
 )
 def test_draws_everything_and_fetches_nothing(visit: Any, name: str, size: str) -> None:
     seen = visit(name, size)
@@ -85,11 +95,16 @@ def test_draws_everything_and_fetches_nothing(visit: Any, name: str, size: str) 
     assert all(abs(each["drawing"] - each["width"]) <= 1 for each in drawn)
 
 
-@pytest.mark.parametrize(("name", "size"), [("check", "telephone"), ("check", "desk"), ("path", "telephone")])
-def test_reports_about_controllers_draw_everything_in_its_place(
-    browser: Any, controllers: dict[str, Path], name: str, size: str
-) -> None:
-    seen = Visit(browser, controllers[name], SIZES[size])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("check", "telephone"),
+        pytest.param("check", "desk", marks=pytest.mark.proof),
+        pytest.param("path", "telephone", marks=pytest.mark.proof),
+    ],
+)
+def test_reports_about_controllers_draw_everything_in_its_place(visit: Any, name: str, size: str) -> None:
+    seen = visit(name, size)
     assert seen.said == []
     assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)
     page = seen.page
@@ -104,10 +119,9 @@ def test_reports_about_controllers_draw_everything_in_its_place(
     assert all(drawn)
     page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     assert page.evaluate("document.documentElement.scrollWidth") <= SIZES[size][0]
-    page.close()
 
 
-@pytest.mark.parametrize("name", ["both", "failed"])
+@pytest.mark.parametrize("name", ["failed", pytest.param("both", marks=pytest.mark.proof)])
 def test_nothing_overflows_a_telephone(visit: Any, name: str) -> None:
     page = visit(name, "telephone").page
     page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
@@ -171,8 +185,8 @@ def test_panels_zoom_in_time_together(visit: Any) -> None:
     assert all(found == [3, 5] for found in ranges)
 
 
-def test_a_reader_chooses_dark_and_the_unit_of_frequency(browser: Any, controllers: dict[str, Path]) -> None:
-    seen = Visit(browser, controllers["check"], SIZES["desk"])
+def test_a_reader_chooses_dark_and_the_unit_of_frequency(visit: Any) -> None:
+    seen = visit("check", "telephone")
     page = seen.page
     first = "(document.getElementById('loops-bode')._fullData[0].x[0])"
     title = "document.getElementById('loops-bode')._fullLayout.xaxis2.title.text"
@@ -191,11 +205,10 @@ def test_a_reader_chooses_dark_and_the_unit_of_frequency(browser: Any, controlle
     page.pdf(format="A4")
     assert page.locator("#look").inner_text() == "Light", "paper is printed light, the screen stays dark"
     assert seen.said == []
-    page.close()
 
 
 def test_paper_shows_folded_sections(visit: Any, tmp_path: Path) -> None:
-    page = visit("validation", "desk").page
+    page = visit("both", "desk").page  # last, for it is drawn anew
     content = page.pdf(path=str(tmp_path / "report.pdf"), format="A4")
     assert content.startswith(b"%PDF")
     assert page.evaluate("document.querySelectorAll('.canvas svg.main-svg').length") > 0

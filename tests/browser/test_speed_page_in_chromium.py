@@ -18,8 +18,15 @@ def browser() -> Iterator[Any]:
     yield from running_browser()
 
 
-@pytest.mark.parametrize("verb", ["trim", "derivatives"])
-@pytest.mark.parametrize("size", [(1200, 900), (390, 844)])
+@pytest.mark.parametrize(
+    ("verb", "size"),
+    [
+        ("trim", (1200, 900)),
+        pytest.param("trim", (390, 844), marks=pytest.mark.proof),
+        pytest.param("derivatives", (1200, 900), marks=pytest.mark.proof),
+        ("derivatives", (390, 844)),
+    ],
+)
 def test_the_page_is_drawn_says_nothing_and_fetches_nothing(
     browser: Any, tmp_path: Path, verb: str, size: tuple[int, int]
 ) -> None:

@@ -204,6 +204,7 @@ def test_places_that_cannot_be_written_to_are_found_first(records: Path, tmp_pat
     assert "is not a folder and not a file" in one_message(swash("bench", tmp_path / "nothing"))
 
 
+@pytest.mark.proof  # what a card fixes and holds is in tests/unit/identification/core/test_prior_card.py
 def test_a_bench_card_is_the_prior_of_a_flight(records: Path, simulated: Path, tmp_path: Path) -> None:
     assert swash("bench", records, "--out", tmp_path / "card.toml", "--quiet").code == 0
     asked = ("--free", ",".join(FREE), "--tie", TIE, "--method", "output-error")
@@ -217,7 +218,10 @@ def test_a_bench_card_is_the_prior_of_a_flight(records: Path, simulated: Path, t
     card = read_card(tmp_path / "fit" / "model.toml")
     assert card.parameters["tau_drive_upper"].source.startswith("bench: drive_steps")
     assert "Prior and flight" in (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
-    two = swash("identify", "--vehicle", "coax", "--flight", simulated, "--prior", "coax", "--prior", "card.toml")
-    assert "are two cards" in one_message(two)
     none = swash("identify", "--vehicle", "coax", "--flight", simulated, "--prior", "coax")
     assert "no parameter with status measured" in one_message(none)
+
+
+def test_a_prior_of_two_cards_is_refused() -> None:
+    two = swash("identify", "--vehicle", "coax", "--flight", "any.nc", "--prior", "coax", "--prior", "card.toml")
+    assert "are two cards" in one_message(two)

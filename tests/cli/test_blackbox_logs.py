@@ -95,7 +95,7 @@ def test_gains_come_in_the_firmwares_own_names(chirped: Path, tmp_path: Path) ->
 
 
 def test_a_flight_of_feedback_alone_is_refused_in_words(tmp_path: Path) -> None:
-    (tmp_path / "calm.bbl").write_bytes(flown(chirp=False))
+    (tmp_path / "calm.bbl").write_bytes(flown(chirp=False, seconds=20.0))
     arguments = ("respond", tmp_path / "calm.bbl", "--inputs", "mixer_roll", "--outputs", "p", "--band", "0.5-8")
     outcome = swash(*arguments)
     assert outcome.code == 2

@@ -17,6 +17,14 @@ from swashplate.control.laws.autopilot import autopilot
 from swashplate.errors import ControllerError
 
 
+@pytest.fixture(scope="module")
+def held(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of a law that holds its place."""
+    file = tmp_path_factory.mktemp("held") / "place.toml"
+    assert swash("decouple", "coax", "--mode", "place", "--out", file, "--quiet").code == 0
+    return file
+
+
 def test_figure_10_by_two_commands(tmp_path: Path) -> None:
     drift = {}
     for name, options, lag in (
@@ -174,10 +182,10 @@ def test_the_step_is_flown_on_models_that_the_data_cannot_tell_apart(tmp_path: P
     assert "--fit: is for the paths of a --step" in outcome.err
 
 
-def test_many_flights_are_summarised_and_the_worst_is_kept(tmp_path: Path) -> None:
-    controller, worst = tmp_path / "place.toml", tmp_path / "worst.nc"
-    assert swash("decouple", "coax", "--mode", "place", "--out", controller, "--quiet").code == 0
-    command = ("simulate", "--vehicle", "coax", "--controller", controller, "--out", worst, "--monte-carlo", "20")
+@pytest.mark.proof  # test_linear_monte_carlo.py flies many in short, tests/unit/control/draws many of the coax
+def test_many_flights_are_summarised_and_the_worst_is_kept(held: Path, tmp_path: Path) -> None:
+    worst = tmp_path / "worst.nc"
+    command = ("simulate", "--vehicle", "coax", "--controller", held, "--out", worst, "--monte-carlo", "20")
     outcome = swash(*command, "--maneuver", "doublet:pitch,1s,0.1", "--gusts", "indoor", "--sag", "0.1", "--seed", "3")
     assert outcome.code == 0, outcome.err
     assert "20 flights, 0 lost" in outcome.out
@@ -195,6 +203,11 @@ def test_many_flights_are_summarised_and_the_worst_is_kept(tmp_path: Path) -> No
     assert found["limits"]["place"]["value"] is None
     assert found["worst"]["lean"] == pytest.approx(found["figures"]["lean, largest [deg]"][-1])
     assert "LOST: 20 of 20 flights lost" in page.read_text(encoding="utf-8")
+
+
+def test_many_flights_that_cannot_be_are_refused(held: Path, tmp_path: Path) -> None:
+    worst = tmp_path / "worst.nc"
+    command = ("simulate", "--vehicle", "coax", "--controller", held, "--out", worst, "--monte-carlo", "20")
     for text, said in (
         ("lean=0", "--limit: lean is 0, expected more than 0 deg"),
         ("drift=1m", "--limit: 'drift' is no limit; expected lean, rate, place, height, heading"),
@@ -211,10 +224,9 @@ def test_many_flights_are_summarised_and_the_worst_is_kept(tmp_path: Path) -> No
     assert "--gusts: is for --monte-carlo" in windy.err
 
 
-def test_a_controller_is_checked_and_the_report_written(tmp_path: Path) -> None:
-    controller, out = tmp_path / "place.toml", tmp_path / "check"
-    assert swash("decouple", "coax", "--mode", "place", "--out", controller, "--quiet").code == 0
-    outcome = swash("control", "check", "coax", "--controller", controller, "--out", out)
+def test_a_controller_is_checked_and_the_report_written(held: Path, tmp_path: Path) -> None:
+    out = tmp_path / "check"
+    outcome = swash("control", "check", "coax", "--controller", held, "--out", out)
     assert outcome.code == 0, outcome.err
     assert "all at once: gain +- 3.9 dB" in outcome.out
     assert "provisional" in outcome.out
@@ -228,7 +240,7 @@ def test_a_controller_is_checked_and_the_report_written(tmp_path: Path) -> None:
     assert "Disturbance rejection" in page
     assert "Level 2" in page
     for options, level in ((("--scale", "1"), 1), (("--task", "tracking"), 3)):
-        again = swash("control", "check", "coax", "--controller", controller, *options, "--json")
+        again = swash("control", "check", "coax", "--controller", held, *options, "--json")
         assert json.loads(again.out)["handling"]["phi"]["level"] == level
 
 
@@ -265,10 +277,9 @@ def test_the_papers_figure_as_a_report(tmp_path: Path) -> None:
 
 
 @pytest.mark.proof
-def test_aircraft_that_differ_by_more_than_a_fit_says(tmp_path: Path) -> None:
-    controller, worst = tmp_path / "place.toml", tmp_path / "worst.nc"
-    assert swash("decouple", "coax", "--mode", "place", "--out", controller, "--quiet").code == 0
-    command = ("simulate", "--vehicle", "coax", "--controller", controller, "--out", worst)
+def test_aircraft_that_differ_by_more_than_a_fit_says(held: Path, tmp_path: Path) -> None:
+    worst = tmp_path / "worst.nc"
+    command = ("simulate", "--vehicle", "coax", "--controller", held, "--out", worst)
     many = (*command, "--maneuver", "doublet:pitch,1s,0.1", "--monte-carlo", "20")
     scatter = ("--battery", "12.5-10.5", "--vary", "linkage_lower=10%", "--payload", "0.02", "--delay", "0.015")
     outcome = swash(*many, *scatter)

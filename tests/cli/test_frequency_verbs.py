@@ -302,7 +302,7 @@ def test_an_unstable_start_is_named_and_the_fit_is_kept(folder: Path, answered: 
         ready.replace('Lb = {value = 1000.0, unit = "1/s^2", lower = 0.0}', "Lb = {value = -1000.0}"), encoding="utf-8"
     )
     out = folder / "unstable"
-    done = swash("fit-ss", text, answered, "--out", out)
+    done = swash("fit-ss", text, answered, "--starts", "1", "--out", out)
     assert done.code == 2
     assert "is unstable" in done.err
     assert (out / "fit.json").is_file()
@@ -387,10 +387,10 @@ def test_a_stopped_fit_is_kept_as_far_as_it_came(
 
 
 def test_a_channel_of_another_name_is_flown_along_where_asked_or_where_the_responses_say_so(
-    folder: Path, flown: Path
+    folder: Path,
 ) -> None:
-    other = folder / "other.csv"
-    other.write_text(flown.read_text(encoding="utf-8").replace(",p [rad/s]", ",p_gyro [rad/s]"), encoding="utf-8")
+    other = log(folder / "other.csv", seed=6, seconds=40.0)
+    other.write_text(other.read_text(encoding="utf-8").replace(",p [rad/s]", ",p_gyro [rad/s]"), encoding="utf-8")
     renamed = folder / "renamed"
     ask = ("--inputs", "mixer_roll,mixer_pitch", "--outputs", "p=p_gyro,q", "--band", "0.2-12")
     assert swash("respond", other, *ask, "--out", renamed).code == 0

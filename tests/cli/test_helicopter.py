@@ -125,19 +125,19 @@ def test_primed_rows_mix_roll_and_yaw_by_the_product_of_inertia() -> None:
 
 
 def test_uncertainty_bounds_hold_the_cards_value_and_repeat() -> None:
-    arguments = ("derivatives", "raptor50", "--uncertainty", "--draws", "20", "--json")
+    arguments = ("derivatives", "raptor50", "--uncertainty", "--draws", "10", "--json")
     first, second = swash(*arguments), swash(*arguments)
     assert first.out == second.out
     document = json.loads(first.out)["tables"][0]
     found = document["derivatives"]
-    assert (document["draws"], document["refused"]) == (20, 0)
+    assert (document["draws"], document["refused"]) == (10, 0)
     assert [mode["real"]["value"] for mode in document["modes"]] == pytest.approx(
         [m["real"] for m in json.loads(swash("linearize", "raptor50", "--json").out)["models"][0]["modes"] if m["real"]]
     )
     assert all(mode["real"]["5 %"] < mode["real"]["value"] < mode["real"]["95 %"] for mode in document["modes"][:3])
     for name in ("Lp", "Mq", "Zw", "Xu"):
         assert found[name]["5 %"] < found[name]["value"] < found[name]["95 %"]
-    assert "5 % and 95 % bounds of 20 samples" in swash(*arguments[:-1]).out
+    assert "5 % and 95 % bounds of 10 samples" in swash(*arguments[:-1]).out
 
 
 def test_a_sweep_in_hover_is_flown_and_saved(tmp_path: Path) -> None:

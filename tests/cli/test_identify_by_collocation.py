@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from commands import one_message, swash
 
 import swashplate as sp
 from rolling import SAME, TRUTH, gusty
 
 
-def test_a_model_file_is_identified_by_collocation(tmp_path: Path) -> None:
-    gusty().save(tmp_path / "flight.nc")
-    (tmp_path / "roll.toml").write_text(SAME, encoding="utf-8")
-    asked = ("identify", "--vehicle", tmp_path / "roll.toml", "--flight", tmp_path / "flight.nc", "--rate", "50")
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory: pytest.TempPathFactory) -> tuple[str | Path, ...]:
+    folder = tmp_path_factory.mktemp("roll")
+    gusty().save(folder / "flight.nc")
+    (folder / "roll.toml").write_text(SAME, encoding="utf-8")
+    return ("identify", "--vehicle", folder / "roll.toml", "--flight", folder / "flight.nc", "--rate", "50")
+
+
+@pytest.mark.proof  # the estimator itself is in tests/unit/identification/time/test_collocation.py
+def test_a_model_file_is_identified_by_collocation(asked: tuple[str | Path, ...], tmp_path: Path) -> None:
     done = swash(*asked, "--method", "collocation", "--outputs", "p,pdot,ay", "--out", tmp_path / "fit")
     assert done.code == 0, done.err
     assert "roll by collocation: converged" in done.out
@@ -24,6 +31,9 @@ def test_a_model_file_is_identified_by_collocation(tmp_path: Path) -> None:
         assert model.structure is not None
         assert model.structure.parameters[name].value == fit[name].value
     assert "identified in time" in (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_method_that_is_none_is_refused(asked: tuple[str | Path, ...]) -> None:
     message = one_message(swash(*asked, "--method", "magic"))
     assert "expected one of" in message
     assert "collocation" in message

@@ -73,7 +73,10 @@ COMMAND = "Install it with: pip install 'swashplate[model]'"
 
 def test_the_light_verbs_do_without_what_the_others_name(tmp_path: Path) -> None:
     """One cold process in which the extras' libraries cannot be imported."""
-    flown, unseen = log(tmp_path / "flown.csv", seed=1), log(tmp_path / "unseen.csv", seed=2, seconds=40.0)
+    flown, unseen = (
+        log(tmp_path / f"{name}.csv", seed=seed, seconds=seconds)
+        for name, seed, seconds in (("flown", 1, 60.0), ("unseen", 2, 20.0))
+    )
     answers, model = tmp_path / "responses", tmp_path / "model"
     light: list[list[object]] = [
         ["inspect", flown],
@@ -135,7 +138,13 @@ def test_a_log_with_attitude_is_inspected_without_what_is_slow_to_import(tmp_pat
         "import swashplate.flights.spectrum, dask.base\n"
         "print([name for name in ('scipy', 'dask.base') if name in sys.modules])"
     )
-    words = [sys.executable, "-c", code, log(tmp_path / "flown.csv", seed=1), str(tmp_path / "turned.csv")]
+    words = [
+        sys.executable,
+        "-c",
+        code,
+        log(tmp_path / "flown.csv", seed=1, seconds=20.0),
+        str(tmp_path / "turned.csv"),
+    ]
     ran = subprocess.run(words, capture_output=True, text=True, check=True, timeout=300)
     assert ran.stdout.splitlines() == ["[0, 0]", "[]", "['scipy', 'dask.base']"]
 

@@ -42,10 +42,14 @@ def test_draws_keep_the_fits_correlation_and_ties_follow(tmp_path: Path) -> None
         draw_models(model, fit_of(tmp_path / "fit.json", structure("six_dof"), ("Lp", "Mq")), count=2, seed=1)
 
 
-def test_linear_models_are_flown_in_many_versions(tmp_path: Path) -> None:
+OBSERVED = ("--sensors", "gyro@50,mocap@50", "--gain", "steady")
+
+
+@pytest.mark.parametrize("law", [("--method", "lqr"), pytest.param(OBSERVED, marks=pytest.mark.proof)])
+def test_linear_models_are_flown_in_many_versions(law: tuple[str, ...], tmp_path: Path) -> None:
     controller, worst = tmp_path / "linear.toml", tmp_path / "worst.nc"
-    design = ("control", "design", "thirteen_state", "--sensors", "gyro@50,mocap@50", "--rate", "50")
-    assert swash(*design, "--gain", "steady", "--out", controller, "--quiet").code == 0
+    design = ("control", "design", "thirteen_state", *law, "--rate", "50")
+    assert swash(*design, "--out", controller, "--quiet").code == 0
     fly = ("simulate", "--vehicle", "thirteen_state", "--controller", controller, "--out", worst)
     many = (*fly, "--maneuver", "doublet:lateral,0.5s,0.1", "--monte-carlo", "5")
     outcome = swash(*many, "--fit", fit_of(tmp_path / "fit.json"), "--vary", "Xu=20%")

@@ -94,6 +94,7 @@ def test_a_link_in_a_process_of_its_own(tmp_path: Path) -> None:
     assert flight.values("motor_lower")[-1] == pytest.approx(0.3)
 
 
+@pytest.mark.proof  # files that grow and are cut off are in tests/unit/links/test_recorder.py
 def test_a_killed_link_loses_nothing_of_what_it_answered(tmp_path: Path) -> None:
     """`kill -9` in flight, beside an older file of that name; the next link saves the flight before it begins."""
     record = tmp_path / "flown.nc"
@@ -141,11 +142,15 @@ def test_listening_beyond_this_machine_is_warned_of() -> None:
     assert "Listening beyond this machine" in outcome.err
 
 
+@pytest.mark.proof  # what the file says is in tests/unit/links/test_link_parameters.py
 def test_parameters_for_ardupilot_are_written_and_nothing_waits(tmp_path: Path) -> None:
     file = tmp_path / "raptor50.parm"
     outcome = swash("link", "ardupilot", "--vehicle", "raptor50", "--write-parameters", file)
     assert outcome.code == 0, outcome.err
     assert f"written: {file}" in " ".join(outcome.err.split())
     assert "H_SW_TYPE,3\n" in file.read_text(encoding="utf-8")
+
+
+def test_a_place_where_no_parameters_can_be_written_is_refused(tmp_path: Path) -> None:
     refused = swash("link", "ardupilot", "--vehicle", "raptor50", "--write-parameters", tmp_path / "no" / "x.parm")
     assert "the folder does not exist" in one_message(refused)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
+import inspect
 import re
 import runpy
 import sys
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,6 +18,7 @@ import pytest
 import typer
 
 import report_samples
+import swashplate as sp
 from swashplate.cli.app import app
 from swashplate.flights import datasets
 from swashplate.reporting.compose import compose
@@ -35,6 +39,17 @@ def _script(name: str) -> ModuleType:
 
 running, docs, diagram = _script("docs_running"), _script("docs_pages"), _script("block_diagram")
 PAGES = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in docs.pages()}
+HEAVY = {
+    "docs/explanation/flights-under-feedback.md",
+    "docs/explanation/lpv.md",
+    "docs/explanation/round-earth.md",
+    "docs/howto/check-a-controller.md",
+    "docs/howto/decouple-and-hold.md",
+    "docs/howto/fly-under-ardupilot-or-px4.md",
+    "docs/howto/train-a-policy.md",
+    "docs/notebooks/log-to-flight.md",
+}
+"""Pages that fly and compile long for themselves alone; what they call is run in short by tests/cli and tests/unit."""
 COMMANDS = [
     (name, command)
     for name, text in PAGES.items()
@@ -50,7 +65,12 @@ def _anchors(text: str) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("name", [name for name, text in PAGES.items() if running.runs_something(text)])
+def _run(name: str) -> Any:
+    """A page as a parameter."""
+    return pytest.param(name, marks=[pytest.mark.proof] if name in HEAVY else [])
+
+
+@pytest.mark.parametrize("name", [_run(name) for name, text in PAGES.items() if running.runs_something(text)])
 def test_a_page_runs_and_prints_what_it_says(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     mpl.use("Agg")
@@ -65,11 +85,44 @@ def test_a_page_runs_and_prints_what_it_says(name: str, tmp_path: Path, monkeypa
         pytest.skip(f"the flights of coax56 are not here; not run: {'; '.join(left_out)}")
 
 
+def calls_that_fail(program: str) -> list[str]:
+    """Public names that a program uses and that there are not, and arguments by name that they do not take."""
+    wrong = []
+    for node in ast.walk(ast.parse(program)):
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "sp" and not hasattr(sp, node.attr):
+            wrong.append(node.attr)
+        elif isinstance(node, ast.Call) and (name := ast.unparse(node.func))[:3] == "sp." and hasattr(sp, name[3:]):
+            taken = inspect.signature(getattr(sp, name[3:])).parameters
+            if not any(each.kind is each.VAR_KEYWORD for each in taken.values()):
+                wrong += [f"{name}: {k.arg}" for k in node.keywords if k.arg and k.arg not in taken]
+    return wrong
+
+
+@pytest.mark.parametrize("name", sorted(HEAVY))
+def test_a_heavy_page_calls_what_there_is(name: str) -> None:
+    programs = [fence.text for fence in running.fences(PAGES[name]) if fence.language == "python"]
+    assert programs or [command for page, command in COMMANDS if page == name]
+    assert [wrong for program in programs for wrong in calls_that_fail(program)] == []
+
+
+def test_a_call_of_what_there_is_not_is_found() -> None:
+    assert calls_that_fail("import swashplate as sp\nsp.trim(sp.no_vehicle('coax'), spead=2.0, **more)") == [
+        "sp.trim: spead",
+        "no_vehicle",
+    ]
+
+
 @pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.name)
 def test_an_example_runs(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(example), run_name="__main__")
     assert list(tmp_path.iterdir()), "an example leaves something to look at"
+
+
+@lru_cache
+def _command_line() -> Any:
+    """Building it takes a quarter of a second."""
+    return typer.main.get_command(app)
 
 
 @pytest.mark.parametrize(("name", "command"), COMMANDS, ids=[f"{name}: {c.line[:60]}" for name, c in COMMANDS])
@@ -81,7 +134,7 @@ def test_a_command_is_one_that_the_command_line_takes(name: str, command: Any) -
         assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE)
         return
     assert words[0] == "swash", f"{name}: `{command.line}` is neither swash nor make"
-    parsed, rest = typer.main.get_command(app), words[1:]
+    parsed, rest = _command_line(), words[1:]
     context = parsed.make_context("swash", list(rest), resilient_parsing="--help" in rest)
     while hasattr(parsed, "commands") and rest and rest[0] in parsed.commands:
         parsed, rest = parsed.commands[rest[0]], rest[1:]

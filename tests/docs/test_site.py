@@ -1,12 +1,19 @@
-"""The site: it builds without a warning, its links and pictures are there, a browser searches and follows a door."""
+"""The site: it builds without a warning, its links and pictures are there, a browser searches and follows a door.
+
+Building all of it takes half a minute: that is `proof`. What runs always is a site of the pages that a reader comes to
+first, and a look at every page's source for what Sphinx would complain about.
+"""
 
 from __future__ import annotations
 
 import json
+import posixpath
 import re
+import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from html import unescape
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -23,22 +30,51 @@ import docs_running  # noqa: E402
 import real_results  # noqa: E402
 import site_pages  # noqa: E402
 import site_reference  # noqa: E402
+from pygments.filters import ErrorToken  # noqa: E402
+from pygments.lexers import get_lexer_by_name  # noqa: E402
+from pygments.lexers.special import TextLexer  # noqa: E402
+from pygments.util import ClassNotFound  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
 _TARGET = re.compile(r'<(?:a|img|script|link)\b[^>]*?\b(?:href|src)="([^"]*)"')
+_FENCED = re.compile(r"^(`{3,}).*?^\1$\n?", re.DOTALL | re.MULTILINE)
 _ID = re.compile(r'\bid="([^"]+)"')
+
+
+PAGES = {str(page.relative_to(ROOT / "docs")): page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md")}
+_FIRST = ("index.md", "doors/", "notebooks/", "learn.md", "explanation/index.md", "reference/index.md")
+_ALSO = ("developers/index.md", "howto/fly-a-sweep.md", "howto/identify-from-a-sweep.md")
+_AWAY = ["-D", "suppress_warnings=myst.xref_missing,toc.not_readable"]
+"""A small site lacks pages that others lead to; whether they are in the sources is asked of every page's text."""
+
+
+def built(folder: Path, *options: str, docs: Path = DOCS) -> Path:
+    """A site, built as `make site` builds it but for the options."""
+    command = [*build_site.command(folder / "site", folder / "known"), *options]
+    command[command.index(str(DOCS))] = str(docs)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return folder / "site"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site of `make site`."""
+    assert "scripts/build_site.py" in (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nsite:")[2][:80]
+    return built(tmp_path_factory.mktemp("whole"))
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built as `make site` builds it."""
+    """A site of the pages that a reader comes to first."""
     folder = tmp_path_factory.mktemp("site")
-    done = subprocess.run(
-        build_site.command(folder / "site", folder / "pages"), capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr + done.stdout
-    assert "scripts/build_site.py" in (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nsite:")[2][:80]
-    return folder / "site"
+    docs = folder / "docs"
+    for name in (name for name in PAGES if name.startswith((*_FIRST, *_ALSO))):
+        (docs / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(DOCS / name, docs / name)
+    shutil.copytree(DOCS / "pictures", docs / "pictures")
+    return built(folder, *_AWAY, docs=docs)
 
 
 def dead_links(site: Path) -> list[str]:
@@ -59,10 +95,86 @@ def dead_links(site: Path) -> list[str]:
     return dead
 
 
-def test_every_page_is_on_the_site_and_every_link_leads_somewhere(site: Path) -> None:
-    pages = {page.relative_to(ROOT / "docs").with_suffix(".html") for page in (ROOT / "docs").rglob("*.md")}
-    assert {page for page in pages if not (site / page).is_file()} == set()
-    assert dead_links(site) == []
+@pytest.mark.proof
+def test_every_page_is_on_the_site_and_every_link_leads_somewhere(whole: Path) -> None:
+    pages = {Path(name).with_suffix(".html") for name in PAGES}
+    assert {page for page in pages if not (whole / page).is_file()} == set()
+    assert dead_links(whole) == []
+
+
+def _headings(page: str) -> list[tuple[int, str]]:
+    prose = _FENCED.sub("", page)
+    return [(len(marks), words) for marks, words in re.findall(r"^(#+) (.+)$", prose, re.MULTILINE)]
+
+
+def _coloured(fence: docs_running.Fence) -> str:
+    """What the colouring of a fence stumbles over; "" where nothing."""
+    try:
+        lexer = TextLexer() if fence.language == "csv" else get_lexer_by_name(fence.language)
+        lexer.add_filter("raiseonerror")
+        list(lexer.get_tokens(fence.text))
+    except (ClassNotFound, ErrorToken) as wrong:
+        return f"{fence.language}: {wrong}"
+    return ""
+
+
+def complaints(name: str, pages: Mapping[str, str]) -> list[str]:
+    """What Sphinx would say about a page: its headings, links, pictures and fences."""
+    page = pages[name]
+    levels = [level for level, _ in _headings(page)]
+    said = [_coloured(fence) for fence in docs_running.fences(page)]
+    if levels[:1] != [1] or any(after > before + 1 for before, after in pairwise(levels)):
+        said.append(f"headings of the levels {levels}")
+    for target in re.findall(r"\]\(([^)\s]+)\)", _FENCED.sub("", page)):
+        path, _, anchor = target.partition("#")
+        place = posixpath.normpath(posixpath.join(posixpath.dirname(name), path)) if path else name
+        if target.startswith(("http://", "https://", "mailto:")):
+            continue
+        if not (place in pages if place.endswith(".md") else (DOCS / place).is_file()):
+            said.append(f"{target} is not there")
+        elif anchor:
+            slugs = {re.sub(r"[^\w\- ]", "", words.lower()).replace(" ", "-") for _, words in _headings(pages[place])}
+            said += [] if anchor in slugs else [f"{target} has no such heading"]
+    return [each for each in said if each]
+
+
+@pytest.fixture(scope="module")
+def read() -> dict[str, str]:
+    """Every page as Sphinx gets it."""
+    made = {name: [text] for name, text in PAGES.items()}
+    for name, source in made.items():
+        site_pages._read(None, name.removesuffix(".md"), source)
+    return {name: source[0] for name, source in made.items()}
+
+
+def test_no_page_gives_sphinx_a_reason_to_complain(read: dict[str, str]) -> None:
+    assert {name: said for name in read if (said := complaints(name, read))} == {}
+
+
+def test_every_page_is_in_the_navigation(read: dict[str, str]) -> None:
+    """Sphinx says so too, when it builds the whole site."""
+    seen, waiting = set(), ["index"]
+    while waiting:
+        page = waiting.pop()
+        seen.add(page)
+        trees = re.findall(r"^```\{toctree\}\n(?::[^\n]*\n)*\n(.*?)\n```", read[f"{page}.md"], re.DOTALL | re.MULTILINE)
+        below = [posixpath.normpath(posixpath.join(posixpath.dirname(page), n)) for t in trees for n in t.split()]
+        waiting += [each for each in below if each not in seen]
+    assert sorted(name for name in read if name.removesuffix(".md") not in seen) == []
+
+
+def test_what_sphinx_would_complain_about_is_found() -> None:
+    pages = {
+        "a/one.md": "# One\n\n### Deep\n\n[x](two.md#here) [y](two.md#gone) [z](three.md)\n\n![p](../pictures/no.png)",
+        "a/two.md": "# Two\n\n## Here\n\n```jsonn\n{}\n```\n\n```json\n{'a'}\n```\n",
+    }
+    assert complaints("a/one.md", pages) == [
+        "headings of the levels [1, 3]",
+        "two.md#gone has no such heading",
+        "three.md is not there",
+        "../pictures/no.png is not there",
+    ]
+    assert [said.split(":")[0] for said in complaints("a/two.md", pages)] == ["jsonn", "json"]
 
 
 def test_a_dead_link_is_found(tmp_path: Path) -> None:
@@ -73,9 +185,18 @@ def test_a_dead_link_is_found(tmp_path: Path) -> None:
     assert sorted(dead_links(tmp_path)) == ["a.html: #gone", "a.html: c.png", "b.html: ../away.html"]
 
 
-def test_the_python_reference_has_every_public_name_with_its_signature(site: Path) -> None:
-    text = (site / "reference" / "python.html").read_text(encoding="utf-8")
+def test_the_python_reference_has_every_public_name_with_its_signature(read: dict[str, str]) -> None:
     assert set(site_reference.places()) == set(sp.__all__) - {"__version__"}
+    text = read["reference/python.md"]
+    defined = set(re.findall(r"^`{5}\{py:\w+\} (\w+)", text, re.MULTILINE))
+    assert defined == set(site_reference.places())
+    assert re.search(r"^`{5}\{py:function\} \w+\(.*keep_unexcited: bool=False", text, re.MULTILINE)
+    assert "in SI units, radians, NED and FRD" in text
+
+
+@pytest.mark.proof
+def test_the_reference_on_the_site_has_every_public_name_with_its_signature(whole: Path) -> None:
+    text = (whole / "reference" / "python.html").read_text(encoding="utf-8")
     missing = [name for name in site_reference.places() if f'id="swashplate.{name}"' not in text]
     assert missing == []
     plain = unescape(re.sub(r"<[^>]+>", "", text))
