@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from swashplate.compiled import can_compile
 from swashplate.export.stepping_c import CompiledEngine
@@ -15,13 +18,38 @@ from swashplate.links.recorder import Recorder
 from swashplate.links.sensing import Sensing
 from swashplate.links.servos import servo_mapping
 from swashplate.models.catalogue import vehicle
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
+from swashplate.simulation.dynamics import SURROUNDINGS
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
-from swashplate.simulation.stepping import MakeEngine
+from swashplate.simulation.stepping import MakeEngine, motion_row
 
 QUICK: MakeEngine | None = CompiledEngine if can_compile() else None
 """What `swash link` steps with here."""
+
+
+class PlainFloats:
+    """What moves a vehicle without a compiler."""
+
+    def __init__(self, moved: Vehicle, environment: Environment) -> None:
+        self.moved, self.parameters, self.environment = moved, moved.values(), environment
+
+    def place(self, row: np.ndarray) -> None:
+        self.row = row
+
+    def advance(self, inputs: Sequence[float], around: np.ndarray, step: float, steps: int) -> list[float]:
+        air, xp = self.environment._replace(**dict(zip(SURROUNDINGS, around.tolist(), strict=True))), FloatBackend()
+
+        def rates(x: np.ndarray, w: Sequence[float]) -> np.ndarray:
+            return np.array(self.moved.rates(x.tolist(), w, self.parameters, air, xp))
+
+        for _ in range(steps):
+            self.row = rk4_step(rates, self.row, lambda _: inputs, step, looped=False)
+        slope = rates(self.row, inputs).tolist()
+        return motion_row(self.row.tolist(), slope, float(air.gravity), xp)
 
 
 @dataclass

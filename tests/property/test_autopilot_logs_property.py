@@ -17,7 +17,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.readers import clocked
 from swashplate.flights.readers.read import read
 
-few = settings(max_examples=25, deadline=None, derandomize=True)
+few = settings(max_examples=12, deadline=None, derandomize=True)
 
 SEEDS = {
     "a.bin": dataflash(ardupilot_rows(until=24.0)),

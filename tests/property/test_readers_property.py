@@ -20,7 +20,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import ProcessingStep, Provenance
 from swashplate.flights.readers.read import read
 
-few = settings(max_examples=20, deadline=None, derandomize=True)
+few = settings(max_examples=10, deadline=None, derandomize=True)
 
 
 def _mat(*, compressed: bool) -> bytes:

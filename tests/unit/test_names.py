@@ -15,7 +15,8 @@ def _twice(house: Path) -> dict[str, list[str]]:
     """Modules by the name of a public class that several of them define."""
     found = defaultdict(list)
     for place in sorted(house.rglob("*.py")):
-        for node in ast.parse(place.read_text(encoding="utf-8")).body:
+        text = place.read_text(encoding="utf-8")
+        for node in ast.parse(text).body if "class " in text else ():
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found[node.name].append(str(place.relative_to(house)))
     return {name: places for name, places in found.items() if len(places) > 1}

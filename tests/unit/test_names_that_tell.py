@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import swashplate
@@ -16,7 +17,8 @@ def _bound(house: Path) -> list[str]:
     """Where `found` is bound, as a variable, a parameter or a field."""
     places = []
     for place in sorted(house.rglob("*.py")):
-        for node in ast.walk(ast.parse(place.read_text(encoding="utf-8"))):
+        text = place.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if re.search(r"\bfound\b", text) else ():
             name = node.arg if isinstance(node, ast.arg) else node.id if isinstance(node, ast.Name) else ""
             if name == "found" and not isinstance(getattr(node, "ctx", None), ast.Load):
                 places.append(f"{place.relative_to(house)}:{node.lineno}")  # type: ignore[attr-defined]

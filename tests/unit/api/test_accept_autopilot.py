@@ -181,7 +181,7 @@ def judged_against(
     return beside_truth(flight, chirps, truth_of(vehicle, name=name), truth_of(own, name=name), rate=100.0)
 
 
-@pytest.mark.parametrize("share", [0.75, 1.0, 1.3])
+@pytest.mark.parametrize("share", [0.75, *(pytest.param(share, marks=pytest.mark.proof) for share in (1.0, 1.3))])
 def test_another_truth_fails(accepted: tuple[Acceptance, Path], share: float) -> None:
     """The same log beside a vehicle whose yaw inertia is another: only the one that flew passes."""
     found, _ = accepted
@@ -205,7 +205,7 @@ def test_a_wrong_frame_fails_before_it_flies(tmp_path: Path) -> None:
     ("faults", "ekf", "words"),
     [
         ("never-ekf", 4.0, "not within 4 s: PreArm: Need Position Estimate"),
-        ("warm,nowhere", 20.0, "not within 20 s: its EKF has no place"),
+        pytest.param("warm,nowhere", 20.0, "not within 20 s: its EKF has no place", marks=pytest.mark.proof),
     ],
 )
 def test_an_ekf_that_is_never_ready(faults: str, ekf: float, words: str, tmp_path: Path) -> None:
@@ -218,7 +218,7 @@ def test_an_ekf_that_is_never_ready(faults: str, ekf: float, words: str, tmp_pat
 @pytest.mark.parametrize(
     ("faults", "words"),
     [
-        ("warm,crash", "the binary ended by SIGFPE; its last words: "),
+        pytest.param("warm,crash", "the binary ended by SIGFPE; its last words: ", marks=pytest.mark.proof),
         pytest.param("warm,frozen", "sent no servo packet for 2 s", marks=pytest.mark.proof),
         pytest.param("warm,reboot", "the autopilot restarted by itself", marks=pytest.mark.proof),
         pytest.param("warm,sweepless", "mode SYSTEMID: refused: ", marks=pytest.mark.proof),
@@ -357,6 +357,7 @@ def test_a_coaxial_s_mixer_moves_motors_by_its_thrust_curve_and_flaps_over_its_t
         np.testing.assert_allclose(moves[axis], moved, atol=1e-5)
 
 
+@pytest.mark.proof
 def test_a_coaxial_with_another_frame_is_not_flown(tmp_path: Path) -> None:
     out = tmp_path / "t"
     found = coaxial(out, axes=("yaw",), faults="frame")

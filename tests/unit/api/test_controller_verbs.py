@@ -94,16 +94,24 @@ class StillKind(ControllerKind[Still]):
 STILL = StillKind()
 
 
-def test_a_kind_of_another_package_is_saved_loaded_and_flown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kind_of_another_package_is_saved_and_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(CONTROLLERS._own, "still", f"{__name__}:STILL")
     coax = sp.vehicle("coax")
     save_controller(Still(sp.trim(coax).inputs), tmp_path / "still.toml")
     again = sp.load_controller(tmp_path / "still.toml")
+    np.testing.assert_array_equal(again.gains, sp.trim(coax).inputs)
+    with pytest.raises(ControllerError, match="has no C"):
+        kind_of(again).traced(again)
+
+
+@pytest.mark.proof
+def test_a_kind_of_another_package_is_flown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CONTROLLERS._own, "still", f"{__name__}:STILL")
+    coax = sp.vehicle("coax")
+    again = Still(sp.trim(coax).inputs)
     many = sp.monte_carlo(coax, again, maneuver="doublet:pitch,0.5s,0.1", count=4, battery=(12.2, 9.0))
     assert many.spread.lost_by["height"] == many.lost == 4  # nobody makes up for the battery, and it says so
     assert many.remarks
-    with pytest.raises(ControllerError, match="has no C"):
-        kind_of(again).traced(again)
 
 
 def test_a_controller_that_says_nothing_of_itself_is_plain(tmp_path: Path) -> None:

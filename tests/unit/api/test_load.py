@@ -6,7 +6,9 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -60,6 +62,13 @@ def again_drawn(judged: Any) -> list[Figure]:
     return [block for block in section_of(judged).blocks if isinstance(block, Figure)]
 
 
+@lru_cache(maxsize=1)
+def saved_judgement() -> str:
+    fit = sp.fit_transfer_function(responses(), "0/1", input="servo_roll", outputs=["p"])
+    with TemporaryDirectory() as folder:
+        return sp.residuals(fit, sweep()).save(Path(folder) / "left.json").read_text()
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -75,8 +84,7 @@ def again_drawn(judged: Any) -> list[Figure]:
 def test_a_judgement_that_was_changed_is_refused_by_its_entry(
     change: Callable[[dict[str, Any]], Any], words: str, tmp_path: Path
 ) -> None:
-    fit = sp.fit_transfer_function(responses(), "0/1", input="servo_roll", outputs=["p"])
-    document = json.loads(sp.residuals(fit, sweep()).save(tmp_path / "left.json").read_text())
+    document = json.loads(saved_judgement())
     change(document)
     (tmp_path / "left.json").write_text(json.dumps(document))
     with pytest.raises(SwashError, match=rf"left\.json.*{re.escape(words)}"):

@@ -36,7 +36,7 @@ def test_flights_in_two_threads_are_those_of_one() -> None:
     def flown(place: float) -> Array:
         height = {"z": -place}
         flight = simulate_closed_loop(
-            coax, controller, duration=20.0, start=hover, reference=height, rate=500.0, fly=fly
+            coax, controller, duration=5.0, start=hover, reference=height, rate=500.0, fly=fly
         )
         return flight.array(("z", "u", "omega_upper"))
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from link_bench import PlainFloats
+from swashplate.api import link
 from swashplate.compiler import compiler
 from swashplate.errors import DivergenceError, ExportError
 from swashplate.export import stepping_c
@@ -19,6 +21,29 @@ pytest.importorskip("casadi", reason="the extra 'export' is not installed")
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 
+@pytest.mark.parametrize("height", [0.0, 10.0])
+@pytest.mark.parametrize("name", ["raptor50", "coax"])
+def test_it_flies_as_plain_floats_do(name: str, height: float) -> None:
+    """Pressed into the ground and off it, in wind that changes and with a battery that sags."""
+    made, around = standing(vehicle(name)), Environment(1.0, -0.5, 0.2, voltage=12.0)
+    low, high = np.array(made.input_limits).T
+    start = at_rest(made, around)
+    start[2] += 0.002 - height
+    start[made.index("phi")], start[made.index("u")], start[made.index("q")] = 0.02, 0.3, 0.1
+    start[[name.startswith("omega") for name in made.state_names]] = 100.0
+    both = [Stepping(made, start, around, engine=e) for e in (PlainFloats, CompiledEngine)]
+    random = np.random.default_rng(0)
+    for k in range(6):
+        inputs = low + random.random(low.size) * (high - low)
+        for each in both:
+            each.surround(wind_north=0.1 * k, voltage=12.0 - 0.05 * k)
+        one, other = (each.advance(inputs, 0.01) for each in both)
+    assert np.abs(one.states - start).max() > 0.1
+    np.testing.assert_allclose(other.states, one.states, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(other.force, one.force, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.proof
 @pytest.mark.parametrize("name", ["raptor50", "coax"])
 def test_it_flies_as_xla_does(name: str) -> None:
     """From the ground into the air, in wind that changes and with a battery that sags."""
@@ -56,6 +81,7 @@ def test_a_compiler_that_fails_is_told_of_and_the_link_flies_on(monkeypatch: pyt
         raise ExportError("cc refused the exported sources: no math.h")
 
     monkeypatch.setattr(stepping_c, "loaded", refused)
+    monkeypatch.setattr(link, "XlaEngine", PlainFloats)  # nothing to compile
     linked = sp.link_ardupilot(sp.vehicle("coax"), port=0, idle_exit=0.1, notice=said.append)
     assert linked.exchanges == 0
     assert said == [

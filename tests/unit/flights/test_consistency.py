@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,8 +51,9 @@ def changed(flight: Flight, **channels: np.ndarray) -> Flight:
     return flight
 
 
-@pytest.mark.parametrize("flight", [flown(), flown(heading=False), flown(delay=0.05)], ids=["whole", "-psi", "late"])
-def test_a_right_log_passes(flight: Flight) -> None:
+@pytest.mark.parametrize("options", [{}, {"heading": False}, {"delay": 0.05}], ids=["whole", "-psi", "late"])
+def test_a_right_log_passes(options: dict[str, Any]) -> None:
+    flight = flown(**options)
     assert consistency(flight) == ()
     refuse_inconsistent(flight)
 

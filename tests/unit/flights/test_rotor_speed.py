@@ -44,7 +44,14 @@ def _flight(
     return Flight({"motion": stream(t, channels)})
 
 
-@pytest.mark.parametrize(("rate", "pair"), [(150.0, ("phi", "theta")), (400.0, ("ax", "ay")), (400.0, ("p", "q"))])
+@pytest.mark.parametrize(
+    ("rate", "pair"),
+    [
+        (150.0, ("phi", "theta")),
+        pytest.param(400.0, ("ax", "ay"), marks=pytest.mark.proof),
+        pytest.param(400.0, ("p", "q"), marks=pytest.mark.proof),
+    ],
+)
 def test_a_line_is_tracked_with_honest_bounds(rate: float, pair: tuple[str, str]) -> None:
     made = rotor_speed(_flight(_steady, rate=rate, pair=pair))
     told = made.history[-1].details["lines"]["omega_rotor"]

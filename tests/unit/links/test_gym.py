@@ -52,6 +52,7 @@ def test_gymnasium_accepts_it(name: str) -> None:
     assert env.action_space.shape == (4,)
 
 
+@pytest.mark.proof
 def test_a_single_rotor_helicopter_too_and_its_governed_throttle_is_no_action() -> None:
     env = HelicopterEnv(sp.vehicle("raptor50", rotor_speed="throttle"), "hover", task_options={"duration": 0.2})
     check_env(env, skip_render_check=True)

@@ -105,6 +105,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
         px4_law(mapping(), COAXIAL, sp.trim(COAXIAL))
 
 
+@pytest.mark.proof
 def test_it_takes_off_hovers_turns_and_lands_under_the_dual_frame() -> None:
     """Behind the stand-in's loops with ArduPilot's gains and the feed-forward that the parameter file gets."""
     line = bench("coaxial15", environment=Environment(0.5, -0.5, 0.0), engine=QUICK)

@@ -192,7 +192,11 @@ def nameless(drawn: Any) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("what", MADE)
+SLOW = ("fit and validation", "study of transfer functions")
+"""Many panels, which the others and the pages' own tests show too."""
+
+
+@pytest.mark.parametrize("what", [pytest.param(w, marks=pytest.mark.proof) if w in SLOW else w for w in MADE])
 def test_every_axis_says_what_it_shows_and_in_which_unit(what: str) -> None:
     figures = MADE[what]()
     assert figures

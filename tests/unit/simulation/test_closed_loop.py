@@ -10,10 +10,17 @@ from swashplate.control.laws.hold import hover_hold
 from swashplate.errors import SwashError
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation import closed_loop
 from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.sensors import QUIET, InertialUnit, MotionCapture, Sensors, observe, specific_forces
 from swashplate.simulation.trim import trim
+
+
+@pytest.fixture(autouse=True)
+def one_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Flights of every length here are compiled once: samples too many are cut off."""
+    monkeypatch.setattr(closed_loop, "shared_length", lambda n: 8192)
 
 
 @pytest.fixture(scope="module")
@@ -41,15 +48,20 @@ def test_a_sweep_stays_in_the_room_while_the_battery_empties(coax: Vehicle) -> N
     assert flight.values("voltage")[-1] == pytest.approx(12.22 - 0.66)
 
 
+def test_a_rate_that_is_no_multiple_of_the_controllers_is_refused(coax: Vehicle) -> None:
+    with pytest.raises(SwashError, match=r"multiple of the controller's 30 Hz\. Give 90 Hz"):
+        simulate_closed_loop(coax, hover_hold(coax, trim(coax), rate=30.0), duration=1.0)
+
+
+@pytest.mark.proof
 def test_the_controller_runs_at_its_own_rate(coax: Vehicle) -> None:
+    """In short: `test_shared_lengths`."""
     controller = hover_hold(coax, trim(coax), rate=25.0)
     flight = simulate_closed_loop(coax, controller, duration=3.0, start={"phi": 0.1})
     command = flight.values("servo_roll")
     changes = np.flatnonzero(np.diff(command)) + 1
     assert changes.size > 60
     assert np.all(changes % 4 == 0)
-    with pytest.raises(SwashError, match=r"multiple of the controller's 30 Hz\. Give 90 Hz"):
-        simulate_closed_loop(coax, hover_hold(coax, trim(coax), rate=30.0), duration=1.0)
 
 
 def test_motion_capture_has_the_faults_of_a_real_log(coax: Vehicle) -> None:

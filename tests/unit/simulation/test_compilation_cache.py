@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import jax
+import jax.numpy as jnp
 import pytest
+from jax.experimental.compilation_cache import compilation_cache
 
 from swashplate.simulation import compilation
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -30,6 +30,7 @@ def restored():
     yield
     for name, value in before.items():
         jax.config.update(name, value)
+    compilation_cache.reset_cache()
 
 
 def test_the_folder_is_made_and_used(tmp_path: Path) -> None:
@@ -67,24 +68,12 @@ def test_small_loops_are_asked_for_once_and_a_users_options_stay(monkeypatch: py
     assert os.environ["XLA_FLAGS"] == "--xla_backend_extra_options=other=1"
 
 
-COMPILE = """
-import sys, warnings
-import jax, jax.numpy as jnp
-from swashplate.simulation.compilation import enable_compilation_cache
-warnings.simplefilter("error")
-enable_compilation_cache(sys.argv[1])
-jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-print(float(jax.jit(lambda x: jnp.sin(x) * 3.0)(jnp.array(2.0))))
-"""
-
-
-def _compiled(folder: Path) -> str:
-    """What a process prints that compiles something and takes every warning as an error."""
-    command = [sys.executable, "-c", COMPILE, str(folder)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120, env=environment)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+def _compiled(folder: Path) -> float:
+    """What comes of something that is compiled with this folder; warnings are errors here."""
+    compilation_cache.reset_cache()  # as in a new process
+    enable_compilation_cache(folder)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    return float(jax.jit(lambda x: jnp.sin(x) * 3.0)(2.0))
 
 
 def test_an_entry_that_was_cut_off_is_made_anew(tmp_path: Path) -> None:

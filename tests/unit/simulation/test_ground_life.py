@@ -145,8 +145,10 @@ def stands(rows: np.ndarray, name: str) -> None:
     assert np.abs(rows[:, tilts]).max(initial=0.0) < math.radians(6.0)
 
 
+@pytest.mark.proof
 @pytest.mark.parametrize("name", ["raptor50", "helion", "xcell60", "coax"])
 def test_what_is_parked_stands_still(name: str) -> None:
+    """As XLA compiles it; the quick form is the same by C, below."""
     stands(parked(name, 6.0, wind=3.0), name)
 
 
@@ -179,9 +181,10 @@ def lived(pilot: HeliAutopilot, *, hover: float, expected: float | None) -> None
 
 def test_the_firmware_refuses_until_its_ekf_is_ready() -> None:
     pilot = HeliAutopilot(bench("raptor50", engine=QUICK).send, rate=100)
+    pilot.ekf.begun = 15.0 - EKF_WAIT  # aligned after 15 s: its other checks take 12
     pilot.fly(1.0)
     assert pilot.arm() == "Gyros still settling"
-    pilot.fly(EKF_WAIT - 2.0)
+    pilot.fly(13.0)
     assert pilot.arm() == "Need Position Estimate"
     pilot.fly(2.0)
     pilot.interlock = True
@@ -198,14 +201,12 @@ def test_an_ekf_on_ground_that_shakes_never_settles() -> None:
         return answer and answer.replace(b'"gyro":[', b'"gyro":[0.05') if answer else None
 
     pilot = HeliAutopilot(send, rate=100)
-    with pytest.raises(AssertionError, match="does not settle in 45 s: Gyros still settling"):
-        pilot.wait_for_ekf(45.0)
+    with pytest.raises(AssertionError, match="does not settle in 5 s: Gyros still settling"):
+        pilot.wait_for_ekf(5.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "rounds"),
-    [("raptor50", 2), *(pytest.param(name, 3, marks=pytest.mark.proof) for name in ("raptor50", "helion", "xcell60"))],
-)
+@pytest.mark.proof
+@pytest.mark.parametrize(("name", "rounds"), [("raptor50", 2), ("raptor50", 3), ("helion", 3), ("xcell60", 3)])
 def test_a_helicopter_lives_on_the_ground_and_flies(name: str, rounds: int) -> None:
     """From a cold start, as long as the EKF takes, and again after a landing while the rotor runs down."""
     at = bench(name, engine=QUICK)
@@ -241,7 +242,7 @@ def written_gains(name: str) -> Gains:
     return Gains(angle, tuple(rows["FF"]), tuple(rows["P"]), tuple(rows["I"]), kept)
 
 
-@pytest.mark.parametrize("seconds", [10.0, pytest.param(120.0, marks=pytest.mark.proof)])
+@pytest.mark.parametrize("seconds", [4.0, pytest.param(120.0, marks=pytest.mark.proof)])
 @pytest.mark.parametrize("which", ["ardupilot", "px4"])
 def test_a_coaxial_lives_on_the_ground_and_hops(which: str, seconds: float) -> None:
     """Parked with its servos stirred, spooled up, off the ground, down, stopped, and again; at both links' rates."""
@@ -276,7 +277,11 @@ def test_a_coaxial_lives_on_the_ground_and_hops(which: str, seconds: float) -> N
         assert down.body.z == pytest.approx(-plant.standing_depth, abs=0.005)
 
 
-@pytest.mark.parametrize("name", HELICOPTERS)
+@pytest.mark.parametrize(
+    "name",
+    [name if name in ("raptor50", "coax") else pytest.param(name, marks=pytest.mark.proof)
+     for name in (*HELICOPTERS, "coax")],
+)  # fmt: skip
 def test_exported_c_stands_still(name: str) -> None:
     """The C that links and exports share, 10 s on the ground at random servo positions."""
     rows = parked(name, 10.0, wind=3.0, engine=QUICK)

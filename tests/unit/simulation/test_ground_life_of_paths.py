@@ -178,7 +178,7 @@ def gym_environment(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarr
 PATHS: dict[str, Flown] = {"C": exported_c, "FMU": fmu, "live": live_loop, "gym": gym_environment}
 
 
-@pytest.mark.parametrize("which", ["C", "live"])
+@pytest.mark.parametrize("which", ["C", pytest.param("live", marks=pytest.mark.proof)])
 def test_a_coaxial_lives_on_the_ground(which: str, tmp_path: Path) -> None:
     """The short form: what is quick to compile."""
     lives("coax", PATHS[which], tmp_path, parked=4.0)
@@ -204,7 +204,8 @@ def test_every_other_vehicle_lives_two_minutes_on_the_ground(name: str, which: s
     lives(name, PATHS[which], tmp_path, parked=120.0)
 
 
-@pytest.mark.parametrize("together", [False, pytest.param(True, marks=pytest.mark.proof)], ids=["one", "many"])
+@pytest.mark.proof
+@pytest.mark.parametrize("together", [False, True], ids=["one", "many"])
 def test_the_gym_starts_on_the_ground(together: bool) -> None:
     """Stopped it stands where it was put; more than hovering power lifts it off; many are as many single ones."""
     pytest.importorskip("gymnasium")
@@ -241,7 +242,8 @@ def test_a_governed_throttle_is_an_action_on_the_ground() -> None:
     from swashplate.links.gym.tasks import task_of
 
     raptor = sp.vehicle("raptor50")
-    assert len(flying(raptor, task_of("hover", {}), ground=True).free) == 5  # four in the air: test_gym
+    assert len(flying(raptor, task_of("hover", {}), ground=True).free) == 5
+    assert len(flying(raptor, task_of("hover", {})).free) == 4  # in the air
 
 
 def test_a_vehicle_that_sinks_into_the_ground_is_seen(tmp_path: Path) -> None:

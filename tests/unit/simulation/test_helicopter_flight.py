@@ -7,11 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from link_bench import QUICK
 from swashplate.control.laws.state_hold import state_hold
 from swashplate.errors import CardError, TrimError
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, stream
 from swashplate.models.catalogue import from_card, vehicle
 from swashplate.models.doubts import doubts
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics import actuators, engine
 from swashplate.physics.atmosphere import air_density
 from swashplate.physics.backend import FloatBackend
@@ -20,7 +22,9 @@ from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.speeds import trims_over_speed
-from swashplate.simulation.trim import trim
+from swashplate.simulation.standing import at_rest, standing
+from swashplate.simulation.stepping import Stepping
+from swashplate.simulation.trim import Trim, trim
 
 RAPTOR = vehicle("raptor50")
 
@@ -82,6 +86,7 @@ def test_where_the_equations_are_not_to_be_trusted() -> None:
     )
 
 
+@pytest.mark.proof
 def test_a_hold_keeps_the_helicopter_through_a_maneuver() -> None:
     for options in ({"bar": True, "inflow": "pitt-peters"},):
         flight = simulate_maneuver(
@@ -145,9 +150,22 @@ def _parked(east: float) -> Flight:
     return simulate(stands, inputs, start=start, rate=100.0)
 
 
-def test_what_is_parked_stays_where_it_is_until_friction_gives_way() -> None:
+def _parked_by_c(east: float) -> Flight:
+    """The same as links step it."""
+    stands, stopped = standing(RAPTOR), Environment()
+    stepping = Stepping(stands, at_rest(stands, stopped), stopped, engine=QUICK)
+    rows = []
+    for k in range(1200):
+        stepping.surround(wind_east=east if k > 200 else 0.0)
+        rows.append(stepping.advance(np.zeros(len(stands.input_names)), 0.01).states)
+    columns = dict(zip(stands.state_names, np.transpose(rows), strict=True))
+    return Flight({"uniform": stream(np.arange(len(rows)) / 100.0, columns)})
+
+
+@pytest.mark.parametrize("parked", [_parked_by_c, pytest.param(_parked, marks=pytest.mark.proof)])
+def test_what_is_parked_stays_where_it_is_until_friction_gives_way(parked: Callable[[float], Flight]) -> None:
     """In 10 m/s of wind it stands, held against the drag of fuselage and fin; in 30 m/s, ten times that, it slides."""
-    held = _parked(10.0)
+    held = parked(10.0)
     for name in ("x", "y", "psi"):
         assert abs(held.values(name)[-1] - held.values(name)[600]) < 1e-6
     card = RAPTOR.card.values()
@@ -155,7 +173,7 @@ def test_what_is_parked_stays_where_it_is_until_friction_gives_way() -> None:
     pressure = 0.5 * 1.225 * 10.0**2
     assert pressure * card["fuselage_area_y"] < pull < pressure * (card["fuselage_area_y"] + card["fin_area"])
     greatest = (9.0 * pull - card["skid_friction"] * card["mass"] * 9.81) / card["mass"]
-    assert 0.08 * greatest < _parked(30.0).values("v")[210] < 0.1 * greatest  # 0.1 s later; then it turns into the wind
+    assert 0.08 * greatest < parked(30.0).values("v")[210] < 0.1 * greatest  # 0.1 s later; then it turns into the wind
 
 
 def test_grip_lets_go_in_the_air_and_trims_have_none() -> None:
@@ -169,7 +187,25 @@ def test_grip_lets_go_in_the_air_and_trims_have_none() -> None:
         vehicle("raptor50", grip=True)
 
 
-def test_autorotation() -> None:
+def _simulated(flying: Vehicle, inputs: dict[str, np.ndarray], start: Trim) -> Flight:
+    return simulate(flying, inputs, start=start, rate=500.0)
+
+
+def _by_c(flying: Vehicle, inputs: dict[str, np.ndarray], start: Trim) -> Flight:
+    """As links step it, with ground far below."""
+    stands = standing(flying)
+    first = at_rest(stands, start.environment)
+    first[: len(start.state)] = start.state
+    first[2] = -100.0
+    stepping = Stepping(stands, first, start.environment, engine=QUICK)
+    moves = np.stack([inputs[name] for name in stands.input_names], axis=1)
+    rows = [first, *(stepping.advance(row, 1.0 / 500.0).states for row in moves[:-1])]
+    columns = dict(zip(stands.state_names, np.transpose(rows), strict=True))
+    return Flight({"uniform": stream(np.arange(len(rows)) / 500.0, columns)})
+
+
+@pytest.mark.parametrize("flown", [_by_c, pytest.param(_simulated, marks=pytest.mark.proof)])
+def test_autorotation(flown: Callable[[Vehicle, dict[str, np.ndarray], Trim], Flight]) -> None:
     """The throttle is cut: the rotor slows and the aircraft sinks; sinking at 10 m/s the air alone keeps it turning."""
     flying = vehicle("raptor50", rotor_speed="throttle")
     start, n = trim(flying, speed=8.0), 400
@@ -178,14 +214,14 @@ def test_autorotation() -> None:
     inputs["throttle"] = np.where(time < 0.2, 1.0, 0.0)
     inputs["theta0"] = np.interp(time, [0.2, 0.4], [start.commands()["theta0"], -0.04])
     inputs["theta0T"] = np.interp(time, [0.2, 0.4], [start.commands()["theta0T"], 0.0])
-    entry = simulate(flying, inputs, start=start, rate=500.0)
+    entry = flown(flying, inputs, start)
     assert 0.8 < entry.values("omega")[-1] / entry.values("omega")[0] < 0.95
     assert entry.values("w")[-1] > 3.0
 
     gliding = trim(flying, speed=8.0, climb=-10.0)
     assert gliding.states()["omega"] >= flying.card.values()["rotor_speed"]
     without = {name: np.full(n, value) for name, value in gliding.commands().items()} | {"throttle": np.zeros(n)}
-    glide = simulate(flying, without, start=gliding, rate=500.0)
+    glide = flown(flying, without, gliding)
     np.testing.assert_allclose(glide.values("omega"), gliding.states()["omega"], rtol=1e-3)
     assert gliding.commands()["theta0"] < 0.0 < start.commands()["theta0"]
 
@@ -258,5 +294,9 @@ def test_a_flight_far_out_of_reach_still_names_the_limit() -> None:
     """Where Newton's method finds no way from hover in one go, it walks: the limit that stops it is known."""
     with pytest.raises(TrimError, match=r"60 m/s ahead.* needs theta0 = 61.2 deg, but its limit is 15.0 deg"):
         trim(RAPTOR, speed=60.0)
+
+
+@pytest.mark.proof
+def test_a_flight_that_nothing_reaches_says_how_far_it_got() -> None:
     with pytest.raises(TrimError, match=r"1000 m/s ahead.* is out of reach: [0-9]+% of the way there needs theta0 = "):
         trim(RAPTOR, speed=1000.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from swashplate.control.laws.state_hold import state_hold
 from swashplate.errors import FlightError, SwashError
@@ -111,6 +112,7 @@ def _error(dash: Flight, table: Schedule, scheme: str, second: float) -> float:
     return float(np.hypot(*(flown.values(n)[place] - dash.values(n)[place] for n in ("u", "v"))))
 
 
+@pytest.mark.proof
 def test_the_printed_scheme_loses_the_flight_and_the_others_do_not(dash: Flight, table: Schedule) -> None:
     """After 6 s: printed is off by more than the flight itself, the stitched model by a tenth of it."""
     assert dash.values("u")[-1] == pytest.approx(8.0, abs=0.2)
@@ -119,6 +121,23 @@ def test_the_printed_scheme_loses_the_flight_and_the_others_do_not(dash: Flight,
     assert stitched < 1.5
     assert trimmed < 4.0
     assert stitched < 0.2 * printed
+
+
+def test_near_a_trim_of_the_table_it_flies_as_the_linear_model_there(table: Schedule) -> None:
+    """In short, of one scheme: kept where it is trimmed, and a small step of collective by the matrix exponential."""
+    start, last = trim(RAPTOR, speed=8.0), 10
+    flown = []
+    for step in (0.0, 1e-4):
+        controls = {name: np.full(61, start.commands()[name] + step * (name == "theta0")) for name in PAPER_INPUTS}
+        flown.append(simulate_lpv(RAPTOR, controls, start=start, scheme="trim-term", over=table, rate=100.0))
+    at = [PAPER_STATES.index(name) for name in ("u", "v", "w", "p", "q", "r")]
+    moved, kept = (np.array([f.values(PAPER_STATES[k]) for k in at]) for f in (flown[1], flown[0]))
+    np.testing.assert_allclose(kept[:, -1], kept[:, 0], atol=1e-9)
+    n, push = len(PAPER_STATES), 1e-4 * table.B[8][:, PAPER_INPUTS.index("theta0")]
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n] = table.A[8], push
+    expected = expm(last / 100.0 * whole)[:n, n][at]
+    np.testing.assert_allclose(moved[:, last] - kept[:, last], expected, atol=0.02 * np.abs(expected).max())
 
 
 def test_why_the_printed_scheme_drifts(table: Schedule) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,17 +9,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import swashplate as sp
+from link_bench import QUICK, PlainFloats
 from swashplate.errors import DivergenceError
 from swashplate.models.catalogue import vehicle
 from swashplate.models.nesting import rebuild
 from swashplate.models.surroundings import environment_of
-from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import SURROUNDINGS
-from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.standing import at_rest, skids_of, standing
-from swashplate.simulation.stepping import Stepping, motion_row
+from swashplate.simulation.stepping import MakeEngine, Stepping
 
 
 @pytest.mark.parametrize(
@@ -79,44 +76,24 @@ OPTIONS = {"bar": True, "servos": True, "gyro": True, "coning": True, "inflow": 
 
 
 @pytest.mark.parametrize(
-    ("name", "options"),
+    ("name", "options", "engine"),
     [
-        pytest.param("raptor50", OPTIONS, marks=pytest.mark.proof),
-        ("coax", {}),
-        pytest.param("coax", {"bar": False}, marks=pytest.mark.proof),
+        pytest.param("raptor50", OPTIONS, None, marks=pytest.mark.proof),
+        ("coax", {}, QUICK),
+        pytest.param("coax", {}, None, marks=pytest.mark.proof),
+        pytest.param("coax", {"bar": False}, None, marks=pytest.mark.proof),
     ],
 )
-def test_everything_can_stand(name: str, options: dict[str, object]) -> None:
+def test_everything_can_stand(name: str, options: dict[str, object], engine: MakeEngine | None) -> None:
     made = standing(vehicle(name, **options))
     around = Environment()
-    stepping = Stepping(made, at_rest(made, around), around)
+    stepping = Stepping(made, at_rest(made, around), around, engine=engine)
     stopped = np.zeros(len(made.input_names))
     for _ in range(50):
         told = stepping.advance(stopped, 0.01)
     np.testing.assert_allclose(told.force, [0.0, 0.0, -9.81], atol=2e-3)
     np.testing.assert_allclose(told.velocity, 0.0, atol=1e-3)
     assert -told.body.z == pytest.approx(skids_of(made).depth, rel=0.1)
-
-
-class PlainFloats:
-    """What moves a vehicle without a compiler."""
-
-    def __init__(self, moved: Vehicle, environment: Environment) -> None:
-        self.moved, self.parameters, self.environment = moved, moved.values(), environment
-
-    def place(self, row: np.ndarray) -> None:
-        self.row = row
-
-    def advance(self, inputs: Sequence[float], around: np.ndarray, step: float, steps: int) -> list[float]:
-        air, xp = self.environment._replace(**dict(zip(SURROUNDINGS, around.tolist(), strict=True))), FloatBackend()
-
-        def rates(x: np.ndarray, w: Sequence[float]) -> np.ndarray:
-            return np.array(self.moved.rates(x.tolist(), w, self.parameters, air, xp))
-
-        for _ in range(steps):
-            self.row = rk4_step(rates, self.row, lambda _: inputs, step, looped=False)
-        slope = rates(self.row, inputs).tolist()
-        return motion_row(self.row.tolist(), slope, float(air.gravity), xp)
 
 
 def test_ground_is_added_to_any_body_as_a_card_has_it() -> None:

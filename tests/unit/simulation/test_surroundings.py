@@ -40,11 +40,11 @@ def test_command_line_and_python_fly_in_the_same_air() -> None:
 
 
 def test_a_simulation_flies_in_the_air_of_the_trim_that_it_starts_from() -> None:
-    raptor = sp.vehicle("raptor50")
-    thin = sp.trim(raptor, environment=sp.Environment(air_density=0.9))
+    light = sp.vehicle("crazyflie")
+    thin = sp.trim(light, environment=sp.Environment(air_density=0.9))
     commands = {name: np.full(21, value) for name, value in thin.commands().items()}
-    assert np.ptp(sp.simulate(raptor, commands, start=thin).values("z")) < 1e-9
-    sunk = sp.simulate(raptor, commands, start=thin, environment=sp.Environment())
+    assert np.ptp(sp.simulate(light, commands, start=thin).values("z")) < 1e-9
+    sunk = sp.simulate(light, commands, start=thin, environment=sp.Environment())
     assert np.ptp(sunk.values("z")) > 1e-2
 
 

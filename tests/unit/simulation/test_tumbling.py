@@ -1,4 +1,4 @@
-"""Aircraft that pitch through the vertical, where Euler angles have no rates: stepped, on a link, on the live page."""
+"""Aircraft that pitch through the vertical, where Euler angles have no rates: stepped, on a link, simulated."""
 
 from __future__ import annotations
 
@@ -11,11 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import swashplate as sp
-from flown_by_hand import fly, fresh
 from heli_autopilot import servo_packet
-from link_bench import bench
+from link_bench import QUICK, bench
 from swashplate.control.laws.hold import hover_hold
-from swashplate.links.live.world import World
 from swashplate.models.catalogue import vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
@@ -24,7 +22,7 @@ from swashplate.physics.quaternion import euler_of, quaternion_of, quaternion_ra
 from swashplate.simulation import closed_loop, integrate
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
-from swashplate.simulation.stepping import Stepping
+from swashplate.simulation.stepping import MakeEngine, Stepping
 from swashplate.simulation.tumbling import from_euler, to_euler
 
 FLOATS = FloatBackend()
@@ -60,13 +58,14 @@ def test_rows_keep_counting_turns() -> None:
     np.testing.assert_allclose(to_euler(from_euler(before), before), before, atol=1e-12)
 
 
+@pytest.mark.parametrize("engine", [QUICK, pytest.param(None, marks=pytest.mark.proof)], ids=["C", "XLA"])
 @pytest.mark.parametrize("start", [1.2, np.pi / 2.0], ids=["through", "from"])
-def test_attitude_through_the_vertical_is_what_the_gyros_add_up_to(start: float) -> None:
+def test_attitude_through_the_vertical_is_what_the_gyros_add_up_to(start: float, engine: MakeEngine | None) -> None:
     flown = vehicle("raptor50", rotor_speed="throttle")
     hover = sp.trim(flown)
     x = np.array(hover.state)
     x[2], x[7], x[flown.index("q")] = -200.0, start, 6.0
-    stepping = Stepping(flown, x, Environment())
+    stepping = Stepping(flown, x, Environment(), engine=engine)
     rows = [x, *(stepping.advance(hover.inputs, 1e-3).states for _ in range(800))]
     assert np.isfinite(rows).all()
     attitude = np.array(rows)[:, ANGLES]
@@ -111,22 +110,6 @@ def test_an_autopilot_that_flips_is_answered_with_numbers_until_the_ground_and_c
     assert not at.plant.broken
 
 
-def test_the_live_page_flies_through_the_vertical_and_begins_again() -> None:
-    world = fresh(World(sp.vehicle("raptor50")), "raw")
-    world._crafts["own"].x[2] = -300.0
-    lowest = 1.0
-    for _ in range(40):
-        x = fly(world, 0.1, pitch=-1.0)
-        assert np.isfinite(x).all()
-        lowest = min(lowest, float(np.cos(x[6]) * np.cos(x[7])))
-        if world.trouble:
-            break
-    assert lowest < -0.3, "it has been upside down"
-    world.reset()
-    assert not world.trouble
-    assert np.abs(fly(world, 0.2)[ANGLES]).max() < 0.1
-
-
 def test_a_simulated_flight_through_the_vertical_is_what_its_gyros_add_up_to(monkeypatch: pytest.MonkeyPatch) -> None:
     """At 100 Hz; with Euler angles the same flight is twelve degrees off, without a word."""
     flown = vehicle("crazyflie")
@@ -165,6 +148,7 @@ def _apart(one: sp.Flight, other: sp.Flight, every: int) -> float:
     return float(np.degrees((first.inv() * second).magnitude()).max())
 
 
+@pytest.mark.proof
 def test_closed_loops_fly_through_the_vertical(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(closed_loop, "shared_length", lambda n: 768)  # programs of one length for both rates
     usual, fine = _thrown(100.0), _thrown(1600.0)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from swashplate.control.analysis.ardupilot_gains import GAIN_MARGIN, OVERSHOOT, PHASE_MARGIN, suggest_gains
+from swashplate.control.analysis.ardupilot_gains import GAIN_MARGIN, OVERSHOOT, PHASE_MARGIN, Suggestion, suggest_gains
 from swashplate.models.linear.state_space_file import structure
 
 SITL = {
@@ -17,9 +18,13 @@ SITL = {
 }  # fmt: skip
 
 
+@lru_cache(maxsize=1)
+def suggested() -> tuple[Suggestion, ...]:
+    return suggest_gains(structure("rotor_body").with_values(SITL))
+
+
 def test_gains_of_the_simulated_helicopter() -> None:
-    model = structure("rotor_body").with_values(SITL)
-    roll, pitch = suggest_gains(model)
+    roll, pitch = suggested()
     # Feed-forward: one over the steady rate per command (true DC gains 3.5897 and 3.9515 rad/s per unit).
     assert abs(roll.parameters["ATC_RAT_RLL_FF"] * 3.5897 - 1.0) < 0.03
     assert abs(pitch.parameters["ATC_RAT_PIT_FF"] * 3.9515 - 1.0) < 0.03
@@ -112,7 +117,7 @@ def test_a_loop_with_phase_to_spare_and_a_high_crossover_is_called_out_by_its_de
 
 def test_flown_gains_that_nothing_beats_are_kept() -> None:
     model = structure("rotor_body").with_values(SITL)
-    first = suggest_gains(model)
+    first = suggested()
     good = {name: value for found in first for name, value in found.parameters.items()}
     again = suggest_gains(model, autopilot=good)
     for found in again:

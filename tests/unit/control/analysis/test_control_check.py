@@ -15,7 +15,7 @@ from swashplate.control.analysis.requirements import BANDWIDTH, PHASE_MARGIN, RE
 from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.control.analysis.stability import loop_margins, loop_modes
 from swashplate.control.analysis.step_response import cross_ratio, step_metrics
-from swashplate.control.laws.autopilot import autopilot
+from swashplate.control.laws.autopilot import Autopilot, autopilot
 from swashplate.control.lqg.analysis import analyse, sensitivity
 from swashplate.control.lqg.design import design
 from swashplate.errors import SwashError
@@ -40,7 +40,12 @@ def hover(coax: Vehicle) -> Trim:
 
 @pytest.fixture(scope="module")
 def place(coax: Vehicle, hover: Trim) -> ControlCheck:
-    return check_controller(coax, autopilot(coax, hover), hover)
+    return checked(coax, autopilot(coax, hover), hover)
+
+
+def checked(coax: Vehicle, controller: Autopilot, hover: Trim, gusts: Gusts | None = INDOOR) -> ControlCheck:
+    """Flown in C, as `sp.check_controller` does."""
+    return check_controller(coax, controller, hover, gusts=gusts, fly=loop_in_c(coax, controller, hover))
 
 
 def integrator(gain: float, *, rate: float = 10.0) -> SampledLoop:
@@ -79,11 +84,11 @@ def test_sensitivity_is_what_a_flight_with_a_wrong_sensor_shows(coax: Vehicle, h
     complementary = loop.response(w, "psi", "psi")
     np.testing.assert_allclose(loop.sensitivity(w, "psi"), 1.0 - complementary, atol=1e-9)
     # And T is what a flight shows: the amplitude of the answer to a slow sine of 3 degrees.
-    t = np.arange(12251) / 500.0  # compiled for the same length as the check below
+    t = np.arange(12251) / 500.0
     wanted = math.radians(3.0) * np.sin(1.0 * t)
-    flight = simulate_closed_loop(
-        coax, autopilot(coax, hover), duration=24.5, reference={"psi": wanted}, start=hover, rate=500.0
-    )
+    law = autopilot(coax, hover)
+    fly = loop_in_c(coax, law, hover)
+    flight = simulate_closed_loop(coax, law, duration=24.5, reference={"psi": wanted}, start=hover, rate=500.0, fly=fly)
     last = t > 24.5 - 2.0 * np.pi
     answer = 2.0 * np.mean(flight.values("psi")[last] * np.exp(-1j * t[last])) * 1j
     assert abs(answer) / math.radians(3.0) == pytest.approx(abs(complementary[1]), rel=0.02)
@@ -152,14 +157,14 @@ def test_the_check_of_the_coax(place: ControlCheck, coax: Vehicle, hover: Trim) 
 def test_what_a_pilots_loop_couples_and_what_the_law_takes_away(coax: Vehicle, hover: Trim) -> None:
     found = {}
     for decoupled in (False, True):
-        check = check_controller(coax, autopilot(coax, hover, mode="speed", decoupled=decoupled), hover)
+        check = checked(coax, autopilot(coax, hover, mode="speed", decoupled=decoupled), hover, None)
         found[decoupled] = {c.name.split(" (")[0]: c.value for c in check.couplings}
     assert found[True]["pitch from roll"] < 0.5 * found[False]["pitch from roll"]
     assert found[True]["height from pitch"] < 0.05
 
 
 def test_a_loop_that_does_not_stand_is_judged_as_far_as_it_goes(coax: Vehicle, hover: Trim) -> None:
-    check = check_controller(coax, autopilot(coax, hover, mode="manual"), hover)
+    check = checked(coax, autopilot(coax, hover, mode="manual"), hover, None)
     assert check.margins is None
     assert check.rejections == ()
     assert "growing mode at +0.247" in check.problems[0]
@@ -174,6 +179,7 @@ def test_a_held_speed_leaves_the_place_neutral_and_stands(coax: Vehicle, hover: 
     assert loop_margins(coax, controller, hover).together.alpha > 0.3
 
 
+@pytest.mark.proof
 def test_a_conventional_helicopter_under_its_state_hold(place: ControlCheck) -> None:
     raptor = sp.vehicle("raptor50")
     rest = sp.trim(raptor)
@@ -189,21 +195,25 @@ def test_a_conventional_helicopter_under_its_state_hold(place: ControlCheck) -> 
     }
 
 
-def test_linear_quadratic_controllers_with_and_without_an_observer(coax: Vehicle, hover: Trim) -> None:
+@pytest.mark.proof
+def test_a_linear_quadratic_controller_that_is_fed_the_states(coax: Vehicle, hover: Trim) -> None:
     states = design(coax, sensors=())
     fed = check_controller(coax, states, hover, duration=5.0, fly=loop_in_c(coax, states, hover))
     assert fed.problems == ()
     assert fed.notes == ()
     assert fed.slowest.real < -0.01  # memory that nothing writes is no mode
     assert {r.state for r in fed.rejections} >= {"x", "y", "z", "psi"}
+
+
+def test_a_linear_quadratic_controller_with_an_observer(coax: Vehicle, hover: Trim) -> None:
     told = design(coax, sensors=suite("imu@100,mocap@100+10ms"))
     seen = check_controller(coax, told, hover, duration=5.0, fly=loop_in_c(coax, told, hover))
     assert seen.problems == ()
     assert "observer" in seen.notes[0]
     assert seen.margins is not None
-    assert fed.margins is not None
     own = analyse(told, on=Aircraft(coax, hover, {}), points=400)  # the check's grid
     assert seen.margins.together.alpha == own.margins.together.alpha
+    fed = analyse(design(coax, sensors=()), on=Aircraft(coax, hover, {}))
     assert seen.margins.together.alpha < fed.margins.together.alpha
     assert {step.reference for step in seen.steps} == {"x", "y", "z", "psi"}
     assert {r.state for r in seen.rejections} >= {"x", "y", "z", "psi"}
@@ -247,7 +257,8 @@ def test_gusts_move_what_a_controller_holds_by_their_square(coax: Vehicle, hover
     weak = Gusts((0.015, 0.015, 0.01), INDOOR.length, INDOOR.speed)
     held, problems, notes = ("psi", "z", "x", "y"), list[str](), list[str]()
     still = Aircraft(coax, hover, {})
-    less = fly_gusts(still, autopilot(coax, hover), weak, held, 20.0, problems, notes)
+    law = autopilot(coax, hover)
+    less = fly_gusts(still, law, weak, held, 20.0, problems, notes, fly=loop_in_c(coax, law, hover))
     assert less is not None
     assert less.place / found.place == pytest.approx(0.01, rel=0.2)
     assert fly_gusts(still, autopilot(coax, hover), None, held, 20.0, problems, notes) is None

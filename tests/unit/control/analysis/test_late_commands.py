@@ -106,16 +106,32 @@ def test_late_loops_are_what_late_flights_do(coax: Vehicle) -> None:
     controller = autopilot(coax, hover)
     nudged = hover.__class__(**{**vars(hover), "state": hover.state + 0.02 * (np.arange(len(hover.state)) == 9)})
     for wait, stands in ((0.03, True), (0.036, False)):
+        fly = loop_in_c(coax, controller, hover)
         slope = loop_modes(coax, controller, hover, delays={"servo_roll": wait, "servo_pitch": wait})
         assert bool(slope[0].real < 0.0) is stands
         flight = simulate_closed_loop(
-            coax, controller, duration=12.0, start=nudged, rate=500.0, delays={"servo_roll": wait, "servo_pitch": wait}
-        )
+            coax, controller, duration=12.0, start=nudged, rate=500.0,
+            delays={"servo_roll": wait, "servo_pitch": wait}, fly=fly,
+        )  # fmt: skip
         rate = np.abs(flight.values("p"))
         grew = rate[flight.time("p") > 9.0].max() > rate[flight.time("p") < 3.0].max()
         assert bool(grew) is not stands
 
 
+def test_nothing_acts_before_it_can(late: Vehicle, hover: Trim) -> None:
+    """In C; that this is XLA's flight is asked below."""
+    controller = autopilot(late, hover)
+    fly = loop_in_c(late, controller, hover)
+    flown = simulate_closed_loop(
+        late, controller, duration=0.5, reference={"psi": 0.3}, start=hover, rate=500.0, fly=fly
+    )
+    for name, wait in input_delays(late).items():
+        moved = flown.time(name)[np.abs(flown.values(name) - hover.commands()[name]) > 1e-6]
+        assert moved.size == 0 or moved[0] >= wait - 1e-9
+        assert name.startswith("servo") or moved[0] < wait + 0.02
+
+
+@pytest.mark.proof
 def test_many_flights_are_as_late_as_one(late: Vehicle, hover: Trim) -> None:
     controller = autopilot(late, hover)
     one, in_c = (
@@ -133,7 +149,7 @@ def test_many_flights_are_as_late_as_one(late: Vehicle, hover: Trim) -> None:
 
 
 # ---- design --------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("delays", [0.0, None, 0.1])
+@pytest.mark.parametrize("delays", [None, *(pytest.param(late, marks=pytest.mark.proof) for late in (0.0, 0.1))])
 def test_default_loops_are_no_faster_than_their_delays_allow(late: Vehicle, delays: float | None) -> None:
     made = design(late, sensors=suite(SENSORS), delays=delays)
     model = linearize(late, made.start)
@@ -173,10 +189,8 @@ def test_computation_is_a_delay_of_every_input(late: Vehicle) -> None:
 def test_a_design_that_knows_no_delay_is_refused_and_its_flights_are_lost(
     coax: Vehicle, late: Vehicle, hover: Trim
 ) -> None:
+    """The same design on an aircraft without delays has no problems: `test_control_check`."""
     blind = design(coax, sensors=suite(SENSORS))
-    rest = sp.trim(coax)
-    fly = loop_in_c(coax, blind, rest)
-    assert check_controller(coax, blind, rest, duration=5.0, gusts=None, fly=fly).problems == ()
     found = check_controller(late, blind, hover, duration=5.0, fly=loop_in_c(late, blind, hover))
     assert found.margins is None
     assert found.slowest.real > 1.0
@@ -201,16 +215,27 @@ def test_a_design_that_knows_them_flies_as_late_as_the_aircraft_is(judged: Contr
     assert heading.metrics.settling < 4.0
 
 
+def fit_of(late: Vehicle, folder: Path) -> sp.Result:
+    """What a fit wrote, read again."""
+    found = result(late, {"tau_f_upper": 1.6, "linkage_lower": 0.1355}, np.diag([0.1, 0.005]) ** 2)
+    found.save(folder / "fit.json")
+    return sp.load(folder / "fit.json")
+
+
+def test_a_fits_file_keeps_its_delays(late: Vehicle, aware: Lqg, tmp_path: Path) -> None:
+    fit = fit_of(late, tmp_path)
+    assert input_delays(fit.model) == input_delays(late)
+    assert design(fit.model, sensors=suite(SENSORS)).plan.delays == aware.plan.delays
+
+
+@pytest.mark.proof
 def test_from_a_fits_file_to_an_aircraft_that_flies_in_short(late: Vehicle, tmp_path: Path) -> None:
     """What a fit wrote, read again, designed on, and flown late and in gusts on an aircraft that the fit allows.
 
     The whole chain, from a real log and with a hundred aircraft, quantised and with a tired battery, is
     `recovery/test_log_to_flight`; this one has the shapes that are compiled above.
     """
-    found = result(late, {"tau_f_upper": 1.6, "linkage_lower": 0.1355}, np.diag([0.1, 0.005]) ** 2)
-    found.save(tmp_path / "fit.json")
-    fit = sp.load(tmp_path / "fit.json")
-    assert input_delays(fit.model) == input_delays(late)
+    fit = fit_of(late, tmp_path)
     made = design(fit.model, sensors=suite(SENSORS))
     drawn = {name: float(values[0]) for name, values in draw_models(fit.model, fit, count=1, seed=3).items()}
     assert abs(drawn["tau_f_upper"] - 1.6) > 0.05

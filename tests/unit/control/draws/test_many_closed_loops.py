@@ -32,6 +32,7 @@ def hover(coax: Vehicle) -> Trim:
     return trim(coax)
 
 
+@pytest.mark.proof
 def test_a_batch_is_the_single_flight_many_times(coax: Vehicle, hover: Trim) -> None:
     controller = autopilot(coax, hover)
     mass = np.array([0.29, 0.302, 0.32])
@@ -98,6 +99,7 @@ def test_gusts_have_drydens_variance_and_spectrum() -> None:
         outdoor(0.0)
 
 
+@pytest.mark.proof
 def test_place_is_held_in_indoor_gusts(coax: Vehicle, hover: Trim) -> None:
     wind = dryden(INDOOR, samples=1000, rate=100.0, seed=0, count=40)
     noise = {"u": 0.02, "v": 0.02, "p": 0.02, "q": 0.02}

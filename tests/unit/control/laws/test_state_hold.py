@@ -15,8 +15,14 @@ def test_gains_too_fast_for_the_rate_are_refused() -> None:
     start = sp.trim(coax)
     with pytest.raises(SwashError, match=r"coax: .*too fast for 50 samples a second.* 2\.21 times.*higher rate="):
         sp.state_hold(coax, start, rate=50.0)
+    assert sp.state_hold(coax, start).rate == 100.0  # what its gains allow
+
+
+@pytest.mark.proof
+def test_at_the_rate_that_its_gains_allow_it_holds() -> None:
+    coax = sp.vehicle("coax")
+    start = sp.trim(coax)
     hold = sp.state_hold(coax, start)
-    assert hold.rate == 100.0  # what its gains allow
     held = sp.simulate_closed_loop(coax, hold, duration=5.0, start=start)
     assert np.abs(held.values("r")).max() < 0.1
     assert np.abs(held.values("z")).max() < 0.02

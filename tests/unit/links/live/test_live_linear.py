@@ -40,7 +40,7 @@ def session(model: StateSpaceModel, tmp_path_factory: pytest.TempPathFactory) ->
     return LiveSession(linear_vehicle(model), controller=None, folder=tmp_path_factory.mktemp("live"))
 
 
-@pytest.fixture(scope="module", params=["thirteen_state", "coaxial"])
+@pytest.fixture(scope="module", params=["thirteen_state", pytest.param("coaxial", marks=pytest.mark.proof)])
 def world(request: pytest.FixtureRequest, session: LiveSession) -> World:
     return session.world if request.param == "thirteen_state" else World(linear_vehicle(structure(request.param)))
 
@@ -51,7 +51,7 @@ def test_a_stick_moves_the_aircraft_its_way(world: World, mode: str, axis: str) 
     moves_its_way(world, mode, axis)
 
 
-@pytest.mark.parametrize("mode", ["velocity", "position"])
+@pytest.mark.parametrize("mode", [pytest.param("velocity", marks=pytest.mark.proof), "position"])
 def test_what_is_held_is_held(world: World, mode: str) -> None:
     holds_what_is_held(world, mode)
 

@@ -200,8 +200,8 @@ def test_the_drawn_disc_leans_with_the_rotor(shown: Replay) -> None:
 def test_a_film_is_a_film(shown: Replay, tmp_path: Path) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg is not installed")
     told: list[tuple[int, int]] = []
-    count = film.write_film(shown, tmp_path / "flight.mp4", rate=2.0, tell=lambda done, of: told.append((done, of)))
-    assert told[-1] == (count, count) == (12, 12)
+    count = film.write_film(shown, tmp_path / "flight.mp4", rate=1.0, tell=lambda done, of: told.append((done, of)))
+    assert told[-1] == (count, count) == (6, 6)
     probed = subprocess.run(
         [ffmpeg.get_ffmpeg_exe(), "-i", tmp_path / "flight.mp4", "-f", "null", "-"], capture_output=True, text=True
     ).stderr

@@ -94,7 +94,7 @@ def test_it_is_verified_on_the_doublets_that_the_fit_has_not_seen(made: tuple[De
 
 
 def test_the_copied_lines_give_the_same(made: tuple[Desk, dict[str, Any], Path]) -> None:
-    _, result, folder = made
+    _, result, _ = made
     names: dict[str, Any] = {}
     exec(result["code"]["python"], names)
     wanted = {name: value for name, value, *_ in result["fit"]["rows"]}
@@ -103,6 +103,12 @@ def test_the_copied_lines_give_the_same(made: tuple[Desk, dict[str, Any], Path])
     (suggestion,) = names["study"].material.gains
     suggested = {name: after for name, _, after in result["gains"][0]["rows"]}
     assert suggestion.parameters == pytest.approx(suggested, rel=1e-6)
+
+
+@pytest.mark.proof
+def test_the_copied_commands_give_the_same(made: tuple[Desk, dict[str, Any], Path]) -> None:
+    _, result, folder = made
+    suggested = {name: after for name, _, after in result["gains"][0]["rows"]}
     for line in result["code"]["shell"].splitlines():
         done = CliRunner().invoke(app, shlex.split(line)[1:])
         assert done.exit_code == 0, done.output

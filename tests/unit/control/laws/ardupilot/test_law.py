@@ -22,6 +22,7 @@ from swashplate.errors import ControllerError
 from swashplate.flights.flight import Flight
 from swashplate.links.ardupilot.gains import ardupilot_law
 from swashplate.links.servos import servo_mapping
+from swashplate.simulation.dynamics import enable_double_precision
 
 HAND_MADE = {
     **{
@@ -47,6 +48,12 @@ MIXERS = (
 )
 
 
+@pytest.fixture(autouse=True, scope="module")
+def double_precision() -> None:
+    """Flights ask for it; filters alone do not."""
+    enable_double_precision()
+
+
 def coax(given: dict[str, float]) -> ArduPilotLaw:
     vehicle = sp.vehicle("coax")
     return ardupilot_law(servo_mapping("coax", vehicle), vehicle, sp.trim(vehicle), given=given)
@@ -65,6 +72,7 @@ def last(flight: Flight, name: str, seconds: float = 20.0) -> np.ndarray:
     return values[-round(seconds * 400.0) :]
 
 
+@pytest.mark.proof
 def test_hand_made_gains_drift_as_they_did_under_the_firmware() -> None:
     """The firmware's pilot told 2.3 degrees and 3.4 m: a cycle that the place loop keeps up; here about 2.8 and 2.4."""
     flight = flown(coax(HAND_MADE))
@@ -74,6 +82,7 @@ def test_hand_made_gains_drift_as_they_did_under_the_firmware() -> None:
     assert 1.7 < drift < 5.0
 
 
+@pytest.mark.proof
 def test_base_files_gains_bang_the_servos_between_their_ends() -> None:
     flight = flown(coax({}))
     servo = last(flight, "servo_roll", 10.0)
