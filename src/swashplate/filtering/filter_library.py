@@ -15,7 +15,7 @@ from swashplate.errors import SwashError
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_c import filter_source
 
-_OPTIONS = ("-O1", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
+_OPTIONS = ("-O2", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
 _QUIET = (
     "-Wno-unused-variable",
     "-Wno-unused-but-set-variable",
