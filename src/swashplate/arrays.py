@@ -19,3 +19,7 @@ def largest_first(sizes: Array) -> NDArray[np.int64]:
     """
     relative = sizes / max(float(np.max(sizes, initial=0.0)), np.finfo(float).tiny)
     return np.argsort(-np.round(relative / _SAME), kind="stable")
+
+
+IMAGINARY = 1e-30
+"""Step of a slope by complex numbers, exact to rounding (Squire and Trapp 1998)."""

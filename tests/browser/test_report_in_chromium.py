@@ -72,6 +72,12 @@ def visit(browser: Any, written: dict[str, Path], controllers: Callable[[str], P
     return open_
 
 
+def asks_for_nothing(seen: Visit) -> None:
+    """It neither complains nor fetches anything from outside."""
+    assert seen.said == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)
+
+
 @pytest.mark.parametrize(
     ("name", "size"),
     [
@@ -83,8 +89,7 @@ def visit(browser: Any, written: dict[str, Path], controllers: Callable[[str], P
 )
 def test_draws_everything_and_fetches_nothing(visit: Any, name: str, size: str) -> None:
     seen = visit(name, size)
-    assert seen.said == []
-    assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)
+    asks_for_nothing(seen)
     drawn = seen.page.evaluate(
         "Array.from(document.querySelectorAll('.canvas'), c => ({svg: c.querySelectorAll('svg.main-svg').length,"
         " marks: c.querySelectorAll('.trace, .hm, .point').length, width: c.clientWidth,"
@@ -105,8 +110,7 @@ def test_draws_everything_and_fetches_nothing(visit: Any, name: str, size: str) 
 )
 def test_reports_about_controllers_draw_everything_in_its_place(visit: Any, name: str, size: str) -> None:
     seen = visit(name, size)
-    assert seen.said == []
-    assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)
+    asks_for_nothing(seen)
     page = seen.page
     names = page.evaluate("Array.from(document.querySelectorAll('[id]'), e => e.id)")
     names = [n for n in names if "-" in n or n.isalpha()]  # plotly's own are random

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.models.vehicle import Vehicle
 
@@ -33,6 +36,19 @@ def commands_moved(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance,
     first, second, third = c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a
     slope = 0.5 * (first + t * (2.0 * second + t * (3.0 * third)))
     return b + 0.5 * t * (first + t * (second + t * third)), xp.where(wanted == place, -slope / dt, 0.0)
+
+
+def commands_by(vehicle: Vehicle, late: Array, names: Sequence[str]) -> Array:
+    """Slopes of the arriving commands by some of a record's own numbers (names, n, n_inputs).
+
+    Args:
+        late: slopes by each input's delay, of `commands_moved`. names: of `Nuisance`; most move no command.
+    """
+    motor = np.array(motors(vehicle))
+    ways = {"delay_motor": late * motor, "delay_servo": late * ~motor}
+    for j, name in enumerate(vehicle.input_names):
+        ways[f"trim_{name}"] = np.tile(np.arange(len(motor)) == j, (len(late), 1)).astype(float)
+    return np.stack([ways.get(name, np.zeros_like(late)) for name in names])
 
 
 def motors(vehicle: Vehicle) -> list[bool]:

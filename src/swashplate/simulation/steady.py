@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from swashplate.arrays import Array
+from swashplate.arrays import IMAGINARY, Array
 from swashplate.physics.backend import ArrayBackend, Backend
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody
@@ -24,8 +24,6 @@ ACCELERATIONS = slice(3, 6)
 ANGULAR_ACCELERATIONS = slice(9, 12)
 
 _XP = ArrayBackend()
-_IMAGINARY = 1e-30
-"""Step of a slope by complex numbers, exact to rounding (Squire and Trapp 1998)."""
 
 
 def assemble(
@@ -95,8 +93,8 @@ def unrest_at(
     free = [name not in held for name in equations.vehicle.input_names]
     by_z, by_input = np.zeros((len(state), z.size)), np.zeros((len(inputs), z.size))
     for place in range(2):
-        turned = assemble(equations, z + 1j * _IMAGINARY * np.eye(z.size)[place], course, _XP)[0]
-        by_z[:, place] = np.imag(turned) / _IMAGINARY
+        turned = assemble(equations, z + 1j * IMAGINARY * np.eye(z.size)[place], course, _XP)[0]
+        by_z[:, place] = np.imag(turned) / IMAGINARY
     by_z[BODY:, z.size - inside :] = np.eye(inside)
     by_input[free, 2 : z.size - inside] = np.eye(sum(free))
     slope = by_x @ by_z + by_w[:, : len(inputs)] @ by_input

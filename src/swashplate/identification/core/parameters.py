@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swashplate.arrays import IMAGINARY, Array
 from swashplate.errors import CardError, ExpressionError, IdentificationError
 from swashplate.filtering.disturbances import SEPARATE
 from swashplate.filtering.nuisance import PUSHES, USUAL_PUSH, Nuisance
@@ -45,6 +46,11 @@ class Layout:
         for name, expression in self.ties:
             numbers[name] = expression(numbers)
         return self.parameters(**numbers)
+
+    def moved(self, card: Array, row: Array) -> Array:
+        """Slopes of `values` by each free parameter (free, parameters), by complex steps (Squire and Trapp 1998)."""
+        step = 1j * IMAGINARY * np.eye(len(self.free))
+        return np.array([np.imag(np.array(self.values(card, row + one))) / IMAGINARY for one in step])
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from swashplate.arrays import Array, Complex
+from swashplate.arrays import IMAGINARY, Array, Complex
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.filter_library import filter_library
@@ -46,9 +46,6 @@ _BODY = len(RigidBody._fields)
 
 _ASIDE = 2e-3
 """How far to either side of a row slopes are taken, in scaled units, by four points: exact to 1e-10."""
-
-IMAGINARY = 1e-30
-"""Step of a slope by complex numbers, exact to rounding (Squire and Trapp 1998)."""
 
 _PUSHES = np.array([Nuisance._fields.index(name) for name in PUSHES])
 
@@ -135,13 +132,15 @@ def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotio
     return Begun(model.gain_of(dK, dS), _slope_aside(_starts(model, rows, seen)))
 
 
-def start(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Array:
-    """The state that a run begins with; its noise and the mean velocity do not count."""
+def starting_row(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Array:
+    """The state that a run begins with; noise and mean velocity do not count."""
     return np.asarray(_starts(model, FilterNumbers(*(np.asarray(row)[None] for row in numbers)), seen)[0])
 
 
-def start_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Array:
-    """Slopes of `start` along directions, which come first."""
+def starting_row_moved(
+    model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers
+) -> Array:
+    """Slopes of `starting_row` along directions, which come first."""
     return _slope_aside(_starts(model, _aside(numbers, directions), seen))
 
 

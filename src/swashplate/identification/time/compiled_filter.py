@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.arrays import Array
+from swashplate.arrays import IMAGINARY, Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.filter_library import FilterLibrary, filter_library, flat
-from swashplate.identification.time.beginning import IMAGINARY, Begun, FilterNumbers, first_state, numbers_and_constants
+from swashplate.identification.time.beginning import Begun, FilterNumbers, first_state, numbers_and_constants
 from swashplate.simulation.dynamics import CONSTANTS
 
 

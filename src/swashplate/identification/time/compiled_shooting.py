@@ -12,12 +12,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.filtering.arriving_commands import commands_moved, motors
+from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.time.beginning import IMAGINARY, Begun, FilterNumbers, FirstMotion, start, start_moved
+from swashplate.identification.time.beginning import (
+    Begun,
+    FilterNumbers,
+    FirstMotion,
+    starting_row,
+    starting_row_moved,
+)
 from swashplate.identification.time.compiled_filter import CompiledFilter, FilterRun
+from swashplate.identification.time.kinematics import turned_rows
 from swashplate.identification.time.traced_shooting import ShootingPlan
 from swashplate.physics.backend import ArrayBackend
 
@@ -112,7 +119,7 @@ class CompiledShooting:
         here = slice(window.first, window.first + self._plan.length)
         parameters = np.array(self._plan.layout.values(self._card, shared[:k]), dtype=np.float64)
         numbers = FilterNumbers(parameters, self._noise, nuisance, reaching[window.first])
-        begin = Begun(self._no_gain(), start(model, numbers, window.seen) + own[:n])
+        begin = Begun(self._no_gain(), starting_row(model, numbers, window.seen) + own[:n])
         nothing = np.zeros((self._plan.length, model.n_outputs))
         run = self._c.along(begin, numbers, (nothing, reaching[here], window.voltage))
         outputs = np.asarray(model.measure(np.asarray(run.states.x).T, Nuisance(*nuisance), _XP)).T
@@ -124,17 +131,15 @@ class CompiledShooting:
         n, k, m, d = len(model.vehicle.state_names), len(plan.layout.free), self._nuisances.size, self._drifting.size
         count, own = k + m + d + n, k + window.log * m
         scale = np.concatenate([self._scale[:k], self._scale[own : own + m], self._own_scale[n:], self._own_scale[:n]])
-        by_command = self._commands_moved(flown)
+        by_command = commands_by(model.vehicle, flown.late, (*plan.nuisances, *plan.drifting))
         parts = FilterNumbers(*(np.zeros((count, np.size(part))) for part in numbers))
-        for i in range(k):
-            step = shared[:k] + 1j * IMAGINARY * (np.arange(k) == i)
-            parts.parameters[i] = np.imag(np.array(plan.layout.values(self._card, step))) / IMAGINARY
+        parts.parameters[:k] = plan.layout.moved(self._card, shared[:k])
         for i, place in enumerate([*self._nuisances, *self._drifting]):
             parts.nuisance[k + i, place] = 1.0
         parts.inputs[k : k + m + d] = by_command[:, 0]
         directions = FilterNumbers(*(scale[:, None] * part for part in parts))
         begins = np.zeros((count, n))
-        begins[: k + m + d] = start_moved(
+        begins[: k + m + d] = starting_row_moved(
             model, numbers, window.seen, FilterNumbers(*(part[: k + m + d] for part in directions))
         )
         begins[k + m + d :] = np.diag(scale[k + m + d :])
@@ -142,36 +147,15 @@ class CompiledShooting:
         series = flown.outputs, flown.commands, window.voltage
         begin = Begun(self._no_gain(count), begins)
         roots = np.asarray(flown.run.roots)
-        slopes = -self._turned(self._c.moved(flown.begin, begin, numbers, directions, series, roots, (k, late)), flown)
+        slopes = -self._c.moved(flown.begin, begin, numbers, directions, series, roots, (k, late))
+        heading = np.asarray(flown.run.states.x)[:, model.vehicle.index("psi")]
+        slopes = turned_rows(slopes, model.output_names, heading)
         every = np.zeros((plan.shared + n + d, *slopes.shape[1:]))
         every[:k], every[own : own + m] = slopes[:k], slopes[k : k + m]
         every[plan.shared : plan.shared + n], every[plan.shared + n :] = slopes[k + m + d :], slopes[k + m : k + m + d]
         return every
 
-    def _commands_moved(self, flown: FlownWindow) -> Array:
-        """Slopes of the arriving commands by each of the flight's numbers and of the window's drifts."""
-        vehicle = self._plan.model.vehicle
-        motor = np.array(motors(vehicle))
-        ways = {"delay_motor": flown.late * motor, "delay_servo": flown.late * ~motor}
-        for j, name in enumerate(vehicle.input_names):
-            ways[f"trim_{name}"] = np.tile(np.arange(len(motor)) == j, (len(flown.late), 1)).astype(float)
-        names = (*self._plan.nuisances, *self._plan.drifting)
-        return np.stack([ways.get(name, np.zeros_like(flown.late)) for name in names])
-
     def _no_gain(self, *front: int) -> FilterGain:
         model = self._plan.model
         joined = len(model.vehicle.state_names) + model.n_gusts + N_DISTURBANCES
         return model.gain_of(np.zeros((*front, joined, model.n_outputs)), np.eye(model.n_outputs))
-
-    def _turned(self, slopes: Array, flown: FlownWindow) -> Array:
-        """Slopes of innovations (count, n, outputs) with their horizontal part back in local axes."""
-        names = list(self._plan.model.output_names)
-        if not {"x", "y"} <= set(names):
-            return slopes
-        i, j = names.index("x"), names.index("y")
-        psi = np.asarray(flown.run.states.x)[:, self._plan.model.vehicle.index("psi")]
-        c, s = np.cos(psi), np.sin(psi)
-        turned = slopes.copy()
-        turned[:, :, i] = c * slopes[:, :, i] - s * slopes[:, :, j]
-        turned[:, :, j] = s * slopes[:, :, i] + c * slopes[:, :, j]
-        return turned

@@ -133,11 +133,8 @@ def identify_flight(
     nuisances = likelihood.nuisances_of(row)
     nuisance = mean_nuisance(nuisances)
     identified = _identified(best, noise, nuisance, began, every, pieces, by.method)
-    settings: dict[str, Any] = {}
-    if isinstance(likelihood, PredictionError):
-        settings["filter by"] = likelihood.compiled_by
-    else:
-        settings["simulated by"] = likelihood.compiled_by
+    done = "filter by" if isinstance(likelihood, PredictionError) else "simulated by"
+    settings: dict[str, Any] = {done: likelihood.compiled_by}
     if residual is not None:
         if residual.kept and horizon is not None:
             wanders = {"noise": {k: float(v) for k, v in residual.noise._asdict().items()}}

@@ -15,14 +15,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.filtering.arriving_commands import commands, commands_moved, motors
+from swashplate.filtering.arriving_commands import commands, commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.core.robust import losses
 from swashplate.identification.time.beginning import (
-    IMAGINARY,
     Begun,
     FilterNumbers,
     FirstMotion,
@@ -111,7 +110,8 @@ class RecordRun:
     def moved(self, run: Filtered, card: Array, numbers: Array, scale: Array) -> tuple[Array, Array]:
         """Slopes by every scaled entry of the row: innovations (p, n, outputs), covariance (p, outputs, outputs)."""
         model, k, m, p = self.plan.model, len(self.plan.layout.free), len(self.plan.nuisances), len(numbers)
-        by_command = self._commands_moved(run)
+        late = commands_moved(model.vehicle, model.dt, self.inputs, Nuisance(*run.numbers.nuisance), np)[1]
+        by_command = commands_by(model.vehicle, late, self.plan.nuisances)
         own, noises = k + self.log * m, _places(Noise, self.plan.noises)
         directions = FilterNumbers(
             np.zeros((p, len(run.numbers.parameters))),
@@ -119,28 +119,16 @@ class RecordRun:
             np.zeros((p, len(run.numbers.nuisance))),
             np.zeros((p, len(run.numbers.inputs))),
         )
-        for i in range(k):
-            step = numbers[:k] + 1j * IMAGINARY * (np.arange(k) == i)
-            directions.parameters[i] = np.imag(np.array(self.plan.layout.values(card, step))) / IMAGINARY
+        directions.parameters[:k] = self.plan.layout.moved(card, numbers[:k])
         directions.nuisance[np.arange(own, own + m), _places(Nuisance, self.plan.nuisances)] = 1.0
         directions.noise[np.arange(p - noises.size, p), noises] = run.numbers.noise[noises]
         directions.inputs[own : own + m] = by_command[:, : starting_samples(model.dt)].mean(axis=1)
         directions = FilterNumbers(*(scale[:, None] * part for part in directions))
         begin = begun_moved(model, run.numbers, self.seen, directions)
-        late, series = by_command * scale[own : own + m, None, None], (self.readings, run.commands, self.voltage)
+        arriving, series = by_command * scale[own : own + m, None, None], (self.readings, run.commands, self.voltage)
         went = FilterRun(run.innovations, run.states, run.roots)
-        slopes = moved(model, run.begin, begin, run.numbers, directions, series, went, (own, late), free=k)
+        slopes = moved(model, run.begin, begin, run.numbers, directions, series, went, (own, arriving), free=k)
         return slopes, np.asarray(begin.gain.covariance)
-
-    def _commands_moved(self, run: Filtered) -> Array:
-        """Slopes of the arriving commands by each of the record's own numbers (nuisances, n, n_inputs)."""
-        vehicle = self.plan.model.vehicle
-        nuisance, motor = Nuisance(*run.numbers.nuisance), np.array(motors(vehicle))
-        late = commands_moved(vehicle, self.plan.model.dt, self.inputs, nuisance, np)[1]
-        ways = {"delay_motor": late * motor, "delay_servo": late * ~motor}
-        for j, name in enumerate(vehicle.input_names):
-            ways[f"trim_{name}"] = np.tile(np.arange(len(motor)) == j, (len(late), 1)).astype(float)
-        return np.stack([ways.get(name, np.zeros_like(late)) for name in self.plan.nuisances])
 
 
 def _places(of: Any, names: Sequence[str]) -> Any:

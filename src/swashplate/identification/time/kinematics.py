@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from swashplate.arrays import Array
@@ -69,3 +71,14 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
         gyro = record.outputs[:, [names.index(name) for name in RATES]]
         rates = savgol_filter(gyro, 5, 2, axis=0)
     return np.concatenate([smooth[:, :3], velocity, smooth[:, 3:], rates], axis=1)
+
+
+def turned_rows(rows: Array, names: Sequence[str], angles: Array) -> Array:
+    """Rows (..., n, names) whose horizontal parts are turned by n angles about the vertical."""
+    if "x" not in names or "y" not in names:
+        return rows
+    i, j = names.index("x"), names.index("y")
+    c, s, turned = np.cos(angles), np.sin(angles), rows.copy()
+    turned[..., i] = c * rows[..., i] - s * rows[..., j]
+    turned[..., j] = s * rows[..., i] + c * rows[..., j]
+    return turned

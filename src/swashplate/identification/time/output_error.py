@@ -243,13 +243,16 @@ class OutputError:
         return self._cost(residual), gradient, information
 
     def _accumulate(self, row: Array) -> tuple[Array, Array, Array, Array]:
-        residual, derivative = self._with_slopes(row)
+        with np.errstate(over="ignore", invalid="ignore"):  # far out it diverges: its cost is then infinite
+            residual, derivative = self._with_slopes(row)
+        p, s, n = len(self.row), self._shared, len(self._own)
+        gradient, information = np.zeros(p), np.zeros((p, p))
+        if not (np.isfinite(self._cost(residual)) and np.isfinite(derivative).all()):
+            return residual, gradient, information, np.zeros_like(derivative)
         Li = np.linalg.inv(self._L)
         white = residual @ Li.T
         weight = robust.weights(white)
         d_white = derivative @ Li.T
-        p, s, n = len(self.row), self._shared, len(self._own)
-        gradient, information = np.zeros(p), np.zeros((p, p))
         for place in range(len(self._places)):
             own = np.concatenate([np.arange(s), s + place * n + np.arange(n)])
             flat = d_white[place].reshape(s + n, -1)

@@ -31,7 +31,7 @@ from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time import innovations_ahead
 from swashplate.identification.time.beginning import FilterNumbers, seen_at_start
 from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun, traced_cost
-from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.identification.time.kinematics import PREDICTED, turned_rows
 from swashplate.identification.time.noise_entries import estimated_noises, noise_entries, with_first_guesses
 
 SETTLING = 1.5
@@ -326,15 +326,8 @@ class PredictionError:
 
     def unturned(self, innovations: Array, piece: Record) -> Array:
         """Innovations of a record with their horizontal part back in local axes."""
-        names = list(self.model.output_names)
-        if not {"x", "y", "psi"} <= set(names):
-            return innovations
-        turned = innovations.copy()
-        i, j, k = (names.index(name) for name in ("x", "y", "psi"))
-        c, s = np.cos(piece.outputs[:, k]), np.sin(piece.outputs[:, k])
-        turned[:, i] = c * innovations[:, i] - s * innovations[:, j]
-        turned[:, j] = s * innovations[:, i] + c * innovations[:, j]
-        return turned
+        names = self.model.output_names
+        return turned_rows(innovations, names, piece.outputs[:, names.index("psi")]) if "psi" in names else innovations
 
     # ---- what the accuracy analysis and the report need --------------------------------------------------------
     def noise_of(self, row: Array) -> Noise:

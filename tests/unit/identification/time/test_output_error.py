@@ -81,6 +81,17 @@ def test_cost_and_gradient_are_those_of_the_scores_and_jax_calls_them() -> None:
     assert float(traced.function(traced.plan, traced.data, jnp.asarray(row))) == pytest.approx(cost, rel=1e-14)
 
 
+@pytest.mark.parametrize("name", ["coax", "xcell60"])
+def test_a_row_with_which_it_diverges_costs_without_end_and_says_nothing(name: str) -> None:
+    """Warnings are errors here."""
+    likelihood = _likelihood(name)
+    far = likelihood.row.starts() + 1e4 * np.random.default_rng(1).standard_normal(len(likelihood.row))
+    cost, gradient, information = likelihood.scores(far)
+    assert cost == likelihood.cost(far) == np.inf
+    assert not np.any(gradient)
+    assert not np.any(information)
+
+
 def test_without_a_compiler_xla_simulates_the_same_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     likelihood = _likelihood("coax")
     row = _somewhere(likelihood)
