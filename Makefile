@@ -18,7 +18,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make demo   identify the CoaX from one flight, predict another, write demo/report.html"
-	@echo "make test   ruff, mypy, import-linter, pytest and the benchmarks in short"
+	@echo "make test   ruff, pyrefly, import-linter, pytest and the benchmarks in short"
 	@echo "make proof  the statistics with all their seeds and the benchmarks in full, into docs/proof.md (half an hour)"
 	@echo "make siege  damaged files, kills, full disks, packets and hostile pages, into docs/proof.md (an hour)"
 	@echo "make site   the documentation as a site, build/site/index.html; offline, warnings are errors"
@@ -49,7 +49,7 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check .
 
 types: $(STAMP)
-	$(BIN)/mypy
+	$(BIN)/pyrefly check --python-interpreter-path $(BIN)/python --output-format min-text
 
 layers: $(STAMP)
 	$(BIN)/lint-imports
@@ -72,5 +72,5 @@ site: $(STAMP)
 	$(BIN)/python scripts/build_site.py
 
 clean:
-	rm -rf src/swashplate/links/live/page/vendor .venv build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf src/swashplate/links/live/page/vendor .venv build dist demo .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -12,7 +12,7 @@ import sys
 import time
 
 begin = time.perf_counter()
-pid = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ, file_actions=[(os.POSIX_SPAWN_DUP2, 2, 1)])
+pid = os.posix_spawnp(sys.argv[1], sys.argv[1:], os.environ, file_actions=[(os.POSIX_SPAWN_DUP2, 2, 1)])
 _, status, spent = os.wait4(pid, 0)
 told = {"processor": spent.ru_utime + spent.ru_stime, "clock": time.perf_counter() - begin}
 print(json.dumps({**told, "peak_gib": spent.ru_maxrss / 2**20}))

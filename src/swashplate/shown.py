@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class Saved:
     """A result that can be kept as a file."""
 
-    def save(self, path: str | Path) -> Path | tuple[Path, ...]:
+    def save(self, path: str | Path, /) -> Path | tuple[Path, ...]:
         """Write its numbers as a JSON file; what has a file of its own kind (a controller, a flight) says so there."""
         told = getattr(self, "to_document", None) or getattr(self, "as_dict", None)
         return write_json(path, resolve("encode")(self) if told is None else told())

@@ -52,7 +52,7 @@ class NeededExcitation(Saved):
 
     def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Heading and cells of a table."""
-        cells = []
+        cells: list[tuple[str, ...]] = []
         for one in self.movements:
             unit = known(one.channel)
             numbers = (f"{value * unit.shown_factor:.3g}" for value in (one.error, one.moved, one.needed))

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, Complex
 from swashplate.bench.record import BenchRecord
 from swashplate.bench.refusals import refuse_idle
 from swashplate.bench.result import BenchCheck, BenchResult, Curve
@@ -118,7 +118,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     )
 
 
-def _coefficients(record: BenchRecord, channel: str) -> Array:
+def _coefficients(record: BenchRecord, channel: str) -> Complex:
     """Fourier coefficients at the harmonics in every period but the first, shape (periods, harmonics)."""
     values = record[channel]
     length = round(PERIOD / record.dt)

@@ -73,7 +73,7 @@ def fit_lag(
         matrix = np.column_stack(list(columns))
         # The normal equations: few, well-scaled columns, and a hundred times faster than a decomposition of all rows.
         linear = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ (measured - known), rcond=None)[0]
-        return matrix, np.asarray(linear), known + matrix @ linear
+        return matrix, np.asarray(linear, dtype=np.float64), known + matrix @ linear
 
     def cost(log_tau: float) -> float:
         left = measured - solved(float(np.exp(log_tau)))[2]

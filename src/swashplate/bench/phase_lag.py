@@ -128,4 +128,4 @@ def _promised(omega: Array, sigma: Array, residuals: Array) -> Array:
     freedom = omega.size - 2
     square = float(np.sum((residuals / sigma) ** 2))
     wider = square / freedom if stats.chi2.sf(square, freedom) < 0.01 else 1.0
-    return np.asarray(wider * np.linalg.inv(matrix.T @ matrix))
+    return np.asarray(wider * np.linalg.inv(matrix.T @ matrix), dtype=np.float64)

@@ -15,6 +15,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.bench.record import LOADS, BenchRecord
@@ -111,7 +112,7 @@ class RecordSchedule:
     name: str
     procedures: tuple[str, ...]
     driving: Mapping[str, Array]
-    point: Array
+    point: Array | NDArray[np.intp]
     rate: float
     bar: str = "held"
     removed: str = ""

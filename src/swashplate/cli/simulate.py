@@ -92,14 +92,16 @@ def simulate(
         if many.count is not None and controller is not None:
             page = many.page
             flown = sp.monte_carlo(aircraft, controller, maneuver=maneuver, count=many.count, **common, **many.options)
+            shown, late = flown.spread, f"late: {flown.late}"
         else:
             page, how = plot, dict[str, Any](speed=speed, rate=rate, wind=blowing, sensors=sensors.value)
             flown = sp.fly_maneuver(aircraft, maneuver, controller=controller, pilot=pilot, **common, **how)
+            shown, late = flown, ""
         paths = flown.save(out)
         if page is not None:
             paths += (sp.report(flown, path=page),)
-    if many.count is not None:
-        typer.echo(f"late: {flown.late}", err=True)
+    if late:
+        typer.echo(late, err=True)
     for words in flown.remarks:
         typer.echo(f"Careful: {words}", err=True)
     if json:
@@ -107,5 +109,4 @@ def simulate(
 
         typer.echo(as_json(flown.to_document() | {"vehicle": vehicle, "written": paths}))
     elif not quiet:
-        shown = flown if many.count is None else flown.spread
         typer.echo(f"{shown!r}\n\nWritten: {', '.join(map(str, paths))}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +15,7 @@ from swashplate.export.linear import Linear
 from swashplate.flights.schema import channel, is_known
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import CasadiBackend
+from swashplate.physics.backend import CasadiBackend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim
 
@@ -85,7 +85,7 @@ class _Remembering(CasadiBackend):
         super().__init__()
         self.hidden: list[tuple[Any, Any]] = []
         self._casadi = casadi
-        self.detached = self._hide
+        self.detached: Callable[[Scalar], Scalar] = self._hide
 
     def _hide(self, x: Any) -> Any:
         symbol = self._casadi.SX.sym(f"hidden_{len(self.hidden)}")

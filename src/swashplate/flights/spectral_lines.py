@@ -66,7 +66,8 @@ def spectra(signal: Complex, rate: float, band: tuple[float, float]) -> tuple[Ar
     width = 2 * round(_SURROUNDINGS * size / rate) + 1
     around = median_filter(power, size=(1, width), mode="mirror") / np.log(2.0)  # of exponential noise: the mean
     inside = (frequency[near] >= band[0]) & (frequency[near] <= band[1])
-    return frequency[near][inside], (power / np.maximum(around, 1e-300))[:, inside]
+    above = np.asarray(power / np.maximum(around, 1e-300), dtype=np.float64)
+    return np.asarray(frequency[near][inside], dtype=np.float64), above[:, inside]
 
 
 def track(pieces: list[tuple[Array, Complex]], rate: float, band: tuple[float, float]) -> SpectralLine | None:

@@ -67,4 +67,4 @@ def shares(
 
 def unmixed(rows: Array) -> Array:
     """The inverse of `shares`: collective, roll and pitch from the servos, shape (3, n_servos)."""
-    return np.asarray(np.linalg.pinv(rows))
+    return np.asarray(np.linalg.pinv(rows), dtype=np.float64)

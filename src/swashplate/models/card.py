@@ -113,7 +113,7 @@ class Card:
         changed = {}
         for name, value in values.items():
             old = self.parameters[name]
-            known = {"before": old.value} if changes.get("status") == "identified" else {}
+            known: dict[str, Any] = {"before": old.value} if changes.get("status") == "identified" else {}
             changed[name] = replace(old, value=float(value), **{**known, **changes})
         correlations = {
             first: {second: value for second, value in row.items() if second not in values}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -94,7 +95,7 @@ def units_of(senses: Sequence[float], *, battery: bool, warming: bool) -> dict[s
 @lru_cache(maxsize=64)
 def _tuple(name: str, fields: tuple[str, ...]) -> Any:
     """A named tuple type; the same one for the same names, so that compiled code is shared."""
-    return NamedTuple(name, [(entry, Any) for entry in fields])
+    return namedtuple(name, fields)
 
 
 def _options(card: Card) -> tuple[tuple[float, ...], bool, bool]:

@@ -12,10 +12,11 @@ too, counted from where a record or a simulation begins (`facing`). No aircraft 
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter
@@ -181,7 +182,7 @@ def _suited(vehicle: Vehicle) -> None:
 @lru_cache(maxsize=64)
 def _wider(parameters: Any, names: tuple[str, ...]) -> Any:
     """A tuple type with more fields; one for the same names, so that compiled code is shared."""
-    return NamedTuple(parameters.__name__, [(name, Any) for name in (*parameters._fields, *names)])
+    return namedtuple(parameters.__name__, (*parameters._fields, *names))
 
 
 _Rows = tuple[tuple[str, tuple[str, ...]], ...]

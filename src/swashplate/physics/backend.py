@@ -96,7 +96,7 @@ class CasadiBackend:
         self.sin, self.cos, self.tan, self.sqrt = casadi.sin, casadi.cos, casadi.tan, casadi.sqrt
         self.atan2, self.abs, self.where = casadi.atan2, casadi.fabs, casadi.if_else
         self.minimum, self.maximum = casadi.fmin, casadi.fmax
-        self.detached = _same
+        self.detached: Callable[[Scalar], Scalar] = _same
 
 
 def _same(x: Scalar) -> Scalar:

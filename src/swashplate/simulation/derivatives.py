@@ -60,7 +60,7 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
         direct = by_w[:, controls]
     columns = np.concatenate([by_x[:, motions], direct], axis=1)
     n = 6 * len(CONTRIBUTORS)
-    following = -np.linalg.solve(by_x[n:, fast], columns[n:])
+    following = np.asarray(-np.linalg.solve(by_x[n:, fast], columns[n:]), dtype=np.float64)
     columns = columns[:n] + by_x[:n, fast] @ following
     par = vehicle.values()
     scale = np.array([par.mass] * 3 + [par.inertia_xx, par.inertia_yy, par.inertia_zz])[:, None]

@@ -89,7 +89,7 @@ def cascade_plant(
     rows = [model.states.index(name) for name in ("p", "q", "r", "phi", "theta", "psi", "x", "y", "z")]
     seen = states[:, rows]
     speeds = 1j * w[:, None, None] * seen[:, 6:]
-    response = np.concatenate([seen[:, :6], speeds, seen[:, 6:]], axis=1)
+    response = np.concatenate([seen[:, :6], speeds, seen[:, 6:]], axis=1, dtype=np.complex128)
     for i, (command, output) in enumerate(zip(COMMANDS, ("p", "q", "r", "down"), strict=True)):
         if not np.max(np.abs(response[:, OUTPUTS.index(output), i])) > 1e-9:
             raise ControllerError(f"the {command} command moves no {output}.", where=vehicle.name, channel=command)
@@ -247,7 +247,8 @@ def broken_at_commands(plant: CascadePlant, K: Complex, commands: tuple[int, ...
     S = np.linalg.inv(difference)
     turned = np.unwrap(np.angle(np.linalg.det(difference)), axis=1)
     turns = np.round((turned[:, -1] - turned[:, 0]) / np.pi)
-    return BrokenLoops(plant.omega, np.stack([1.0 / S[..., i, i] - 1.0 for i in commands], axis=-1), turns)
+    loops = np.stack([1.0 / S[..., i, i] - 1.0 for i in commands], axis=-1, dtype=np.complex128)
+    return BrokenLoops(plant.omega, loops, turns)
 
 
 def broken_at_leans(plant: CascadePlant, inner: Complex, whole: Complex) -> BrokenLoops:
@@ -262,4 +263,5 @@ def broken_at_leans(plant: CascadePlant, inner: Complex, whole: Complex) -> Brok
     S = np.linalg.inv(np.eye(2) + loop)
     turned = np.unwrap(np.angle(np.linalg.det(np.eye(2) + loop)), axis=1)
     turns = np.round((turned[:, -1] - turned[:, 0]) / np.pi)
-    return BrokenLoops(plant.omega, np.stack([1.0 / S[..., i, i] - 1.0 for i in range(2)], axis=-1), turns)
+    loops = np.stack([1.0 / S[..., i, i] - 1.0 for i in range(2)], axis=-1, dtype=np.complex128)
+    return BrokenLoops(plant.omega, loops, turns)

@@ -105,7 +105,7 @@ class RateLoop:
         without, k = replace(self, gyro_filter=0.0), short(gains)
         if "FLTG" in k:
             k |= {"FLTG": 0.0, "D": 0.0}
-        smooth = _first_order(np.asarray(1j * omega), k.get("FLTT", 0.0))
+        smooth = _first_order(np.asarray(1j * omega, dtype=np.complex128), k.get("FLTT", 0.0))
         return np.asarray(smooth * (k.get("FF", 0.0) + without.controller(k, omega)))
 
     def figures(self, gains: Mapping[str, float], omega: Array) -> LoopFigures:

@@ -60,7 +60,7 @@ def modes_of(loop: SampledLoop) -> NDArray[np.complex128]:
     """The same for a loop that is already linearised."""
     values = np.linalg.eigvals(loop.matrix).astype(np.complex128)
     modes = np.log(values[np.abs(values) > _NO_STATE]) * loop.rate
-    return np.asarray(modes[np.argsort(-modes.real, kind="stable")])
+    return np.asarray(modes[np.argsort(-modes.real, kind="stable")], dtype=np.complex128)
 
 
 def loop_margins(

@@ -162,7 +162,8 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
 
 def _check_sizes(plan: ObserverPlan, f: Feedback, path: str | Path) -> None:
     S, n, m = f.speeds.size, plan.n, plan.inputs
-    expected: dict[str, tuple[int, ...]] = dict.fromkeys(_SINGLE, ()) | dict.fromkeys(("battery", "low", "high"), (m,))
+    expected: dict[str, tuple[int, ...]] = dict.fromkeys(_SINGLE, ())
+    expected |= dict.fromkeys(("battery", "low", "high"), (m,))
     expected |= {"speeds": (S,), "states": (S, n), "inputs": (S, m)}
     expected |= {"gains": (S, m, n + sum(plan.delays) + INTEGRALS)}
     for name, shape in expected.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -74,13 +76,11 @@ def _answers(controller: Lqg, flying: Aircraft, margins: Margins | None) -> list
     """Relative difference of the answers in p, q, r and w to each input, delays included, at its crossover."""
     at = int(np.argmin(np.abs(np.asarray(controller.feedback.speeds) - flying.trim.speed)))
     start = controller.start
-    own_trim = start.__class__(
-        **{
-            **vars(start),
-            "state": np.asarray(controller.feedback.states)[at],
-            "inputs": np.asarray(controller.feedback.inputs)[at],
-            "speed": float(np.asarray(controller.feedback.speeds)[at]),
-        }
+    own_trim = replace(
+        start,
+        state=np.asarray(controller.feedback.states)[at],
+        inputs=np.asarray(controller.feedback.inputs)[at],
+        speed=float(np.asarray(controller.feedback.speeds)[at]),
     )
     own, theirs = linearize(controller.vehicle, own_trim), linearize(flying.vehicle, flying.trim)
     crossovers = {a.name: a.crossover for a in margins.axes} if margins is not None else {}

@@ -56,7 +56,7 @@ def mean_wind(flight: Flight) -> tuple[Array, Array]:
                 hint="Fly full circles at cruise.",
             )
         step = np.linalg.lstsq(slopes, left, rcond=None)[0]
-        estimate = estimate + step
+        estimate = np.asarray(estimate + step, dtype=np.float64)
         if np.max(np.abs(step)) < 1e-9:
             break
     lag, count = round(_LASTS * _RATE), sum(map(len, pieces))

@@ -103,7 +103,7 @@ class _Walk:
         base = self.at
         ends = np.full(stop - base, -1, dtype=np.int64)
         letters = data[places]
-        decodings = {}
+        decodings: dict[str, tuple[Whole, Whole]] = {}
         for letter in self.letters:
             mine = places[letters == ord(letter)]
             written, after = decoded(data, mine + 1, self.header.layouts[letter])

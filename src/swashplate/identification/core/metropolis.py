@@ -13,8 +13,10 @@ import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.identification.core.scoring import Likelihood
@@ -122,7 +124,7 @@ def _learnt(draws: Array, share: float, p: int) -> _Reference:
 
 
 def _walked(
-    data: Mapping[str, Array], chain: _Chain, reference: _Reference, steps: int, thin: int, *, learns: bool
+    data: Mapping[str, NDArray[Any]], chain: _Chain, reference: _Reference, steps: int, thin: int, *, learns: bool
 ) -> tuple[Array, Array, float]:
     """Whitened numbers (kept, p), log-density and mean acceptance of each (kept, 2), and the last share."""
     inverse, share = np.linalg.inv(reference.root), reference.share
@@ -147,7 +149,7 @@ def _walked(
     return np.array(rows), np.array(stats), share
 
 
-def _density(likelihood: Likelihood, data: Mapping[str, Array], z: Array) -> float:
+def _density(likelihood: Likelihood, data: Mapping[str, NDArray[Any]], z: Array) -> float:
     with np.errstate(over="ignore", invalid="ignore"):
         row, stretch = unbent(data, z, np)
     if not (np.all(np.isfinite(row)) and np.all((row >= data["low"]) & (row <= data["high"]))):
@@ -157,7 +159,7 @@ def _density(likelihood: Likelihood, data: Mapping[str, Array], z: Array) -> flo
     return float(total) if np.isfinite(total) else -np.inf
 
 
-def _together(parts: list[list[tuple[Array, Array]]], data: Mapping[str, Array], share: float) -> Chains:
+def _together(parts: list[list[tuple[Array, Array]]], data: Mapping[str, NDArray[Any]], share: float) -> Chains:
     rows = np.stack([[unbent(data, z, np)[0] for z in np.concatenate([part for part, _ in own])] for own in parts])
     stats = np.stack([np.concatenate([part for _, part in own]) for own in parts])
     told = {"lp": stats[:, :, 0], "acceptance_rate": stats[:, :, 1], "diverging": np.zeros(stats.shape[:2])}

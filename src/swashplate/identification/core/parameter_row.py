@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 
@@ -101,6 +102,6 @@ class Row:
         information[np.ix_(known, known)] = np.linalg.inv(correlation[np.ix_(known, known)]) * np.outer(own, own)
         return information
 
-    def places(self, group: str) -> Array:
+    def places(self, group: str) -> NDArray[np.intp]:
         """Indices of a group's entries."""
         return np.array([i for i, entry in enumerate(self.entries) if entry.group == group], dtype=np.intp)

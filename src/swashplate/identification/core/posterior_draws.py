@@ -181,7 +181,7 @@ class Posterior:
         """Heading and cells of a table of the model's parameters: quantiles, spread, and how well they were drawn."""
         quantiles = np.quantile(self.values, QUANTILES, axis=0)
         spread = self.values.std(axis=0, ddof=1)
-        made = []
+        made: list[tuple[str, ...]] = []
         for i, name in enumerate(self.names[: self.parameters]):
             cells = [name, *(f"{q:.5g}" for q in quantiles[:, i]), f"{spread[i]:.2g}"]
             cells += [f"{self.rhat[i]:.4f}", f"{self.ess[i]:.0f}"] if self.rhat.size else ["", ""]

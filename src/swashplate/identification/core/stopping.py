@@ -96,9 +96,9 @@ def keep(interrupt: BaseException) -> None:
     if stop is None or not stop.keeps or not stop.iterations or stop.code:
         raise interrupt
     code = interrupt.code if isinstance(interrupt, SystemExit) else 128 + signal.SIGINT
-    if code not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
+    if not isinstance(code, int) or code not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
         raise interrupt
-    stop.code = int(code)
+    stop.code = code
 
 
 def unfinished() -> str:

@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.identification.core.parameter_row import Row
@@ -39,7 +40,7 @@ class Chains:
     step: Array
 
 
-def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, Array]:
+def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, NDArray[Any]]:
     """The arrays that `unbent` and `log_prior` take.
 
     Args:

@@ -166,7 +166,7 @@ def line_information(model: Sensed, frequency: Array, inputs: Complex, noise: No
 
 
 def _resolvent(model: Sensed, w: Array) -> Complex:
-    return np.asarray(np.linalg.inv(1j * w[:, None, None] * np.eye(len(model.A)) - model.A))
+    return np.asarray(np.linalg.inv(1j * w[:, None, None] * np.eye(len(model.A)) - model.A), dtype=np.complex128)
 
 
 def bounds_from(information: Array) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.identification.frequency.response_cost import Target
@@ -84,7 +85,7 @@ def by_regression(
 
 
 def _states(
-    model: StateSpaceModel, part: FrequencyResponse, at: Array, rows: Sequence[int]
+    model: StateSpaceModel, part: FrequencyResponse, at: NDArray[np.intp], rows: Sequence[int]
 ) -> tuple[Complex | None, Array]:
     """Responses of all states and their errors, (n_f, n_states, n_inputs), by outputs and parameter-free equations."""
     m = model.matrices()

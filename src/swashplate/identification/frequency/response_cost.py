@@ -169,7 +169,7 @@ def log_error(model: Complex, measured: Complex) -> Complex:
     """log(model / measured) with the phase difference wrapped to half a turn either way."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = model / measured
-        return np.asarray(np.log(np.abs(ratio)) + 1j * np.angle(ratio))
+        return np.asarray(np.log(np.abs(ratio)) + 1j * np.angle(ratio), dtype=np.complex128)
 
 
 def cost_of(model: Complex, wanted: Target) -> float:

@@ -95,7 +95,7 @@ class RegressionPlan:
             late = 0.0 if name == self.equation.left else self.equation.delays.get(name, 0.0)
             hold = self.hold if name in self.held else np.ones_like(omega)
             rows.append(hold * np.exp(-1j * omega * late))
-        return np.array(rows)
+        return np.array(rows, dtype=np.complex128)
 
 
 def regression_plan(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
@@ -363,7 +364,7 @@ def _window_weight(matrix: SpectralMatrix) -> Array:
     return np.where(known, matrix.averages**2, 0.0)
 
 
-def _mean(weight: Array, values: Array) -> Array:
+def _mean(weight: Array, values: NDArray[Any]) -> NDArray[Any]:
     shaped = weight.reshape(weight.shape + (1,) * (values.ndim - 2))
     with np.errstate(divide="ignore", invalid="ignore"):
         total = np.sum(np.where(shaped > 0.0, shaped * np.nan_to_num(values), 0.0), axis=0)

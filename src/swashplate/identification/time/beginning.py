@@ -327,6 +327,6 @@ def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> A
 
 def _solved(slope: Array, value: Array) -> Array:
     try:
-        return np.asarray(np.linalg.solve(slope, value))
+        return np.asarray(np.linalg.solve(slope, value), dtype=np.float64)
     except np.linalg.LinAlgError:  # nothing comes to rest: the run's cost is then infinite
         return np.full_like(value, np.nan)

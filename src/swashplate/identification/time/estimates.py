@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import PUSHES
@@ -50,7 +51,7 @@ class Found:
     left: Array
 
     @property
-    def places(self) -> Array:
+    def places(self) -> NDArray[np.intp]:
         return self.criterion.row.places("parameter")
 
     @property

@@ -157,7 +157,7 @@ def _transformed(
     omega = 2.0 * np.pi * hertz
     weight = np.full(time.size, time[1] - time[0])
     weight[[0, -1]] *= 0.5
-    both = (np.exp(-1j * np.outer(omega, time)) * weight) @ table
+    both = (np.exp(-1j * np.outer(omega, time)) * weight) @ table.astype(np.complex128)
     return omega, length, both[:, :inputs], both[:, inputs:]
 
 

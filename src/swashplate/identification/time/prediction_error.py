@@ -78,7 +78,7 @@ def parameter_entries(table: Parameterization) -> list[Entry]:
     ]
 
 
-def stack_records(pieces: Sequence[Record]) -> dict[str, Array]:
+def stack_records(pieces: Sequence[Record]) -> dict[str, NDArray[Any]]:
     """Records of different lengths side by side, padded with their last sample, and a mask of what is real."""
     longest = -(-max(piece.time.size for piece in pieces) // _LENGTHS) * _LENGTHS
 

@@ -76,4 +76,4 @@ def mixer_response(
         answer += gravity * math.cos(theta) * math.sin(phi) * states[:, place("phi")]
     else:
         answer = states[:, place(output)]
-    return np.asarray(answer * np.exp(-1j * omega * late))
+    return np.asarray(answer * np.exp(-1j * omega * late), dtype=np.complex128)

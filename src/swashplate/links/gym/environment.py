@@ -58,7 +58,7 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):  # type: i
         self._k = np.zeros(1, dtype=np.int64)
         self._x = np.array(self.flying.trim.state)[None]
         self._p = self.flying.parameters[None]
-        self._action = np.zeros(len(self.flying.free))
+        self._action: NDArray[Any] = np.zeros(len(self.flying.free))
         self._picture: EnvironmentPicture | None = None
 
     def render(self) -> NDArray[np.uint8] | None:

@@ -55,7 +55,7 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
         self._p = np.tile(self.flying.parameters, (num_envs, 1))
         self._k = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=np.bool_)
-        self._actions = np.zeros((num_envs, len(self.flying.free)))
+        self._actions: NDArray[Any] = np.zeros((num_envs, len(self.flying.free)))
         self._picture: EnvironmentPicture | None = None
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:

@@ -61,7 +61,7 @@ class OneLine(logging.Filter):
         self._told = False
 
     def filter(self, record: logging.LogRecord) -> bool:
-        if record.exc_info is None or not isinstance(record.exc_info[1], UnicodeDecodeError):
+        if not record.exc_info or not isinstance(record.exc_info[1], UnicodeDecodeError):
             return True
         told, self._told = self._told, True
         record.exc_info, record.msg, record.args = None, "A page's message was refused: it is no UTF-8.", ()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.models.card import Card
@@ -135,7 +136,7 @@ LATE = replace(TRAITS, delayed_by="servo_delay")
 @lru_cache(maxsize=16)
 def _tuple(name: str, fields: tuple[str, ...]) -> Any:
     """A named tuple type; the same one for the same names, so that compiled code is shared."""
-    return NamedTuple(name, [(entry, Any) for entry in fields])
+    return namedtuple(name, fields)
 
 
 def _state_names(state: CoaxialState) -> tuple[str, ...]:

@@ -109,7 +109,8 @@ def linear_vehicle(model: StateSpaceModel, *, limits: Mapping[str, tuple[float, 
         options[SIZE] = float(size)
     card = Card(NAME, model.title, model.trust, options, parameters, observer=_delays(model), path=model.name)
     made = linear(card)
-    return StateSpaceVehicle(**{f.name: getattr(made, f.name) for f in fields(Vehicle)} | {"structure": model})
+    parts: dict[str, Any] = {f.name: getattr(made, f.name) for f in fields(Vehicle)}
+    return StateSpaceVehicle(**parts | {"structure": model})
 
 
 def _delays(model: StateSpaceModel) -> dict[str, dict[str, float]]:

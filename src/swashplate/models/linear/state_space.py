@@ -197,7 +197,12 @@ class StateSpaceModel:
                 "the left side is singular: some state's derivative stands in no equation.", where=self.name
             )
         a, b = np.linalg.solve(m["M"], m["F"]), np.linalg.solve(m["M"], m["G"])
-        return np.asarray(a), np.asarray(b), m["H0"] + m["H1"] @ a, m["D"] + m["H1"] @ b
+        return (
+            np.asarray(a, dtype=np.float64),
+            np.asarray(b, dtype=np.float64),
+            np.asarray(m["H0"] + m["H1"] @ a, dtype=np.float64),
+            np.asarray(m["D"] + m["H1"] @ b, dtype=np.float64),
+        )
 
     @cached_property
     def entry_delays(self) -> dict[str, tuple[int, int]]:
@@ -374,7 +379,7 @@ class StateSpaceModel:
         return "\n".join(lines)
 
 
-def _change(e: Element, o: int, i: int, x: Complex, left: Complex, jw: Complex) -> Complex | None:
+def _change(e: Element, o: int, i: int, x: Array | Complex, left: Complex, jw: Complex) -> Array | Complex | None:
     """What one entry's unit change does to one response, None where nothing."""
     if e.matrix == "F":
         return left[:, e.row] * x[:, e.column]

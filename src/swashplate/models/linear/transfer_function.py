@@ -160,18 +160,19 @@ class TransferFunction:
     @property
     def poles(self) -> Complex:
         """Roots of the denominator [1/s]."""
-        return np.concatenate([_roots(self.form.pole_names, self.values), np.zeros(max(self.form.integrators, 0))])
+        return _with_origin(_roots(self.form.pole_names, self.values), self.form.integrators)
 
     @property
     def zeros(self) -> Complex:
         """Roots of the numerator [1/s]."""
-        return np.concatenate([_roots(self.form.zero_names, self.values), np.zeros(max(-self.form.integrators, 0))])
+        return _with_origin(_roots(self.form.zero_names, self.values), -self.form.integrators)
 
     @property
     def coefficients(self) -> tuple[Array, Array]:
         """Numerator and denominator in falling powers of s, without the delay."""
         top = self.values["K"] * np.real(np.atleast_1d(np.poly(self.zeros)))
-        return np.asarray(top), np.real(np.atleast_1d(np.poly(self.poles)))
+        bottom = np.real(np.atleast_1d(np.poly(self.poles)))
+        return np.asarray(top, dtype=np.float64), np.asarray(bottom, dtype=np.float64)
 
     def to_control(self, *, pade: int | None = None) -> Any:
         """As `control.TransferFunction`.
@@ -246,6 +247,11 @@ class TransferFunctions(tuple[TransferFunction, ...]):
         for k, name in enumerate(free):
             slopes[:, k] = by_name.get(name, 0.0)
         return h, slopes
+
+
+def _with_origin(roots: Complex, count: int) -> Complex:
+    """Roots and so many at zero."""
+    return np.concatenate([roots, np.zeros(max(count, 0), dtype=np.complex128)])
 
 
 def _roots(names: Sequence[str], values: Mapping[str, float]) -> Complex:
