@@ -167,6 +167,16 @@ def test_pictures_come_rarer_while_steps_are_late_and_more_often_again(visit_: A
     visit.done()
 
 
+def test_charts_of_a_single_sample_are_drawn(visit_: Any, coax: str) -> None:
+    """A range of no length has ticks without end: uPlot filled an array until there was no memory left."""
+    visit = visit_(coax).flies()
+    one = "((t) => { swash.charts.clear(); swash.charts.add(t, swash.now.own, null); swash.charts.draw(); })"
+    for t in (1.0, 2.22):
+        visit.of(f"{one}({t})")
+        visit.until("Number(document.documentElement.dataset.drawn) > 3")
+    visit.done()
+
+
 def test_decoupling_changes_the_path_of_the_same_stick(visit_: Any, coax: str) -> None:
     visit = visit_(coax).flies()
     visit.page.check("#ghost")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
-import jax
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import CardError, FlightError, SwashError
+from swashplate.jax_on_demand import jax
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.batch import Batch, FlyBatch, Precision, fly_batch

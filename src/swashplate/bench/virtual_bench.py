@@ -9,11 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +18,7 @@ from swashplate.arrays import Array
 from swashplate.bench.record import LOADS, BenchRecord
 from swashplate.bench.refusals import COMMANDS
 from swashplate.errors import BenchError
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.coax import CoaxInputs, CoaxParameters, CoaxState, Drive, loads
 from swashplate.models.coax_rotors import InflowOptions
 from swashplate.models.vehicle import Vehicle
@@ -181,7 +179,7 @@ def _flat(force: Vector, moment: Vector) -> Any:
     return jnp.stack([*force, *moment])
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_FLIGHT)
+@jit(static_argnums=0, compiler_options=QUICK_FLIGHT)
 def _run(plan: _Held, start: Any, driving: Any, parameters: Any) -> tuple[Any, Any]:
     """States (records, n, 6) and loads (records, n, 6) for driving rows (records, n, 11).
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.jax_on_demand import jnp
 from swashplate.models.vehicle import Vehicle
 
 

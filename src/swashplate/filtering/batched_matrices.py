@@ -10,16 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import jax
-import jax.numpy as jnp
-
 from swashplate.filtering import stack_kernels
 from swashplate.filtering.matrix_operations import JaxMatrices, Scalars
+from swashplate.jax_on_demand import jax, jnp, when_loaded
 from swashplate.physics.backend import Backend
 from swashplate.simulation.trigonometry import vector_backend
 
 
-@jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Stack:
     """Matrices of many vehicles, shape (rows, columns, vehicles); operators are those of one matrix.
@@ -61,6 +58,9 @@ class Stack:
 
     __radd__ = __add__
     __rmul__ = __mul__
+
+
+when_loaded(lambda: jax.tree_util.register_dataclass(Stack))
 
 
 def _of(other: Any) -> Any:

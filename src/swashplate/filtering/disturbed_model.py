@@ -15,8 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.filtering.block_matrices import blocks, diagonal
@@ -25,6 +23,7 @@ from swashplate.filtering.filter_loop import filtered
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import kalman_gain
 from swashplate.flights.schema import POSITION, RATES
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import jax
+from swashplate.jax_on_demand import jax
 
 Correct = Callable[[Any, Any, Any], tuple[Any, Any]]
 """(predicted state, reading, what holds now) to (corrected state, what is told, such as the innovation)."""

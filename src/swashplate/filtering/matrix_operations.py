@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-import jax
-import jax.numpy as jnp
-
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.physics.backend import Backend
 from swashplate.simulation.dynamics import jax_backend
 from swashplate.simulation.runge_kutta import rk4_change

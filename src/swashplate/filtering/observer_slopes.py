@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverPlan
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.physics.backend import Backend
 from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
@@ -39,7 +37,7 @@ def linearised_at(of: OfObserver, plan: ObserverPlan, numbers: Numbers, e: Array
     return values, slopes[:, : len(e)]
 
 
-@partial(jax.jit, static_argnums=(0, 1), compiler_options=RUN_RARELY)
+@jit(static_argnums=(0, 1), compiler_options=RUN_RARELY)
 def _compiled(
     of: OfObserver, plan: ObserverPlan, numbers: Numbers, e: Float[jax.Array, " N"], w: Float[jax.Array, " driving"]
 ) -> tuple[Any, Any]:

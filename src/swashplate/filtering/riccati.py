@@ -7,13 +7,13 @@ horizon: with JAX a fixed number of times, so that the gain can be differentiate
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.simulation.gathered_noise import summed
 
 Map = tuple[Any, Any, Any]
@@ -70,7 +70,6 @@ def gain_at(P: Any, C: Any, R: Any, xp: Any) -> Any:
     return xp.linalg.solve(C @ P @ C.T + R, C @ P).T
 
 
-@jax.custom_jvp
 def predicted_covariance(A: Any, C: Any, Q: Any, R: Any) -> Any:
     """Steady covariance P of the one-step-ahead state error: P = A P A' - A P C'(C P C' + R)^-1 C P A' + Q.
 
@@ -83,13 +82,23 @@ def predicted_covariance(A: Any, C: Any, Q: Any, R: Any) -> Any:
         Q: process noise covariance per sample, shape (n, n).
         R: measurement noise covariance, shape (m, m).
     """
+    return _with_slopes()(A, C, Q, R)
+
+
+@cache
+def _with_slopes() -> Any:
+    made = jax.custom_jvp(_settled_covariance)
+    made.defjvp(_covariance_moved)
+    return made
+
+
+def _settled_covariance(A: Any, C: Any, Q: Any, R: Any) -> Any:
     (_, _, P), _ = jax.lax.scan(
         lambda whole, _: (followed(whole, whole, jnp), None), through(A, C, Q, R, jnp), None, length=_DOUBLINGS
     )
     return 0.5 * (P + P.T)
 
 
-@predicted_covariance.defjvp
 def _covariance_moved(here: tuple[Any, Any, Any, Any], moved: tuple[Any, Any, Any, Any]) -> tuple[Any, Any]:
     """The change of the covariance, from the equation that it solves rather than through every doubling.
 

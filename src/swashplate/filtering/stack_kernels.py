@@ -12,12 +12,10 @@ from functools import lru_cache
 from threading import Lock
 from typing import Any
 
-import jax
-import jax.numpy as jnp
-
 from swashplate.compiled import NATIVE, loaded
 from swashplate.compiler import compiler
 from swashplate.errors import SwashError
+from swashplate.jax_on_demand import jax, jnp
 
 _OPTIONS = ("-O3", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-Wno-psabi")
 _MOST = 40

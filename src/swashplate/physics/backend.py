@@ -12,6 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from swashplate.jax_on_demand import jax, jnp
+
 Scalar = Any
 """A number: `float`, a JAX tracer or array, or a CasADi expression."""
 
@@ -80,9 +82,6 @@ class JaxBackend(ArrayBackend):
     """JAX arrays and tracers."""
 
     def __init__(self) -> None:
-        import jax
-        import jax.numpy as jnp
-
         super().__init__(jnp, jax.lax.stop_gradient)
 
 

@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import diffrax
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float, Real
 
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows

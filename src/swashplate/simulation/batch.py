@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, Protocol
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.flights.flight import Flight
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.dynamics import Equations, row_rates
 from swashplate.simulation.record import check_divergence, simulated_flight
@@ -116,7 +115,7 @@ def fly_batch(
         return np.concatenate(list(threads.map(block, range(0, count, BLOCK))), axis=2)
 
 
-@partial(jax.jit, static_argnums=0, static_argnames=("keep", "held", "looped"))
+@jit(static_argnums=0, static_argnames=("keep", "held", "looped"))
 def trajectories(
     equations: Equations,
     x0: Float[jax.Array, "states vehicles"],

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +14,7 @@ from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
@@ -277,7 +276,7 @@ def _arrived(sent: Float[jax.Array, "commands inputs"], late: Int[jax.Array, " i
     return jnp.take_along_axis(sent, late[None, :], axis=0)[0]
 
 
-_fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_FLIGHT)
+_fly = jit(static_argnums=(0, 1, 2, 3), compiler_options=QUICK_FLIGHT)(_flying)
 
 
 def told(

@@ -7,14 +7,13 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import CardError, SwashError
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.rigid_body import RigidBody
@@ -298,4 +297,4 @@ def _flying_many(
     return record  # type: ignore[no-any-return]
 
 
-_fly_many = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5, 6, 7), compiler_options=QUICK_FLIGHT)
+_fly_many = jit(static_argnums=(0, 1, 2, 3, 4, 5, 6, 7), compiler_options=QUICK_FLIGHT)(_flying_many)

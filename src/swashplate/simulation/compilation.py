@@ -9,13 +9,13 @@ import zlib
 from contextlib import suppress
 from pathlib import Path
 
-import jax
 import numpy as np
 import platformdirs
 
 from swashplate.arrays import Array
 from swashplate.atomic import write_text
 from swashplate.errors import WriteError
+from swashplate.jax_on_demand import option, set_option
 
 QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
 """Options for `jax.jit`: a helicopter's exact derivatives compile four times faster, loops of one vehicle by a sixth to
@@ -85,7 +85,7 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     """
     chosen = Path(
         folder
-        or jax.config.values["jax_compilation_cache_dir"]
+        or option("jax_compilation_cache_dir")
         or Path(platformdirs.user_cache_dir("swashplate", appauthor=False)) / "jax"
     )
     try:
@@ -95,9 +95,9 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     if not os.access(chosen, os.W_OK):
         return None
     _without_damaged(chosen)
-    _set("jax_compilation_cache_dir", str(chosen))
-    _set("jax_persistent_cache_min_compile_time_secs", 0.3)
-    _set("jax_persistent_cache_min_entry_size_bytes", 0)
+    set_option("jax_compilation_cache_dir", str(chosen))
+    set_option("jax_persistent_cache_min_compile_time_secs", 0.3)
+    set_option("jax_persistent_cache_min_entry_size_bytes", 0)
     return chosen
 
 
@@ -147,14 +147,10 @@ def _unpacks(content: bytes) -> bool:
         return False
 
 
-def _set(option: str, value: object) -> None:
-    jax.config.update(option, value)  # type: ignore[no-untyped-call]
-
-
 def dispatch_in_line() -> None:
     """Let JAX run compiled code in the thread that calls it, for a process that waits for every small step.
 
     By default the CPU back end hands every program with a loop to another thread (measured: 45 us a call). An option
     that is read when JAX first computes; called by entry points that own their process.
     """
-    _set("jax_cpu_enable_async_dispatch", False)
+    set_option("jax_cpu_enable_async_dispatch", False)

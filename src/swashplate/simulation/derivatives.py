@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.conventional.derivative_table import COLUMNS, CONTROLS, MOTIONS, DerivativeTable
 from swashplate.models.conventional.helicopter import CONTRIBUTORS, loads
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
@@ -23,7 +22,6 @@ from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
-    Rows,
     enable_double_precision,
     equations_of,
     jax_backend,
@@ -31,6 +29,9 @@ from swashplate.simulation.dynamics import (
     unpack_rows,
 )
 from swashplate.simulation.trim import Trim
+
+if TYPE_CHECKING:
+    from swashplate.simulation.dynamics import Rows
 
 _FAST = ("a1", "b1", "lam0", "lam_c", "lam_s")
 """States that follow without delay in a table of derivatives with six degrees of freedom."""
@@ -79,7 +80,7 @@ def _exact_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tuple[A
     return slopes[:, : len(x)], slopes[:, len(x) :]
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
+@jit(static_argnums=0, compiler_options=RUN_RARELY)
 def _compiled_slopes(equations: Equations, x: Array, w: Array, p: Float[jax.Array, " parameters"]) -> tuple[Any, Any]:
     def acting(x: Float[jax.Array, " states"], w: Float[jax.Array, " inputs"]) -> Any:
         return jnp.stack([jnp.asarray(value, x.dtype) for value in _acting(equations, x, w, p=p, xp=jax_backend())])

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.jax_on_demand import jax, jit, jnp, option, set_option
 from swashplate.models.nesting import rebuild
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
@@ -25,7 +24,8 @@ from swashplate.simulation.trigonometry import vector_backend
 
 Rates = Callable[[Any, Any, Any, Environment], Any]
 RowRates = Callable[[Any, Any, Any], Any]
-Rows = jax.Array | Array | Sequence[Any]
+if TYPE_CHECKING:
+    Rows = jax.Array | Array | Sequence[Any]
 
 SURROUNDINGS = ("wind_north", "wind_east", "wind_down", "voltage")
 """What of the environment may change during a flight, in the order of the driving row."""
@@ -36,8 +36,8 @@ CONSTANTS = ("air_density", "gravity")
 def enable_double_precision() -> None:
     """Make JAX compute in float64, as every public entry point of swashplate needs; importing alone does not do it."""
     compile_small_loops_whole()
-    if not jax.config.values["jax_enable_x64"]:
-        jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
+    if option("jax_enable_x64") is not True:
+        set_option("jax_enable_x64", True)
 
 
 @lru_cache(maxsize=1)
@@ -166,7 +166,7 @@ def rates_and_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tupl
     return values, slopes[:, : len(x)], slopes[:, len(x) :]
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
+@jit(static_argnums=0, compiler_options=RUN_RARELY)
 def _compiled_slopes(
     equations: Equations,
     x: Float[jax.Array, " states"],

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 from jaxtyping import Float, Num
 
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.simulation.discretisation import held_series
 
 _HALVINGS, _TERMS = 8, 5

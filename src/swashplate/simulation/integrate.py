@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.earth import Earth
@@ -140,7 +138,7 @@ def simulate(
     return observe(flight, vehicle, sensors=sensors, seed=seed)
 
 
-@partial(jax.jit, static_argnums=0, static_argnames="held", compiler_options=QUICK_FLIGHT)
+@jit(static_argnums=0, static_argnames="held", compiler_options=QUICK_FLIGHT)
 def trajectory(
     equations: Equations,
     x0: Float[jax.Array, " states"],

@@ -15,11 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Literal
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
@@ -28,6 +25,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.catalogue import from_card
 from swashplate.models.linear.matrices_file import state_space_of_matrices
 from swashplate.models.linear.stitching import stitch_points
@@ -181,7 +179,7 @@ def _linear_step(
     return total
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_FLIGHT)
+@jit(static_argnums=0, compiler_options=QUICK_FLIGHT)
 def _printed(
     equations: Equations,
     trimmed: tuple[Float[jax.Array, " states"], Float[jax.Array, " inputs"]],
@@ -247,7 +245,7 @@ def _stitched(over: Schedule) -> Vehicle:
     return from_card(stitch_points(points, names=[point.title for point in points]))
 
 
-@jax.jit
+@jit()
 def _scheduled(
     tables: tuple[Float[jax.Array, "speeds ..."], ...],
     x0: Float[jax.Array, " states"],

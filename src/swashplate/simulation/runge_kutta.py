@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 from jaxtyping import Float, Int
+
+from swashplate.jax_on_demand import jax, jnp
 
 Rates = Callable[[Any, Any], Any]
 """`f(x, w)`: the rates of a row (or column, or number) under what drives it."""

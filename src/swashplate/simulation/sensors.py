@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
-import jax
 import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
@@ -16,6 +14,7 @@ from swashplate.errors import SwashError
 from swashplate.flights.conditioning.resample import values_at
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.schema import POSITION, QUATERNION, RATES
+from swashplate.jax_on_demand import jax, jit
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.dynamics import (
@@ -191,7 +190,7 @@ def specific_forces(flight: Flight, vehicle: Vehicle, *, environment: Environmen
     return np.asarray(_specific_forces(equations_of(vehicle), states, rows, p))
 
 
-@partial(jax.jit, static_argnums=0)
+@jit(static_argnums=0)
 def _specific_forces(equations: Equations, states: Array, rows: Array, p: Array) -> Any:
     felt = row_force(equations)
     return jax.vmap(lambda x, w: felt(x, w, p))(states, rows)

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import IMAGINARY, Array
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.physics.backend import ArrayBackend, Backend
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody

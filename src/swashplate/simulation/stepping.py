@@ -14,13 +14,12 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple, Protocol
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, FloatBackend, Scalar

@@ -11,10 +11,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 from jaxtyping import Float
 
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.physics.backend import JaxBackend
 
 

@@ -12,12 +12,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Final, NamedTuple, Protocol
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, FloatBackend, JaxBackend, Scalar
 from swashplate.physics.environment import Environment
@@ -145,8 +144,6 @@ def euler_rows(rows: Array, before: Array) -> Array:
 
 
 # ---- in closed loops -----------------------------------------------------------------------------------------------
-Rows = Float[jax.Array, "rows ..."]
-"""A row, or columns of several vehicles."""
 
 
 class CarriedAttitude(NamedTuple):
@@ -177,11 +174,11 @@ def with_quaternion(vehicle: Vehicle, start: Array) -> CarriedAttitude:
     return CarriedAttitude(tumbling(vehicle), begin, start[_PHI:_P], _as_euler)
 
 
-def _as_it_is(x: Rows, shown: Rows) -> tuple[Any, Any]:
+def _as_it_is(x: Float[jax.Array, "rows ..."], shown: Float[jax.Array, "rows ..."]) -> tuple[Any, Any]:
     return x, shown
 
 
-def _as_euler(x: Rows, shown: Rows) -> tuple[Any, Any]:
+def _as_euler(x: Float[jax.Array, "rows ..."], shown: Float[jax.Array, "rows ..."]) -> tuple[Any, Any]:
     euler = euler_of(Quaternion(*(x[_PHI + k] for k in range(4))), JaxBackend())
     turn = 2.0 * jnp.pi
     roll, yaw = (

@@ -10,11 +10,8 @@ axis is used.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import NDArray
@@ -27,6 +24,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.time.beginning import FilterNumbers
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.record_filter import RUNS, whole
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.validation.controller_law import Law, shares_of
 
 _REFERENCE = 0.5
@@ -101,7 +99,7 @@ def closed_ahead(
     return whole(parts, len(starts))  # type: ignore[no-any-return]
 
 
-@partial(jax.jit, static_argnums=0)
+@jit(static_argnums=0)
 def _closed_ahead(
     model: StochasticModel,
     begin: FilterState,

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
@@ -20,6 +18,7 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.time.beginning import FilterNumbers
 from swashplate.identification.time.kinematics import PREDICTED, measured_states, samples_smoothed
 from swashplate.identification.time.record_filter import RUNS, ahead_of
+from swashplate.jax_on_demand import jax, jit
 from swashplate.models.vehicle import Vehicle
 from swashplate.validation.bands import BandedRecord
 from swashplate.validation.prediction import Predictions, observed, uncertainty
@@ -133,7 +132,7 @@ def _root(covariance: Array) -> Array:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-@partial(jax.jit, static_argnums=0)
+@jit(static_argnums=0)
 def _shown(
     model: StochasticModel,
     begin: FilterState,

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -21,6 +19,7 @@ from swashplate.control.laws.ardupilot.law import GRAVITY
 from swashplate.control.laws.ardupilot.mixers import Mixer
 from swashplate.control.laws.ardupilot.parameters import AXES
 from swashplate.errors import ControllerError
+from swashplate.jax_on_demand import jax, jit
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.linearize import linearize
@@ -96,7 +95,7 @@ def cascade_plant(
     return CascadePlant(w, response, effect, 1.0 / rate, delays)
 
 
-@partial(jax.jit, compiler_options=RUN_RARELY)
+@jit(compiler_options=RUN_RARELY)
 def _mixed(mixer: Mixer, wanted: Float[jax.Array, "sets commands"], parameters: dict[str, float]) -> Any:
     """Inputs of sets of commands, shape (sets, inputs)."""
     return jax.vmap(lambda commands: mixer.mix(commands, parameters).inputs)(wanted)

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import SwashError
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
 from swashplate.simulation.compilation import RUN_RARELY
@@ -165,7 +163,7 @@ def sampled_loop(
     return made(np.zeros(len(late)))
 
 
-@partial(jax.jit, static_argnums=(0, 6), compiler_options=RUN_RARELY)
+@jit(static_argnums=(0, 6), compiler_options=RUN_RARELY)
 def _decisions(
     control: Step,
     measured: Float[jax.Array, " measured"],

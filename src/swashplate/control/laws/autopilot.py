@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
-import jax
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from swashplate.control.laws.height_yaw import (
     height_yaw_step,
 )
 from swashplate.errors import SwashError
+from swashplate.jax_on_demand import jax
 from swashplate.models.coax import CoaxInputs
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, Scalar

@@ -9,7 +9,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -19,6 +18,7 @@ from swashplate.control.laws.height_yaw import HeightYawMemory
 from swashplate.control.lqg.controller import Lqg, SensedStep
 from swashplate.control.lqg.controller_step import Law
 from swashplate.errors import ControllerError
+from swashplate.jax_on_demand import jax
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.dynamics import jax_backend
 from swashplate.simulation.trim import Trim

@@ -11,8 +11,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, ClassVar, Protocol
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -35,6 +33,7 @@ from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.filtering.observer_slopes import linearised_at
 from swashplate.filtering.sensor_suite import BIASED, readings
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.frames import Vector
@@ -133,7 +132,7 @@ def _drawing(count: int, seed: Int[jax.Array, ""], sample: Int[jax.Array, ""]) -
     return jax.random.normal(jax.random.fold_in(jax.random.key(seed), sample), (count,))
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
+@jit(static_argnums=0, compiler_options=RUN_RARELY)
 def _drawn_compiled(count: int, seed: Int[jax.Array, ""], samples: Int[jax.Array, " samples"]) -> Any:
     each: Any = jax.vmap(partial(_drawing, count), in_axes=(None, 0))
     return each(seed, samples)

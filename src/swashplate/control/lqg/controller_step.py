@@ -10,8 +10,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -20,6 +18,7 @@ from swashplate.control.lqg.law import LAW_MEMORY, Feedback, lqr_law
 from swashplate.filtering import constant_gain, observer
 from swashplate.filtering.matrix_operations import JaxMatrices, Matrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
+from swashplate.jax_on_demand import jax, jnp
 
 Law = Callable[[list[Any], list[Any], list[Any], Any, list[Any]], tuple[list[Any], list[Any]]]
 """(memory, states, late commands, voltage, reference) to (memory, commands), as `lqr_law`."""

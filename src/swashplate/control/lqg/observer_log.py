@@ -11,11 +11,8 @@ samples, have a notch there: the observer is not asked to explain a vibration th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import scipy.ndimage
 from jaxtyping import Float
@@ -32,6 +29,7 @@ from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPla
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION, RATES
 from swashplate.identification.core.records import uniform_table
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 from swashplate.physics.rigid_body import RigidBody
@@ -168,7 +166,7 @@ def _measured_body(pose: Array, rates: Array, dt: float) -> Array:
     return np.column_stack([pose[:, :3], velocity, pose[:, 3:], rates])
 
 
-@partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_FLIGHT)
+@jit(static_argnums=(0, 1), compiler_options=QUICK_FLIGHT)
 def _along(
     plan: ObserverPlan,
     steps: int,

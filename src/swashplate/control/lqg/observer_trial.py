@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.control.lqg.constant_gain import steady_sigmas
 from swashplate.control.lqg.controller import Lqg, SensedStep
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import REFERENCES, told
 from swashplate.simulation.compilation import QUICK_FLIGHT
@@ -157,7 +155,7 @@ def trial(
     return ObserverTrial(made, place, height, truth, estimates, sigmas)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
+@jit(static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
 def _fly(
     equations: Equations,
     control: SensedStep,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
+from functools import cache
 from typing import Any, Protocol
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.jax_on_demand import jax, jnp
 
 
 class Sloped(Protocol):
@@ -21,10 +20,16 @@ class Sloped(Protocol):
 
 def called_cost(likelihood: Sloped, data: Mapping[str, Any], row: jax.Array) -> Any:
     """The cost at a row, as `scoring.TracedCost` has it; `data` is empty."""
-    return _cost(likelihood, row)
+    return _with_gradient()(likelihood, row)
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
+@cache
+def _with_gradient() -> Any:
+    made = jax.custom_vjp(_cost, nondiff_argnums=(0,))
+    made.defvjp(_forward, _backward)
+    return made
+
+
 def _cost(likelihood: Sloped, row: jax.Array) -> Any:
     return _forward(likelihood, row)[0]
 
@@ -49,6 +54,3 @@ def _forward(likelihood: Sloped, row: jax.Array) -> tuple[Any, Any]:
 
 def _backward(likelihood: Sloped, gradient: jax.Array, pulled: jax.Array) -> tuple[Any]:
     return (pulled * gradient,)
-
-
-_cost.defvjp(_forward, _backward)

@@ -11,12 +11,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import Any
 
 import blackjax
-import jax
-import jax.numpy as jnp
 import numpy as np
 from blackjax.mcmc.hmc import HMCState
 
@@ -24,6 +21,7 @@ from swashplate.arrays import Array
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.core.whitened import Chains, unbent, whitening
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.simulation.dynamics import enable_double_precision
 
 Density = Callable[[Any, Any, Any], Any]
@@ -166,12 +164,12 @@ def _density(function: Density, plan: Hashable, data: Mapping[str, Any], z: jax.
     return jnp.where(jnp.isfinite(total) & allowed, total, -jnp.inf)
 
 
-@partial(jax.jit, static_argnums=(0, 1))
+@jit(static_argnums=(0, 1))
 def _begin(function: Density, plan: Hashable, data: Mapping[str, Any], z: jax.Array) -> Any:
     return blackjax.nuts.init(z, lambda place: _density(function, plan, data, place))
 
 
-@partial(jax.jit, static_argnums=(0, 1))
+@jit(static_argnums=(0, 1))
 def _step(
     function: Density, plan: Hashable, data: Mapping[str, Any], key: jax.Array, state: HMCState, step: float
 ) -> tuple[Any, Any, Any]:

@@ -8,11 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
@@ -24,6 +21,7 @@ from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPla
 from swashplate.filtering.sensor_suite import Suite
 from swashplate.identification.recursive.fourier_regression import CLOCK, EARLY, GAP, LATE, NO_NUMBER
 from swashplate.identification.time.equation_error import EquationError
+from swashplate.jax_on_demand import jit, jnp
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import RUN_RARELY
@@ -214,7 +212,7 @@ class SlowParameters:
         )
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
+@jit(static_argnums=0, compiler_options=RUN_RARELY)
 def _stepped(plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Any, y: Any, due: Any) -> Any:
     M = JaxMatrices()
     flags = [due[i] for i in range(len(plan.sensors))]

@@ -16,8 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-import jax.numpy as jnp
-
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.low_passed import refuse_lowpassed
@@ -35,6 +33,7 @@ from swashplate.identification.time.linear_time_fit import linear_records, linea
 from swashplate.identification.time.prediction_error import parameter_entries
 from swashplate.identification.time.vehicle_likelihood import check_predicted, driving_rows
 from swashplate.identification.time.vehicle_time_fit import check_biases, outputs_of, vehicle_result
+from swashplate.jax_on_demand import jnp
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, NamedTuple, Protocol
-
-import jax
-import jax.numpy as jnp
 
 from swashplate.identification.core.banded_least_squares import Chain
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.vehicle_likelihood import FORCES, measurable
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
@@ -166,16 +163,16 @@ def _traced_local(plan: CollocationPlan, given: Numbers, numbers: jax.Array, x: 
     return Chain(*parts)
 
 
-chain_at = jax.jit(_traced_local, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+chain_at = jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)(_traced_local)
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def moved_by_numbers(plan: CollocationPlan, given: Numbers, numbers: jax.Array, x: jax.Array, ways: jax.Array) -> Any:
     """How defects and errors at a path move along ways of the numbers, (n_ways, ...) each."""
     return jax.vmap(lambda way: jax.jvp(lambda p: _both(plan, given, p, x), (numbers,), (way,))[1])(ways)
 
 
-@partial(jax.jit, static_argnums=(0, 4), compiler_options=QUICK_TO_COMPILE)
+@jit(static_argnums=(0, 4), compiler_options=QUICK_TO_COMPILE)
 def rate_slopes(plan: CollocationPlan, given: Numbers, numbers: jax.Array, x: jax.Array, sample: int) -> jax.Array:
     """Slopes of the rates by the states (s, s) at a sample's inputs."""
     w = plan.model.driving(given, numbers)[2 * sample]
@@ -230,10 +227,10 @@ def _traced_filter(
     return innovations
 
 
-innovations_along = jax.jit(_traced_filter, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+innovations_along = jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)(_traced_filter)
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def innovations_moved(plan: CollocationPlan, given: Numbers, at: Pair, x: jax.Array, ways: Pair) -> Pair:
     """Innovations and variances along ways of numbers and noise, (n_ways, n, o) each, the path held."""
 

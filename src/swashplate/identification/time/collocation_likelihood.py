@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
@@ -48,6 +47,7 @@ from swashplate.identification.time.collocation_equations import (
     moved_by_numbers,
     rate_slopes,
 )
+from swashplate.jax_on_demand import jnp
 from swashplate.simulation.dynamics import enable_double_precision
 
 _GUST = 0.3

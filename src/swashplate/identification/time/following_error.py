@@ -11,11 +11,9 @@ off a record's first states may be, and goes on by itself where the pose was not
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -42,6 +40,7 @@ from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.identification.time.record_filter import STRETCH, stretches, whole
 from swashplate.identification.time.start_states import measured_start, slopes_ahead, steady_flight
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
@@ -264,7 +263,7 @@ def _along_some(
     return jax.tree.map(lambda *rows: np.concatenate(rows, axis=1)[:, :n], *parts)  # type: ignore[no-any-return]
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
+@jit(static_argnums=0, compiler_options=RUN_RARELY)
 def _begun(
     model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Float[jax.Array, "states states"]
 ) -> tuple[FilterState, Any]:
@@ -286,7 +285,7 @@ def _begun(
     return jax.vmap(one)(numbers)
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=FEW_PASSES)
+@jit(static_argnums=0, compiler_options=FEW_PASSES)
 def _along(
     model: StochasticModel,
     state: FilterState,

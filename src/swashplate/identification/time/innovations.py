@@ -10,8 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
@@ -33,6 +31,7 @@ from swashplate.identification.time.beginning import (
 )
 from swashplate.identification.time.compiled_filter import FilterRun
 from swashplate.identification.time.record_filter import along, moved
+from swashplate.jax_on_demand import jax, jnp
 
 
 @dataclass(frozen=True)

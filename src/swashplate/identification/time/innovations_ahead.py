@@ -7,11 +7,7 @@ thousand errors.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
-
-import jax
-import jax.numpy as jnp
 
 from swashplate.filtering.arriving_commands import commands
 from swashplate.filtering.disturbances import Noise
@@ -19,6 +15,7 @@ from swashplate.filtering.disturbed_model import FilterState
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.time.beginning import FirstMotion
 from swashplate.identification.time.innovations import FilterPlan, traced_run, unpack
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 
 
@@ -68,11 +65,11 @@ def _predicted(
     return jax.lax.scan(sample, first, start + jnp.arange(steps[-1]))[1][jnp.array(steps) - 1]
 
 
-errors_ahead = jax.jit(_traced, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+errors_ahead = jit(static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)(_traced)
 """The errors of records side by side, compiled; arguments as of `_traced`."""
 
 
-@partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+@jit(static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
 def errors_ahead_moved(
     plan: FilterPlan,
     steps: tuple[int, ...],

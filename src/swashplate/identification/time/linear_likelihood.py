@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Complex
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries
 from swashplate.identification.time.first_gain import first_gain, kalman_gains
 from swashplate.identification.time.linear_slopes import Coefficients, slopes_along
+from swashplate.jax_on_demand import jax
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.simulation.discretisation import first_order_hold

@@ -13,10 +13,10 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.jax_on_demand import jax
 from swashplate.simulation.dynamics import enable_double_precision
 
 _BLOCK = 256

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
@@ -33,6 +32,7 @@ from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import parameter_entries, stack_records
 from swashplate.identification.time.start_states import slopes
 from swashplate.identification.time.traced_shooting import ShootingPlan
+from swashplate.jax_on_demand import jnp
 
 WINDOW = 4.0
 """Seconds of one shot: some periods of the fast modes, and short against the growth of unstable ones and of yaw."""

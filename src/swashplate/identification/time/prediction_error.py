@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +32,7 @@ from swashplate.identification.time.beginning import FilterNumbers, seen_at_star
 from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun, traced_cost
 from swashplate.identification.time.kinematics import PREDICTED, turned_rows
 from swashplate.identification.time.noise_entries import estimated_noises, noise_entries, with_first_guesses
+from swashplate.jax_on_demand import jnp
 
 SETTLING = 1.5
 """Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""

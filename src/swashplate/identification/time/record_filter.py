@@ -13,11 +13,8 @@ multiplies matrices (measured: half the time of carrying every slope through the
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
@@ -28,6 +25,7 @@ from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, Fil
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.time.beginning import Begun, FilterNumbers, first_state
 from swashplate.identification.time.compiled_filter import FilterRun, compiled_filter
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.simulation.compilation import FEW_PASSES, QUICK_TO_COMPILE, lengthened
 
 STRETCH = 256
@@ -76,7 +74,7 @@ def along(
     return FilterRun(*whole(parts, n))
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _along(
     model: StochasticModel,
     state: FilterState,
@@ -124,7 +122,7 @@ def ahead_of(
     return whole(parts, len(starts))  # type: ignore[no-any-return]
 
 
-@partial(jax.jit, static_argnums=0)
+@jit(static_argnums=0)
 def _ahead_of(
     model: StochasticModel,
     begin: FilterState,
@@ -196,7 +194,7 @@ def planes(
     return [Planes(rows[0], *_planes(model, *rows, parameters, moves)) for rows in stretches(place, commands, voltage)]
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=FEW_PASSES)
+@jit(static_argnums=0, compiler_options=FEW_PASSES)
 def _planes(
     model: StochasticModel,
     place: Float[jax.Array, "samples place"],
@@ -256,7 +254,7 @@ def along_moved(
     return np.concatenate(parts, axis=1)[: len(directions.parameters), : len(readings)]
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=FEW_PASSES)
+@jit(static_argnums=0, compiler_options=FEW_PASSES)
 def _along_moved(
     model: StochasticModel,
     here: tuple[FilterState, FilterGain],

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -13,6 +11,7 @@ from swashplate.arrays import Array
 from swashplate.errors import TrimError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle

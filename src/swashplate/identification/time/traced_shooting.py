@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 from jaxtyping import Float, Int
 
 from swashplate.filtering.arriving_commands import commands
@@ -17,6 +14,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.start_states import start_state
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.simulation.compilation import FEW_PASSES, QUICK_TO_COMPILE
 
 
@@ -105,7 +103,7 @@ def traced_residuals(
     return data["outputs"] - outputs, states
 
 
-residuals = jax.jit(traced_residuals, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+residuals = jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)(traced_residuals)
 
 
 def shooting_cost(plan: ShootingPlan, data: Mapping[str, Any], row: jax.Array) -> Any:
@@ -115,7 +113,7 @@ def shooting_cost(plan: ShootingPlan, data: Mapping[str, Any], row: jax.Array) -
     return robust.losses(white, jnp).sum() + flat.shape[0] * jnp.log(jnp.diag(data["root"])).sum()
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=FEW_PASSES)
+@jit(static_argnums=0, compiler_options=FEW_PASSES)
 def residuals_moved(
     plan: ShootingPlan, data: Mapping[str, jax.Array], row: Float[jax.Array, " entries"]
 ) -> tuple[Any, Any]:

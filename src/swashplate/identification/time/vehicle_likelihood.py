@@ -10,11 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
@@ -28,6 +25,7 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries, gust_entries
 from swashplate.identification.time.prediction_error import parameter_entries
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
@@ -302,10 +300,10 @@ def _traced_ahead(
     return jax.vmap(run)(starts)
 
 
-_ahead = jax.jit(_traced_ahead, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+_ahead = jit(static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)(_traced_ahead)
 
 
-@partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+@jit(static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
 def _ahead_moved(
     plan: _Plan,
     steps: tuple[int, ...],
@@ -323,7 +321,7 @@ def _ahead_moved(
     return jax.vmap(lambda d: jax.jvp(errors, (numbers,), (d,)), out_axes=(None, 0))(directions)
 
 
-_errors = jax.jit(_traced_errors, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+_errors = jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)(_traced_errors)
 
 
 def _gain(plan: _Plan, at: Any, sensors: Any, functions: Any, place: Any) -> Any:
@@ -338,7 +336,7 @@ def _gain(plan: _Plan, at: Any, sensors: Any, functions: Any, place: Any) -> Any
     return kalman_gain(phi, C, gathered, sensors)[0]
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _slopes(plan: _Plan, given: Any, data: Any, numbers: Any, scale: Any) -> tuple[Any, Any]:
     """Errors, and their slopes by every scaled entry of the row (n_entries, n, n_outputs)."""
 

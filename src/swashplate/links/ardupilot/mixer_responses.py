@@ -9,12 +9,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.control.laws.ardupilot.mixers import Mixer
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim import Trim
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, TypedDict
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
+from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.links.gym.tasks import Task
 from swashplate.models.catalogue import vehicle as find_vehicle
 from swashplate.models.surroundings import environment_of
@@ -267,12 +265,12 @@ def _clipped(errors: Any) -> Any:
     return jnp.clip(jnp.nan_to_num(errors), -LIMITS, LIMITS)
 
 
-@jax.jit
+@jit()
 def _observed(x: Any, target: Any, angles: Any) -> Any:
     return jax.vmap(lambda x, target: _clipped(_errors(x, target, angles)))(x, target)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
+@jit(static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
 def _advance(
     equations: Equations, substeps: int, free: tuple[int, ...], x: Any, actions: Any, p: Any, target: Any, rest: Any
 ) -> Any:

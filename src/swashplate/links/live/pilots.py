@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, get_args
 
-import jax.numpy as jnp
 import numpy as np
 from scipy.linalg import expm
 
@@ -24,6 +23,7 @@ from swashplate.control.laws.autopilot import Autopilot, autopilot, row_step
 from swashplate.control.laws.state_hold import state_hold, state_hold_step
 from swashplate.errors import ControllerError
 from swashplate.flights.maneuvers.series import DEFAULT_AMPLITUDE
+from swashplate.jax_on_demand import jnp
 from swashplate.links.live.axes import STICKS, axes_of
 from swashplate.links.live.picture import picture
 from swashplate.models.vehicle import Vehicle

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError, SwashError
 from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.jax_on_demand import jit, jnp
 from swashplate.links.live.flown import Craft, Moment, Setting
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
@@ -54,7 +52,7 @@ _HELD_WITHIN = 3.0
 """Roll or pitch at which the flight of a linear model ends: its angles are small ones."""
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
+@jit(static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
 def advance(
     equations: Equations,
     law: Step,

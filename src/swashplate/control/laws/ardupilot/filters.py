@@ -6,9 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import jax
-import jax.numpy as jnp
-
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.physics.backend import Scalar
 
 HARMONICS = (1.0, 2.0)

@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Literal
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -21,6 +19,7 @@ from swashplate.arrays import Array
 from swashplate.control.laws.ardupilot.filters import low_pass, notch, one_pole, reached_by
 from swashplate.control.laws.ardupilot.mixers import FRAMES, Mixer, SwashplateMixer
 from swashplate.control.laws.ardupilot.parameters import AXES, DEFAULTS, RATE
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
 from swashplate.physics.rigid_body import RigidBody

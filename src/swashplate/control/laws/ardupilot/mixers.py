@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.jax_on_demand import jax, jnp
 from swashplate.physics.backend import Scalar
 
 _FULL_STICK = 4500.0

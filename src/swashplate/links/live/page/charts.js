@@ -3,6 +3,8 @@ import uPlot from "./vendor/uPlot.esm.js";
 
 const DEG = 180 / Math.PI;
 const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"];
+// s, of the time axis: of a range of no length uPlot may put ticks without end (1 + 1e-16 is 1).
+const SHORTEST = 0.1;
 const wrapped = (angle) => DEG * Math.atan2(Math.sin(angle), Math.cos(angle));
 
 // One number that is estimated in flight: value, two standard errors to each side, and what the model says.
@@ -159,7 +161,8 @@ export class Charts {
       if (data[0].length) chart.told(chart.panel.names.map((_, i) => data[1 + i].at(-1)));
       plot.batch(() => {
         plot.setData(data, false);
-        plot.setScale("x", { min: Math.max(this.latest - this.seconds, data[0][0] ?? 0), max: this.latest });
+        const from = Math.max(this.latest - this.seconds, data[0][0] ?? 0);
+        plot.setScale("x", { min: Math.min(from, this.latest - SHORTEST), max: this.latest });
       });
     }
   }

@@ -1,0 +1,103 @@
+"""JAX, loaded when something of it is first used: commands that trace nothing do not wait for it.
+
+Modules take `jax`, `jnp` and `jit` from here. It takes a third of a second to load JAX, a quarter of `swash control
+design` (docs/decisions/0151).
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from collections.abc import Callable, Sequence
+from functools import cached_property, update_wrapper
+from threading import RLock
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+_SETTINGS: dict[str, object] = {}
+_WAITING: list[Callable[[], object]] = []
+_LOCK = RLock()
+
+
+def set_option(name: str, value: object) -> None:
+    """Set an option of JAX: now where it is loaded, otherwise as soon as it is."""
+    if "jax" in sys.modules:
+        sys.modules["jax"].config.update(name, value)
+    else:
+        _SETTINGS[name] = value
+
+
+def option(name: str) -> Any:
+    """An option of JAX as it is, or as it was set before JAX is there: here, or as text by an environment variable."""
+    if "jax" not in sys.modules:
+        return _SETTINGS.get(name, os.environ.get(name.upper()))
+    _catch_up()
+    return sys.modules["jax"].config.values[name]
+
+
+def when_loaded(register: Callable[[], object]) -> None:
+    """Call it once JAX is there: at once, or when it is loaded from here."""
+    if "jax" in sys.modules:
+        register()
+    else:
+        _WAITING.append(register)
+
+
+class _OnDemand(ModuleType):
+    """A module that is imported when something of it is asked for."""
+
+    def __getattr__(self, name: str) -> Any:
+        module = importlib.import_module(self.__name__)
+        _catch_up()
+        value = getattr(module, name)
+        setattr(self, name, value)  # the next time it is found without this function
+        return value
+
+
+def _catch_up() -> None:
+    with _LOCK:
+        while _SETTINGS:
+            sys.modules["jax"].config.update(*_SETTINGS.popitem())
+        while _WAITING:
+            _WAITING.pop()()
+
+
+if TYPE_CHECKING:
+    import jax as jax
+    import jax.numpy as jnp
+else:
+    jax, jnp = _OnDemand("jax"), _OnDemand("jax.numpy")
+
+
+class _Jitted:
+    """A function that `jax.jit` is given when it is first called; attributes are those of the compiled function."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        self._function, self._options = function, options
+        update_wrapper(self, function)
+
+    @cached_property
+    def _compiled(self) -> Any:
+        return jax.jit(self._function, **self._options)
+
+    def __call__(self, *values: Any, **named: Any) -> Any:
+        return self._compiled(*values, **named)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self._compiled, name)
+
+
+def jit(
+    *,
+    static_argnums: int | Sequence[int] = (),
+    static_argnames: str | Sequence[str] = (),
+    compiler_options: dict[str, Any] | None = None,
+) -> Callable[[Callable[..., Any]], Any]:
+    """`jax.jit` as a decorator of a module's functions, without loading JAX when the module is."""
+    numbers: dict[str, Any] = {"static_argnums": static_argnums} if static_argnums != () else {}
+    names: dict[str, Any] = {"static_argnames": static_argnames} if static_argnames else {}
+    options: dict[str, Any] = {**numbers, **names, "compiler_options": compiler_options}
+    return lambda function: _Jitted(function, options)

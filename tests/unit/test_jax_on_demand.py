@@ -1,0 +1,105 @@
+"""No module loads JAX when it is imported; what is told to JAX before it is there is done when it comes."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import swashplate
+from swashplate.jax_on_demand import jax, jit, jnp
+
+_NEEDING = ("jax", "equinox", "diffrax", "blackjax")
+SOURCE = Path(swashplate.__file__).parent
+
+
+def _said(code: str) -> str:
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    return run.stdout.strip()
+
+
+def _loading(tree: ast.Module) -> Iterator[int]:
+    """Lines of imports of JAX that run when the module is imported, those for types alone left out."""
+    waiting: list[ast.stmt] = list(tree.body)
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names]
+            if any(name.partition(".")[0] in _NEEDING for name in names):
+                yield node.lineno
+        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            waiting += node.orelse
+        elif isinstance(node, ast.If | ast.Try | ast.With | ast.ClassDef):
+            waiting += [one for one in ast.iter_child_nodes(node) if isinstance(one, ast.stmt)]
+
+
+def test_no_module_loads_jax_when_it_is_imported() -> None:
+    found = {
+        str(path.relative_to(SOURCE))
+        for path in SOURCE.rglob("*.py")
+        if any(_loading(ast.parse(path.read_text(encoding="utf-8"))))
+    }
+    around = {"identification/core/nuts.py", "simulation/adaptive.py"}  # BlackJAX and diffrax, loaded where asked for
+    assert found == around, "take jax and jnp from swashplate.jax_on_demand"
+
+
+@pytest.mark.parametrize(
+    ("code", "lines"),
+    [
+        ("import jax", [1]),
+        ("import numpy\nfrom jax import numpy as jnp", [2]),
+        ("try:\n    import blackjax\nexcept ImportError:\n    pass", [2]),
+        ("def f():\n    import jax", []),
+        ("if TYPE_CHECKING:\n    import jax", []),
+    ],
+)
+def test_a_module_that_does_would_be_found(code: str, lines: list[int]) -> None:
+    assert list(_loading(ast.parse(code))) == lines
+
+
+def test_a_controller_is_designed_without_it() -> None:
+    code = "import sys, swashplate as sp; sp.design_controller(sp.vehicle('coax')); print('jax' in sys.modules)"
+    assert _said(code) == "False"
+
+
+def test_what_it_is_told_before_is_done_when_it_comes() -> None:
+    code = (
+        "import sys\n"
+        "from swashplate.filtering.batched_matrices import Stack\n"
+        "from swashplate.jax_on_demand import jax, jnp, option\n"
+        "from swashplate.simulation.dynamics import enable_double_precision\n"
+        "enable_double_precision()\n"
+        "print('jax' in sys.modules, option('jax_enable_x64'))\n"
+        "print(jnp.zeros(3).dtype, option('jax_enable_x64'), len(jax.tree_util.tree_leaves(Stack(jnp.ones(2)))))\n"
+    )
+    assert _said(code).splitlines() == ["False True", "float64 True 1"]
+
+
+def test_jax_of_the_users_own_is_told_at_once() -> None:
+    code = (
+        "import jax\n"
+        "from swashplate.simulation.dynamics import enable_double_precision\n"
+        "enable_double_precision()\n"
+        "print(jax.numpy.zeros(3).dtype)\n"
+    )
+    assert _said(code) == "float64"
+
+
+def test_a_function_is_compiled_once_and_keeps_its_name() -> None:
+    traced = []
+
+    @jit(static_argnums=0)
+    def twice(power: int, x: jax.Array) -> jax.Array:
+        """Doubled."""
+        traced.append(power)
+        return 2.0 * x**power
+
+    assert [float(twice(2, jnp.asarray(x))) for x in (1.0, 3.0)] == [2.0, 18.0]
+    assert traced == [2]
+    assert twice._cache_size() == 1
+    assert (twice.__name__, twice.__doc__) == ("twice", "Doubled.")
