@@ -50,10 +50,10 @@ def _best(run, repeats: int) -> float:  # type: ignore[no-untyped-def]
     return fastest
 
 
-def responses(*, repeats: int) -> Span:
-    """Composite, conditioned responses of 4 inputs and 9 outputs, five windows, 600 s at 100 Hz."""
+def responses(*, repeats: int, length: float = SECONDS) -> Span:
+    """Composite, conditioned responses of 4 inputs and 9 outputs, five windows, `length` [s] at 100 Hz."""
     random = np.random.default_rng(0)
-    n = round(SECONDS * RATE)
+    n = round(length * RATE)
     u = lfilter([0.2], [1.0, -0.8], random.standard_normal((n, 4)), axis=0)
     y = lfilter([0.1], [1.0, -0.9], u @ random.standard_normal((4, 9)), axis=0) + random.standard_normal((n, 9))
     columns = {f"in_{i}": u[:, i] for i in range(4)} | {f"out_{i}": y[:, i] for i in range(9)}
@@ -74,7 +74,7 @@ def responses(*, repeats: int) -> Span:
     seconds = _best(run, repeats)
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - before
     note = f"{grown / 1e6:.0f} MB more at the peak, 1000 MB promised"
-    return Span("responses 4 x 9, 5 windows, 600 s at 100 Hz", seconds, RESPOND_WITHIN, note)
+    return Span(f"responses 4 x 9, 5 windows, {length:g} s at 100 Hz", seconds, RESPOND_WITHIN, note)
 
 
 def reading(*, repeats: int) -> list[Span]:

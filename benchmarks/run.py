@@ -52,7 +52,7 @@ def measure(*, short: bool) -> list[Result]:
             if short
             else [export.step("raptor50", steps=4_000 * scale, repeats=repeats, bar=True, inflow="pitt-peters")]
         ),
-        export.environments(steps=20 * scale, repeats=repeats),
+        export.environments(steps=20 * scale, repeats=repeats, count=64 if short else 1024),
         *many.batches("coax", "float64", steps=10 * scale, repeats=repeats),
         *([] if short else many.batches("coax", "float32", steps=10 * scale, repeats=repeats)),
         *([] if short else many.batches("raptor50", "float64", steps=4 * scale, repeats=repeats, promised=False)),
@@ -140,7 +140,7 @@ def main() -> None:
     spans = [
         *([] if options.short else [closed_loops.flights(count=1000, one_by_one=5)]),
         *identifying.measure(short=options.short),
-        frequency.responses(repeats=repeats),
+        frequency.responses(repeats=repeats, length=100.0 if options.short else frequency.SECONDS),
         *frequency.reading(repeats=repeats),
         *frequency.x8(repeats=repeats),
         *([] if options.short else [frequency.fit(repeats=1)]),
