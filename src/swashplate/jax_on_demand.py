@@ -22,26 +22,25 @@ _LOCK = RLock()
 
 def set_option(name: str, value: object) -> None:
     """Set an option of JAX: now where it is loaded, otherwise as soon as it is."""
-    if "jax" in sys.modules:
-        sys.modules["jax"].config.update(name, value)
-    else:
+    with _LOCK:
         _SETTINGS[name] = value
+    if "jax" in sys.modules:
+        _catch_up()
 
 
 def option(name: str) -> Any:
     """An option of JAX as it is, or as it was set before JAX is there: here, or as text by an environment variable."""
     if "jax" not in sys.modules:
         return _SETTINGS.get(name, os.environ.get(name.upper()))
-    _catch_up()
-    return sys.modules["jax"].config.values[name]
+    return _catch_up().config.values[name]
 
 
 def when_loaded(register: Callable[[], object]) -> None:
     """Call it once JAX is there: at once, or when it is loaded from here."""
-    if "jax" in sys.modules:
-        register()
-    else:
+    with _LOCK:
         _WAITING.append(register)
+    if "jax" in sys.modules:
+        _catch_up()
 
 
 class _OnDemand(ModuleType):
@@ -55,12 +54,15 @@ class _OnDemand(ModuleType):
         return value
 
 
-def _catch_up() -> None:
+def _catch_up() -> Any:
+    """JAX, whole also where another thread is still loading it, with all that it had to be told."""
+    loaded = importlib.import_module("jax")
     with _LOCK:
         while _SETTINGS:
-            sys.modules["jax"].config.update(*_SETTINGS.popitem())
+            loaded.config.update(*_SETTINGS.popitem())
         while _WAITING:
             _WAITING.pop()()
+    return loaded
 
 
 if TYPE_CHECKING:

@@ -90,6 +90,21 @@ def test_jax_of_the_users_own_is_told_at_once() -> None:
     assert _said(code) == "float64"
 
 
+def test_threads_that_all_need_it_first_find_it_whole() -> None:
+    code = (
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "from swashplate.filtering.batched_matrices import Stack\n"
+        "from swashplate.jax_on_demand import jax, jnp\n"
+        "from swashplate.simulation.dynamics import enable_double_precision\n"
+        "def first(_):\n"
+        "    enable_double_precision()\n"
+        "    return jnp.zeros(3).dtype.name, len(jax.tree_util.tree_leaves(Stack(jnp.ones(2))))\n"
+        "with ThreadPoolExecutor(8) as pool:\n"
+        "    print(set(pool.map(first, range(8))))\n"
+    )
+    assert _said(code) == "{('float64', 1)}"
+
+
 def test_a_function_is_compiled_once_and_keeps_its_name() -> None:
     traced = []
 
