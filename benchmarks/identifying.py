@@ -44,6 +44,8 @@ FIRST = {
 """Seconds of processor time of whole commands, from the start of the program to its report."""
 FIRST_MEMORY = 0.8
 REPORT = 1.0
+START = {"tau_f_upper": 1.2, "o_zeta_upper": -0.1, "linkage_lower": 0.17}
+"""Numbers that fits begin with."""
 MEMORY = 2.0
 RATIO = 20.0
 
@@ -60,8 +62,7 @@ def flight(seconds: float = 34.0) -> sp.Flight:
 
 
 def _start() -> sp.Vehicle:
-    vehicle = sp.vehicle("coax")
-    return vehicle.with_values({"tau_f_upper": 1.2, "o_zeta_upper": -0.1, "linkage_lower": 0.17})
+    return sp.vehicle("coax").with_values(START)
 
 
 def identify(method: str, logged: sp.Flight, *, iterations: int = 60) -> float:
