@@ -12,14 +12,13 @@ import json
 import os
 import statistics
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from benchmarks.identifying import START, flight
+from benchmarks.identifying import START, commands, flight, spent
 
 ROOT = Path(__file__).resolve().parents[1]
 ASKED = {
@@ -34,20 +33,6 @@ new process, and its second in a process) 10 and 4 s of the whole command, for 3
 BY_CLOCK = ("identify, cold", "identify, warm")
 
 
-def commands(folder: Path, revision: str) -> dict[str, list[str]]:
-    """Words of each command for one of the two codes, which write into a folder of its own; the fit comes first."""
-    own = folder / revision
-    seen = ["--flight", str(folder / "flight.parquet")]
-    law = str(own / "law.toml")
-    fit = ["--vehicle", str(own / "start.toml"), *seen, "--keep-unexcited", "--out", str(own / "fit")]
-    return {
-        "identify": ["identify", *fit],
-        "validate": ["validate", "--model", str(own / "fit" / "model.toml"), *seen, "--out", str(own / "judged")],
-        "control design": ["control", "design", "coax", "--out", law],
-        "control check": ["control", "check", "coax", "--controller", law, "--out", str(own / "check")],
-    }
-
-
 @contextmanager
 def checkout(revision: str) -> Iterator[Path]:
     """The source of a revision in a folder that is there for a while."""
@@ -60,14 +45,9 @@ def checkout(revision: str) -> Iterator[Path]:
             subprocess.run(["git", "worktree", "remove", "--force", place], cwd=ROOT, check=True)
 
 
-def used(source: Path, cache: Path, words: list[str]) -> dict[str, float]:
-    """What a command of one code used (see benchmarks/used.py)."""
+def _environment(source: Path, cache: Path) -> dict[str, str]:
     left = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR")}
-    environment = {**left, "PYTHONPATH": str(source), "XDG_CACHE_HOME": str(cache)}
-    measuring = [sys.executable, str(Path(__file__).with_name("used.py")), sys.executable, *words]
-    run = subprocess.run(measuring, env=environment, capture_output=True, text=True, check=False)
-    assert run.returncode == 0, f"{' '.join(words[:4])} ended with {run.returncode}: {run.stderr[-2000:]}"
-    return json.loads(run.stdout.splitlines()[-1])  # type: ignore[no-any-return]
+    return {**left, "PYTHONPATH": str(source), "XDG_CACHE_HOME": str(cache)}
 
 
 def measure(revision: str, *, repeats: int) -> dict[tuple[str, str], list[dict[str, float]]]:
@@ -79,14 +59,14 @@ def measure(revision: str, *, repeats: int) -> dict[tuple[str, str], list[dict[s
         save = f"import sys, swashplate as sp; sp.vehicle('coax').with_values({START!r}).save(sys.argv[1])"
         for code, source in sources.items():
             (folder / code).mkdir()
-            used(source, folder / code, ["-c", save, str(folder / code / "start.toml")])
+            spent(["-c", save, str(folder / code / "start.toml")], _environment(source, folder / code))
         for turn in range(repeats):
-            for what in commands(folder, "this"):
+            for what in commands(folder, folder):
                 for state in ("cold", "warm"):
                     for code, source in sources.items():
-                        cache = folder / f"{turn} {what} {code}"
-                        words = ["-m", "swashplate", *commands(folder, code)[what]]
-                        found.setdefault((f"{what}, {state}", code), []).append(used(source, cache, words))
+                        around = _environment(source, folder / f"{turn} {what} {code}")
+                        words = ["-m", "swashplate", *commands(folder, folder / code)[what]]
+                        found.setdefault((f"{what}, {state}", code), []).append(spent(words, around)[0])
     return found
 
 

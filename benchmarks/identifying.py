@@ -84,10 +84,23 @@ def warm(method: str, logged: sp.Flight, *, iterations: int = 60) -> Span:
 def cold(method: str) -> Span:
     """A new process with an empty compilation cache, imports and simulated flight included."""
     with tempfile.TemporaryDirectory() as folder:
-        used, _ = _used(["benchmarks.identifying", method], {**os.environ, "JAX_COMPILATION_CACHE_DIR": folder})
+        used, _ = spent(["-m", "benchmarks.identifying", method], {**os.environ, "JAX_COMPILATION_CACHE_DIR": folder})
     seconds, memory = used["clock"], used["peak_gib"]
     note = f"new process, nothing compiled before; peak memory {memory:.2f} GiB (promised: {MEMORY:g})"
     return Span(f"{method}, 15 parameters, cold", seconds, COLD, note, kept=memory <= MEMORY)
+
+
+def commands(folder: Path, own: Path) -> dict[str, list[str]]:
+    """Words of commands about a folder's flight that read and write in `own`, each what later ones need."""
+    seen = ["--flight", str(folder / "flight.parquet")]
+    law = str(own / "law.toml")
+    fit = ["--vehicle", str(own / "start.toml"), *seen, "--keep-unexcited", "--out", str(own / "fit")]
+    return {
+        "identify": ["identify", *fit],
+        "validate": ["validate", "--model", str(own / "fit" / "model.toml"), *seen, "--out", str(own / "judged")],
+        "control design": ["control", "design", "coax", "--out", law],
+        "control check": ["control", "check", "coax", "--controller", law, "--out", str(own / "check")],
+    }
 
 
 def first_answers(logged: sp.Flight) -> list[Span]:
@@ -99,22 +112,12 @@ def first_answers(logged: sp.Flight) -> list[Span]:
         folder = Path(name)
         logged.save(folder / "flight.parquet")
         _start().save(folder / "start.toml")
-        seen = ["--flight", str(folder / "flight.parquet")]
-        fit = ["--vehicle", str(folder / "start.toml"), *seen, "--keep-unexcited", "--out", str(folder / "fit")]
-        judge = ["--model", str(folder / "fit" / "model.toml"), *seen, "--out", str(folder / "judged")]
         fly = ["--maneuver", "multisine:roll+pitch,0.6-5Hz,20s,0.02", "--sensors", "clean"]
         flown = ["--vehicle", "raptor50", "--flight", str(folder / "heli.nc"), "--free", "rotor"]
-        law = str(folder / "law.toml")
-        check = ["control", "check", "coax", "--controller", law, "--out", str(folder / "check")]
+        asked = {**commands(folder, folder), "identify helicopter": ["identify", *flown, "--out", str(folder / "heli")]}
         _swash(["simulate", "--vehicle", "raptor50", *fly, "--out", str(folder / "heli.nc")], folder / "flying")
         spans = []
-        for what, words in (
-            ("identify", ["identify", *fit]),
-            ("validate", ["validate", *judge]),
-            ("identify helicopter", ["identify", *flown, "--out", str(folder / "heli")]),
-            ("control design", ["control", "design", "coax", "--out", law]),
-            ("control check", check),
-        ):
+        for what, words in asked.items():
             for state in ("cold", "warm"):  # a cache of its own: as if nothing had been compiled before
                 used = _swash(words, folder / what.replace(" ", "-"))
                 took, memory = used["processor"], used["peak_gib"]
@@ -128,15 +131,15 @@ def first_answers(logged: sp.Flight) -> list[Span]:
 def _swash(words: list[str], cache: Path) -> dict[str, float]:
     """What a command of ours used, with its own cache."""
     environment = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR")}
-    return _used(["swashplate", *words], {**environment, "XDG_CACHE_HOME": str(cache)})[0]
+    return spent(["-m", "swashplate", *words], {**environment, "XDG_CACHE_HOME": str(cache)})[0]
 
 
-def _used(module: list[str], environment: dict[str, str]) -> tuple[dict[str, float], str]:
-    """What a module with its arguments used (see benchmarks/used.py), and what it said."""
+def spent(words: list[str], environment: dict[str, str]) -> tuple[dict[str, float], str]:
+    """What Python with some arguments used (see benchmarks/used.py), and what it said."""
     measuring = [sys.executable, str(Path(__file__).with_name("used.py"))]
-    command = [*measuring, sys.executable, "-m", *module]
+    command = [*measuring, sys.executable, *words]
     run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert run.returncode == 0, f"{' '.join(module[:2])} ended with {run.returncode}: {run.stderr[-2000:]}"
+    assert run.returncode == 0, f"{' '.join(words[:4])} ended with {run.returncode}: {run.stderr[-2000:]}"
     return json.loads(run.stdout), run.stderr
 
 
@@ -235,7 +238,7 @@ RIVALS = {"simplex": nelder_mead, "scipy": scipy_least_squares}
 
 def beside(rival: str) -> Span:
     """A rival's row from a process of its own, for its peak memory."""
-    used, said = _used(["benchmarks.identifying", rival], dict(os.environ))
+    used, said = spent(["-m", "benchmarks.identifying", rival], dict(os.environ))
     row = json.loads(said.splitlines()[-1])
     note = f"{row['note']}; peak of both in one process {used['peak_gib']:.2f} GiB"
     return Span(row["name"], row["seconds"], row["target"], note, row["kept"])

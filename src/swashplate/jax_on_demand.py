@@ -94,12 +94,10 @@ class _Jitted:
 
 def jit(
     *,
-    static_argnums: int | Sequence[int] = (),
-    static_argnames: str | Sequence[str] = (),
+    static_argnums: int | Sequence[int] | None = None,
+    static_argnames: str | Sequence[str] | None = None,
     compiler_options: dict[str, Any] | None = None,
 ) -> Callable[[Callable[..., Any]], Any]:
     """`jax.jit` as a decorator of a module's functions, without loading JAX when the module is."""
-    numbers: dict[str, Any] = {"static_argnums": static_argnums} if static_argnums != () else {}
-    names: dict[str, Any] = {"static_argnames": static_argnames} if static_argnames else {}
-    options: dict[str, Any] = {**numbers, **names, "compiler_options": compiler_options}
-    return lambda function: _Jitted(function, options)
+    static = {"static_argnums": static_argnums, "static_argnames": static_argnames}
+    return lambda function: _Jitted(function, {**static, "compiler_options": compiler_options})

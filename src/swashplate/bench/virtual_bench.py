@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.bench.record import LOADS, BenchRecord
@@ -110,7 +109,7 @@ class RecordSchedule:
     name: str
     procedures: tuple[str, ...]
     driving: Mapping[str, Array]
-    point: Array | NDArray[np.intp]
+    point: Array
     rate: float
     bar: str = "held"
     removed: str = ""
@@ -141,9 +140,8 @@ def points(
     way, held = round(settle * rate), round(hold * rate)
     names = [key for key in DRIVING if any(key in setting for setting in settings)]
     driving = {key: np.repeat([setting.get(key, 0.0) for setting in settings], way + held) for key in names}
-    number = np.tile(np.r_[np.zeros(way), np.ones(held)], len(settings)) * np.repeat(
-        np.arange(1, len(settings) + 1), way + held
-    )
+    counted = np.repeat(np.arange(1.0, len(settings) + 1.0), way + held)
+    number = counted * np.tile(np.r_[np.zeros(way), np.ones(held)], len(settings))
     return RecordSchedule(name, tuple(procedures), driving, number, rate, removed=removed, words=words)
 
 
