@@ -42,7 +42,7 @@ def combine(
 
     if len(responses) > 2:
         raise SwashError(f"are {len(responses)}; it takes one or two.", channel="RESPONSES")
-    combined = sp.combine(operation, *(_one(text) for text in responses))  # type: ignore[arg-type]  # it says which
+    combined = sp.combine(operation, *(_one(text) for text in responses))  # it says which  # pyrefly: ignore[bad-argument-type]
     with folder_when_complete(out, ours=FILES) as folder:
         if folder is not None:
             combined.save(folder / flying.RESPONSES)

@@ -223,7 +223,7 @@ def flown(verb: Callable[..., None]) -> Callable[..., None]:
         verb(asked, **given)
 
     parameters = [entry.replace(kind=inspect.Parameter.KEYWORD_ONLY) for entry in (*shared.values(), *own)]
-    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__signature__ = inspect.Signature(parameters)  # pyrefly: ignore[missing-attribute]
     command.__annotations__ = {entry.name: entry.annotation for entry in parameters}
     return command
 

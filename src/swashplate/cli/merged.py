@@ -29,7 +29,7 @@ def merged(group: Callable[..., Any]) -> Callable[[Callable[..., None]], Callabl
         for name, entry in own.items():
             entries += shared.values() if name == place else [entry]
         parameters = [entry.replace(kind=inspect.Parameter.KEYWORD_ONLY) for entry in entries]
-        command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        command.__signature__ = inspect.Signature(parameters)  # pyrefly: ignore[missing-attribute]
         command.__annotations__ = {entry.name: entry.annotation for entry in parameters}
         return command
 

@@ -55,8 +55,8 @@ def plot(
         channels=[name.strip() for name in channels.split(",")] if channels else None,
         kind="spectrum" if spectrum else "spectrogram" if spectrogram else "time",
         path=out,
-        theme=theme,  # type: ignore[arg-type]  # one of the names above
-        alignment=align,  # type: ignore[arg-type]
+        theme=theme,  # one of the names above  # pyrefly: ignore[bad-argument-type]
+        alignment=align,  # pyrefly: ignore[bad-argument-type]
     )
     if not quiet:
         for words in aligned.words:

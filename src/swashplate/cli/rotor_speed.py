@@ -43,7 +43,7 @@ def rotor_speed(
     for text in line or ():
         match = _LINE.fullmatch(text)
         try:
-            bands[match["name"]] = (float(match["low"]), float(match["high"]))  # type: ignore[index]
+            bands[match["name"]] = (float(match["low"]), float(match["high"]))  # pyrefly: ignore[unsupported-operation]
         except (TypeError, ValueError):
             raise SwashError(
                 f"'{text}' is no line.", channel="--line", hint="For example --line omega_upper=-40..-30."

@@ -55,7 +55,7 @@ def stitch(
     if flights and len(flights) != len(files):
         raise SwashError(f"{len(flights)} logs for {len(files)} points, expected one each.", channel="--trim")
     how = None if gradients is None else gradients.value
-    made = sp.stitch(files, trims=flights or None, gradients=how, title=title)  # type: ignore[arg-type]  # one of two
+    made = sp.stitch(files, trims=flights or None, gradients=how, title=title)  # one of two
     made.save(out)
     if not quiet:
         typer.echo(repr(made))

@@ -68,7 +68,7 @@ def validation_table(validation: Validation, *, width: int) -> TextTable:
         known = channel(name)
         row = [name, known.shown_unit, f"{horizon:g}"]
         for figure, _, style in figures:
-            row += _cells(scores, figure, known.shown_factor if figure == "rms" else 1.0, style)  # type: ignore[arg-type]
+            row += _cells(scores, figure, known.shown_factor if figure == "rms" else 1.0, style)  # pyrefly: ignore[bad-argument-type]
         rows.append(row)
     head = ["channel", "unit", "ahead [s]"]
     for _, heading, _ in figures:

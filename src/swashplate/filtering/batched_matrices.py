@@ -30,7 +30,7 @@ class Stack:
     @property
     def shape(self) -> tuple[int, int]:
         """Of one matrix."""
-        return self.data.shape[:2]  # type: ignore[no-any-return]
+        return self.data.shape[:2]
 
     @property
     def T(self) -> Stack:

@@ -32,7 +32,7 @@ def kernels() -> bool:
     try:
         library = loaded(_SOURCE, options=(*_OPTIONS, "-isystem", jax.ffi.include_dir()))
         for name in ("propagated", "updated"):
-            target = jax.ffi.pycapsule(getattr(library, f"swash_{name}"))  # type: ignore[no-untyped-call]
+            target = jax.ffi.pycapsule(getattr(library, f"swash_{name}"))
             jax.ffi.register_ffi_target(f"swash_{name}", target, platform="cpu")
     except (SwashError, OSError, AttributeError):  # no headers of XLA, or of another form
         return False
@@ -75,7 +75,7 @@ def updated(H: Any, P: Any, mean: Any, news: Any, noise: Any) -> tuple[Any, Any,
 
 
 def _like(P: Any, shape: tuple[int, ...]) -> jax.ShapeDtypeStruct:
-    return jax.ShapeDtypeStruct(shape, P.dtype)  # type: ignore[no-untyped-call]
+    return jax.ShapeDtypeStruct(shape, P.dtype)
 
 
 _SOURCE = """#include <math.h>

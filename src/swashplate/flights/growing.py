@@ -36,7 +36,7 @@ from swashplate.flights.schema import SCHEMA_VERSION
 try:
     import fcntl
 except ImportError:  # Windows: what is open there cannot be removed, which serves the same end
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None
 
 Schema = TypeVar("Schema")
 

@@ -94,8 +94,8 @@ class _Process:
             process = self._started(path)
             whole = False
             try:
-                process.stdin.write(question)  # type: ignore[union-attr]
-                process.stdin.flush()  # type: ignore[union-attr]
+                process.stdin.write(question)  # pyrefly: ignore[missing-attribute]
+                process.stdin.flush()  # pyrefly: ignore[missing-attribute]
                 while not whole:
                     text = self._bytes(process, int.from_bytes(self._bytes(process, 8), "little"))
                     told = json.loads(text)
@@ -134,7 +134,7 @@ class _Process:
         content = bytearray(count)
         view, at = memoryview(content), 0
         while at < count:
-            got = process.stdout.readinto(view[at:])  # type: ignore[union-attr]
+            got = process.stdout.readinto(view[at:])  # pyrefly: ignore[missing-attribute]
             if not got:
                 raise EOFError
             at += got
@@ -155,8 +155,8 @@ class _Process:
         if own:
             running.kill()
         with suppress(OSError):
-            running.stdin.close()  # type: ignore[union-attr]
-        running.stdout.close()  # type: ignore[union-attr]
+            running.stdin.close()  # pyrefly: ignore[missing-attribute]
+        running.stdout.close()  # pyrefly: ignore[missing-attribute]
         if own:
             running.wait()
 

@@ -305,7 +305,7 @@ def _parameter(name: str, entry: Any, path: str) -> Parameter:
         )
     numbers = {key: float(entry[key]) for key in _NUMBERS if key in entry}
     texts = {key: str(entry[key]) for key in ("unit", "source", "status", "note") if key in entry}
-    return Parameter(**numbers, **texts)  # type: ignore[arg-type]
+    return Parameter(**numbers, **texts)  # pyrefly: ignore[bad-argument-type]
 
 
 def _correlations(entry: Any, parameters: Mapping[str, Parameter], path: str) -> dict[str, dict[str, float]]:

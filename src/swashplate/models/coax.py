@@ -86,11 +86,11 @@ UNITS: dict[str, str] = {
 }
 """Every parameter and its unit, in the order of the equations' tuple."""
 
-CoaxParameters = NamedTuple("CoaxParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
-CoaxInflowParameters = NamedTuple(  # type: ignore[misc]
+CoaxParameters = NamedTuple("CoaxParameters", [(name, Any) for name in UNITS])  # pyrefly: ignore[bad-class-definition]
+CoaxInflowParameters = NamedTuple(  # pyrefly: ignore[bad-class-definition]
     "CoaxInflowParameters", [(name, Any) for name in (*UNITS, *INFLOW_UNITS)]
 )
-CoaxBladeParameters = NamedTuple(  # type: ignore[misc]
+CoaxBladeParameters = NamedTuple(  # pyrefly: ignore[bad-class-definition]
     "CoaxBladeParameters", [(name, Any) for name in (*UNITS, *INFLOW_UNITS, *FLAPPING_UNITS)]
 )
 

@@ -14,7 +14,7 @@ class Vector(NamedTuple):
     y: Scalar
     z: Scalar
 
-    def __add__(self, other: Vector) -> Vector:  # type: ignore[override]
+    def __add__(self, other: Vector) -> Vector:  # pyrefly: ignore[bad-override]
         return Vector(self.x + other.x, self.y + other.y, self.z + other.z)
 
     def cross(self, other: Vector) -> Vector:

@@ -113,7 +113,7 @@ def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:
     models = [one for one in given if isinstance(one, Result) and isinstance(one.solution, StateSpaceModel)]
     material = ResponseMaterial(
         responses=_only([one for one in given if isinstance(one, FrequencyResponse)], "frequency response"),
-        transfer_functions=tuple(one for one in given if _is_of(one, tuple)),  # type: ignore[misc]
+        transfer_functions=tuple(one for one in given if _is_of(one, tuple)),  # pyrefly: ignore[bad-argument-type]
         fit=_only([one for one in models if one.targets], "fit to responses"),
         verification=_only([one for one in given if isinstance(one, Verification)], "verification"),
         time_fit=_only([one for one in models if not one.targets], "fit in time"),

@@ -268,7 +268,7 @@ def _flying(
     _, record = jax.lax.scan(
         sample, (jnp.asarray(x0), jnp.asarray(shown), memory, nothing, sent, 0), (around, wanted, added)
     )
-    return record  # type: ignore[no-any-return]
+    return record
 
 
 def _arrived(sent: Float[jax.Array, "commands inputs"], late: Int[jax.Array, " inputs"]) -> Any:

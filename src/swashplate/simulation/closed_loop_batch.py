@@ -294,7 +294,7 @@ def _flying_many(
     tables = tuple(part.reshape(-1, keep, *part.shape[1:]) for part in (around, wanted, added))
     sent = jnp.broadcast_to(first[None, :, None], (waiting + 1, first.shape[0], x0.shape[1]))
     _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(shown), jnp.asarray(memory), sent, 0), tables)
-    return record  # type: ignore[no-any-return]
+    return record
 
 
 _fly_many = jit(static_argnums=(0, 1, 2, 3, 4, 5, 6, 7), compiler_options=QUICK_FLIGHT)(_flying_many)

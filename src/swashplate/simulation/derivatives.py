@@ -85,7 +85,7 @@ def _compiled_slopes(equations: Equations, x: Array, w: Array, p: Float[jax.Arra
     def acting(x: Float[jax.Array, " states"], w: Float[jax.Array, " inputs"]) -> Any:
         return jnp.stack([jnp.asarray(value, x.dtype) for value in _acting(equations, x, w, p=p, xp=jax_backend())])
 
-    return jax.jacfwd(acting, argnums=(0, 1))(x, w)  # type: ignore[no-any-return]
+    return jax.jacfwd(acting, argnums=(0, 1))(x, w)
 
 
 def _acting(equations: Equations, x: Rows, w: Rows, *, p: Rows, xp: Backend) -> list[Any]:

@@ -224,7 +224,7 @@ def moved(p: PointMass, now: Landing, dt: float) -> Landing:
     push_z = 0.5 * p.density * p.area_z * speed * now.sink
     faster = (thrust * np.sin(now.tilt) - push_x) / p.mass
     sinking = p.gravity - (thrust * np.cos(now.tilt) + push_z) / p.mass
-    V, _, _ = mass_flow(air.lam, air.mu_z, air.mu * air.mu, np)  # type: ignore[arg-type]
+    V, _, _ = mass_flow(air.lam, air.mu_z, air.mu * air.mu, np)  # pyrefly: ignore[bad-argument-type]
     inflow = (thrust / (p.density * p.area) - 2.0 * now.induced * V * air.tip) / (APPARENT_MASS * p.radius)
     slower = -taken / (p.inertia * now.omega)
     ahead, sink = now.ahead + faster * dt, now.sink + sinking * dt

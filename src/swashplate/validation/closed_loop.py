@@ -96,7 +96,7 @@ def closed_ahead(
         past = before[here[:, None] + np.arange(1, reach + 1)]
         reference = np.stack(references, axis=1)[np.minimum(np.arange(first, first + RUNS), len(starts) - 1)]
         parts.append(_closed_ahead(model, begin, numbers, loops, past, reference, reaching[rows], voltage[rows]))
-    return whole(parts, len(starts))  # type: ignore[no-any-return]
+    return whole(parts, len(starts))
 
 
 @jit(static_argnums=0)

@@ -99,7 +99,7 @@ def validate(
         from swashplate.validation.validate import validate as predict_flights
 
         return predict_flights(
-            model,  # type: ignore[arg-type]
+            model,
             flown,
             published=published,
             horizons=horizons,

@@ -65,7 +65,7 @@ class ProcessPool:
     def outcomes(self, seconds: float) -> Iterator[TaskOutcome]:
         busy = {lane.pipe: lane for lane in self._lanes if lane.task is not None}
         for pipe in connection.wait(list(busy), timeout=seconds):
-            lane = busy[pipe]  # type: ignore[index]
+            lane = busy[pipe]  # pyrefly: ignore[bad-index]
             task = lane.task
             assert task is not None
             try:

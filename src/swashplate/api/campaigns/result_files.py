@@ -48,7 +48,7 @@ def packed(columns: Columns, *, ending: str) -> bytes:
     columns = {name: _characters(values) if values.dtype.kind == "U" else values for name, values in columns.items()}
     stream = io.BytesIO()
     if ending == NUMPY:
-        np.savez(stream, **columns)  # type: ignore[arg-type]
+        np.savez(stream, **columns)  # pyrefly: ignore[bad-argument-type]
         return stream.getvalue()
     parquet = library("pyarrow.parquet", what="a table in Parquet")
     table = library("pyarrow", what="a table in Parquet").table(columns)

@@ -119,7 +119,7 @@ def _growth(A: Array, B: Array, K: Array, rate: float) -> float:
 
 def _hashable(step: Step) -> Step:
     """One function per size, so that other gains compile nothing anew."""
-    keywords = step.keywords  # type: ignore[attr-defined]
+    keywords = step.keywords  # pyrefly: ignore[missing-attribute]
     return _STEPS.setdefault((keywords["inputs"], keywords["states"]), step)
 
 

@@ -96,7 +96,7 @@ class LeverArm:
         parts = (self.x, self.y, self.z)
         raw = (self.x.value, self.y.value, self.vertical)
         keep = [part.significant for part in parts[:2]] + [self.percussion != 0.0 or self.z.significant]
-        return tuple(v if k else 0.0 for v, k in zip(raw, keep, strict=True))  # type: ignore[return-value]
+        return tuple(v if k else 0.0 for v, k in zip(raw, keep, strict=True))  # pyrefly: ignore[bad-return]
 
     def __str__(self) -> str:
         lines = [f"lever arm from {self.samples} samples, {self.band[0]:g} to {self.band[1]:g} Hz"]

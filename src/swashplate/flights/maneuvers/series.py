@@ -127,7 +127,7 @@ def _units(*signs: float) -> Callable[[Maneuver, Array], list[Array]]:
         number = np.clip(np.floor(time / unit + 1e-9).astype(int), 0, len(signs) - 1)
         return [np.asarray(signs)[number]]
 
-    blocks.units = len(signs)  # type: ignore[attr-defined]
+    blocks.units = len(signs)  # pyrefly: ignore[missing-attribute]
     return blocks
 
 

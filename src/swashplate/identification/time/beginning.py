@@ -128,7 +128,7 @@ def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotio
     matrices = joined_at(model, rows, seen)
     here = A, C, Q, R = tuple(part[0] for part in matrices)
     P = steady_gain(A, C, Q, R)[2]
-    dK, dS = steady_gain_moved(here, P, tuple(map(_slope_aside, matrices)))  # type: ignore[arg-type]
+    dK, dS = steady_gain_moved(here, P, tuple(map(_slope_aside, matrices)))  # pyrefly: ignore[bad-argument-type]
     return Begun(model.gain_of(dK, dS), _slope_aside(_starts(model, rows, seen)))
 
 

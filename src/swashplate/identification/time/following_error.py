@@ -260,7 +260,7 @@ def _along_some(
         driven = np.swapaxes(lengthened(np.swapaxes(here, 0, 1), STRETCH), 0, 1)
         state, P, part = _along(model, state, P, numbers, read, driven, voltage)
         parts.append(part)
-    return jax.tree.map(lambda *rows: np.concatenate(rows, axis=1)[:, :n], *parts)  # type: ignore[no-any-return]
+    return jax.tree.map(lambda *rows: np.concatenate(rows, axis=1)[:, :n], *parts)
 
 
 @jit(static_argnums=0, compiler_options=RUN_RARELY)

@@ -190,7 +190,7 @@ def traced_innovations(plan: FilterPlan, data: Any, row: Any) -> tuple[Any, Any,
         return traced_run(plan.model, y, u, voltage, seen, parameters=parameters, noise=noise, nuisance=nuisance)
 
     rows = (data["outputs"], data["inputs"], data["voltage"], FirstMotion(*data["seen"]))
-    return jax.vmap(one)(*rows, nuisances)  # type: ignore[no-any-return]
+    return jax.vmap(one)(*rows, nuisances)
 
 
 def traced_cost(plan: FilterPlan, data: Mapping[str, Any], row: jax.Array) -> Any:

@@ -188,7 +188,7 @@ class OutputError:
         """Residuals (windows, n, outputs) and states (windows, n, states)."""
         if self._shooting is not None:
             return self._beside(self._shooting.flown(np.asarray(row)))
-        return traced_shooting.residuals(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
+        return traced_shooting.residuals(self._plan, self._data, jnp.asarray(row))
 
     def _beside(self, flown: list[FlownWindow]) -> tuple[Array, Array]:
         """Residuals and states of simulated windows."""

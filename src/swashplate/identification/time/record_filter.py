@@ -119,7 +119,7 @@ def ahead_of(
         rows = here[:, None] + np.arange(ahead)
         begin = jax.tree.map(lambda part, at=here: np.asarray(part)[at], states)
         parts.append(_ahead_of(model, begin, numbers, commands[rows], voltage[rows]))
-    return whole(parts, len(starts))  # type: ignore[no-any-return]
+    return whole(parts, len(starts))
 
 
 @jit(static_argnums=0)
@@ -216,7 +216,7 @@ def _planes(
         at = jnp.concatenate([here, u, parameters])
         return jax.vmap(lambda move: jax.jvp(step, (at,), (move,)), out_axes=(None, -1))(moves)
 
-    return jax.lax.map(one, (place, commands, voltage), batch_size=_TOGETHER)  # type: ignore[no-any-return]
+    return jax.lax.map(one, (place, commands, voltage), batch_size=_TOGETHER)
 
 
 def along_moved(

@@ -23,7 +23,7 @@ def spaces(flown: Flying) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
     return gymnasium.spaces.Box(-edges, edges), gymnasium.spaces.Box(-1.0, 1.0, (len(flown.free),), np.float32)
 
 
-class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):  # type: ignore[misc]
+class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A vehicle that hovers, follows a path or tracks an attitude sweep.
 
     Observation: `flying.OBSERVED` (12), with `inner=True` the states of rotors, bar and inflow behind them, less the

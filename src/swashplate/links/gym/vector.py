@@ -20,7 +20,7 @@ from swashplate.models.vehicle import Vehicle
 Observations = NDArray[np.float32]
 
 
-class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):  # type: ignore[misc]
+class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """`num_envs` copies of `HelicopterEnv`, the same numbers to 1e-9; an ended one is reset by the next step.
 
     Every info holds the state rows as "state", (num_envs, states). `reset(seed=s)` seeds copy i with s + i, as

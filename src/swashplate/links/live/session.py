@@ -181,7 +181,7 @@ class LiveSession:
         elif not world.vehicle.traits.wind and kind in ("wind", "gusts"):
             raise SwashError("This model has no wind in its equations.")
         elif kind == "wind":
-            world.setting.wind = tuple(float(message[name]) for name in ("north", "east", "down"))  # type: ignore[assignment]
+            world.setting.wind = tuple(float(message[name]) for name in ("north", "east", "down"))  # pyrefly: ignore[bad-assignment]
         elif kind == "gusts":
             world.set_gusts(float(message["value"]))
         elif kind == "voltage":

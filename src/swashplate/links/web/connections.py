@@ -20,7 +20,7 @@ class Punctual(H11Protocol):
 
     _waiting: ClassVar[dict[Punctual, asyncio.TimerHandle]] = {}
 
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+    def connection_made(self, transport: asyncio.Transport) -> None:
         super().connection_made(transport)
         self._wait()
 

@@ -87,10 +87,10 @@ POSITIVE = (*(n for n in SINGLE_POSITIVE if n in UNITS), "differential_limit", "
 NOT_NEGATIVE = tuple(name for name in SINGLE_NOT_NEGATIVE if name in UNITS)
 ANGLES = (*(n for n in SINGLE_ANGLES if n in UNITS and n != "cyclic_phase"), "differential_limit")
 
-CoaxialParameters = NamedTuple("CoaxialParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
+CoaxialParameters = NamedTuple("CoaxialParameters", [(name, Any) for name in UNITS])  # pyrefly: ignore[bad-class-definition]
 
 _EACH = ("hub_height", "shaft_tilt", "blade_first_moment")
-OneRotor = NamedTuple("OneRotor", [(name, Any) for name in (*_ROTOR, *_EACH)])  # type: ignore[misc]
+OneRotor = NamedTuple("OneRotor", [(name, Any) for name in (*_ROTOR, *_EACH)])  # pyrefly: ignore[bad-class-definition]
 """The numbers of one of the rotors, by the names that `main_rotor` reads; shafts are upright, blades even."""
 
 

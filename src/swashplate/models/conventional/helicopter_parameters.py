@@ -132,7 +132,7 @@ UNITS: Mapping[str, str] = {name: unit for name, unit, _ in _TABLE}
 MEANING: Mapping[str, str] = {name: text for name, _, text in _TABLE}
 """What each parameter is, and what to measure or assume."""
 
-HelicopterParameters = NamedTuple("HelicopterParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
+HelicopterParameters = NamedTuple("HelicopterParameters", [(name, Any) for name in UNITS])  # pyrefly: ignore[bad-class-definition]
 
 ADDED: Mapping[str, tuple[str | None, float | str]] = {
     "servo_delay": ("delay", 0.02),

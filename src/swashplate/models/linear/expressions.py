@@ -97,7 +97,7 @@ def _walk(node: ast.expr, values: Mapping[str, Any]) -> Any:
         case ast.Name(id=name):
             return values[name]
         case ast.Constant(value=value):
-            return float(value)  # type: ignore[arg-type]
+            return float(value)  # pyrefly: ignore[bad-argument-type]
         case ast.UnaryOp(op=op, operand=operand):
             inner = _walk(operand, values)
             return -inner if isinstance(op, ast.USub) else inner

@@ -148,7 +148,7 @@ def _turned(local: Vector, attitude: Euler) -> Array:
     """Derivative of a local vector's body components by roll and pitch, shape (3, 2)."""
     step = 1e-30j
     steps = (attitude._replace(phi=attitude.phi + step), attitude._replace(theta=attitude.theta + step))
-    return np.array([[np.imag(c) / step.imag for c in local_to_body(local, a, np)] for a in steps]).T  # type: ignore[arg-type]
+    return np.array([[np.imag(c) / step.imag for c in local_to_body(local, a, np)] for a in steps]).T  # pyrefly: ignore[bad-argument-type]
 
 
 def differences(points: Sequence[TrimmedMatrices]) -> list[dict[str, float]]:

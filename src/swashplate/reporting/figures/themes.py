@@ -59,7 +59,7 @@ def checked(theme: str) -> Theme:
     """
     if theme not in get_args(Theme):
         raise SwashError(f"is '{theme}', expected one of {', '.join(get_args(Theme))}.", channel="theme")
-    return theme  # type: ignore[return-value]
+    return theme  # pyrefly: ignore[bad-return]
 
 
 def coloured(value: Any, theme: Theme) -> Any:
