@@ -44,6 +44,11 @@ def numbers(task: CampaignTask) -> Columns:
     }
 
 
+def bits(folder: Path) -> dict[str, bytes]:
+    """Content of every result in a campaign's folder by its task's name."""
+    return {path.stem: path.read_bytes() for path in sorted((folder / "results").glob("[!.]*"))}
+
+
 def tasks(count: int = 12, *, batch: int = 2, **settings: object) -> tuple[CampaignTask, ...]:
     """Tasks for `numbers`."""
     return made_tasks("test", settings, portions(count=count, batch=batch, seed=5), files={}, program=program())

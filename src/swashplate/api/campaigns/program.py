@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
 import os
 import platform
-import tempfile
+import socket
 import threading
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -22,8 +21,10 @@ _LIBRARIES = ("swashplate", "jax", "jaxlib", "numpy", "scipy")
 _OURS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000"
 """What `compile_small_loops_whole` adds to XLA's flags of a process that has computed; no choice of the user's."""
 _ONE_THREAD = "--xla_cpu_multi_thread_eigen=false"
-_held: list[int] = []
-"""The core that this process has pinned itself to, and the descriptor of its lock."""
+_FIRST_PROCESSES = 0xEFFFFFFC
+"""Number of the namespace of processes that Linux starts with (`PROC_PID_INIT_INO`); containers have others."""
+_held: list[tuple[int, socket.socket | None]] = []
+"""The core that this process has pinned itself to, and its lock."""
 
 
 def worker_environment() -> dict[str, str]:
@@ -92,38 +93,44 @@ def prepare() -> int | None:
     """Make this process a worker: JAX's threads one, and one core of its own; returns the core. A second call does
     nothing.
 
-    Cores are shared out by locks on files, one a core, among all workers of a machine whoever started them: the lock
-    goes when the process ends, however it ends. Where all are taken, two workers share one.
+    Cores are shared out by locks, one a core, among all workers of a machine whoever started them: the lock goes when
+    the process ends, however it ends. Where all are taken, two workers share one. In a container no core is chosen:
+    workers of two containers would all choose the first, so the machine shares its cores out itself.
     """
     if _held:
-        return _held[0]
+        return _held[0][0]
     for name, value in worker_environment().items():
         os.environ[name] = value
-    if not hasattr(os, "sched_setaffinity"):
+    if not hasattr(os, "sched_setaffinity") or _in_container():
         return None
     cores = sorted(os.sched_getaffinity(0))
-    core, descriptor = next(_free(cores), (cores[os.getpid() % len(cores)], -1))
-    _held.extend((core, descriptor))
+    _held.append(next(_free(cores), (cores[os.getpid() % len(cores)], None)))
+    core = _held[0][0]
     for thread in [int(name) for name in os.listdir("/proc/self/task")] if os.path.isdir("/proc/self/task") else [0]:
         with contextlib.suppress(OSError):
             os.sched_setaffinity(thread, {core})
     return core
 
 
-def _free(cores: list[int]) -> Iterator[tuple[int, int]]:
-    """Cores that no other worker holds, each with the descriptor of a lock that is held from now on."""
-    folder = Path(tempfile.gettempdir()) / f"swashplate-cores-{os.getuid()}"
-    with contextlib.suppress(OSError):
-        folder.mkdir(mode=0o700, exist_ok=True)
-        for core in cores:
-            descriptor = os.open(folder / str(core), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                os.close(descriptor)
-                continue
-            yield core, descriptor
-            return
+def _in_container() -> bool:
+    """Whether this process sees only a part of the machine's processes: what it locks, other containers do not see."""
+    try:
+        return os.stat("/proc/self/ns/pid").st_ino != _FIRST_PROCESSES
+    except OSError:
+        return True
+
+
+def _free(cores: list[int]) -> Iterator[tuple[int, socket.socket]]:
+    """A core that no other worker holds, with its lock: a socket's name that only one process of a machine can have."""
+    for core in cores:
+        lock = socket.socket(socket.AF_UNIX)
+        try:
+            lock.bind(f"\0swashplate-core-{core}")
+        except OSError:
+            lock.close()
+            continue
+        yield core, lock
+        return
 
 
 def end_with_parent() -> None:

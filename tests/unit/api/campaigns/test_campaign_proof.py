@@ -23,18 +23,13 @@ KILLS, TASKS = int(os.environ.get("SWASH_KILLS", "40")), int(os.environ.get("SWA
 CLIENT = Path(campaign_client.__file__)
 
 
-def bits(folder: Path) -> dict[str, bytes]:
-    """Content of every result by its task's name."""
-    return {path.stem: path.read_bytes() for path in sorted((folder / "results").glob("[!.]*"))}
-
-
 def expected(folder: Path) -> dict[str, bytes]:
     """The same of this process."""
     store = CampaignStore(folder)
     store.begin("", {}, {})
     for task in made_campaigns.tasks(TASKS, batch=1, wait=0.1):
         store.keep(task, made_campaigns.numbers(replace(task, settings={})))
-    return bits(folder)
+    return made_campaigns.bits(folder)
 
 
 def client(folder: Path, workers: int, engine: str) -> subprocess.Popen[bytes]:
@@ -79,7 +74,7 @@ def test_random_kills_change_no_bit(engine: str, tmp_path: Path) -> None:
     while running.wait(timeout=600) != 0:
         running = client(folder, 2, engine)
     print(f"{engine}: {TASKS} tasks, kills: {killed}, {time.monotonic() - began:.0f} s")
-    failed, same = CampaignStore(folder).failed(), bits(folder) == expected(tmp_path / "here")
+    failed, same = CampaignStore(folder).failed(), made_campaigns.bits(folder) == expected(tmp_path / "here")
     proof_page.leave(
         f"campaign-kills-{engine}",
         {
@@ -103,7 +98,7 @@ def test_one_two_and_eight_workers_have_the_same_bits(tmp_path: Path) -> None:
         for workers in (1, 2, 8):
             folder = tmp_path / f"{engine}-{workers}"
             assert client(folder, workers, engine).wait(timeout=900) == 0
-            assert bits(folder) == whole
+            assert made_campaigns.bits(folder) == whole
 
 
 FLIGHTS = """
@@ -139,6 +134,6 @@ def test_flights_have_the_same_bits_on_any_engine(tmp_path: Path) -> None:
         out = tmp_path / engine
         run = ["campaign", "run", "c.toml", "-o", str(out), "--engine", engine, "--workers", workers, "-q"]
         subprocess.run([*command, *run], cwd=tmp_path, check=True, timeout=600)
-        found.append(bits(out))
+        found.append(made_campaigns.bits(out))
     assert len(found[0]) == 4
     assert found[0] == found[1]

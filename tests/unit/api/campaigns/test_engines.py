@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -25,18 +26,13 @@ from swashplate.api.campaigns.tasks import CampaignTask
 from swashplate.errors import CampaignError, WriteError
 
 
-def bits(store: CampaignStore) -> dict[str, bytes]:
-    """Content of every result by its task's name."""
-    return {path.stem: path.read_bytes() for path in sorted((store.folder / "results").glob("[!.]*"))}
-
-
 def expected(every: tuple[CampaignTask, ...], folder: Path) -> dict[str, bytes]:
     """The same of this process, without any engine."""
     store = CampaignStore(folder)
     store.begin("", {}, {})
     for task in every:
         store.keep(task, made_campaigns.numbers(replace(task, settings={})))
-    return bits(store)
+    return made_campaigns.bits(store.folder)
 
 
 def done(every: tuple[CampaignTask, ...], engine: TaskEngine, folder: Path) -> tuple[CampaignStore, CampaignStanding]:
@@ -56,7 +52,7 @@ def test_kills_and_failures_cost_nothing_but_time(tmp_path: Path, monkeypatch: p
     every = made_campaigns.tasks(fail=[4], die=[8], die_once=[2], folder=str(tmp_path))
     store, standing = done(every, ProcessPool(made_campaigns.numbers, workers=2), tmp_path / "two")
     good = tuple(task for task in every if task.portion.first not in (4, 8))
-    assert bits(store) == expected(good, tmp_path / "here")
+    assert made_campaigns.bits(store.folder) == expected(good, tmp_path / "here")
     assert (standing.done, standing.failed) == (4, 2)
     failed = {told["first"]: told["tries"] for told in store.failed().values()}
     assert failed == {
@@ -74,7 +70,7 @@ def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
     monkeypatch.setattr(engine, "close", lambda: None)
     store, _ = done(every, engine, tmp_path / "dask")
     good = tuple(task for task in every if task.portion.first != 4)
-    assert bits(store) == expected(good, tmp_path / "here")
+    assert made_campaigns.bits(store.folder) == expected(good, tmp_path / "here")
     assert [told["tries"] for told in store.failed().values()] == [["ValueError: row 4 cannot be done"] * TRIES]
     for at, action, address in ((1.0, "add-worker", "a"), (2.5, "remove-worker", "a"), (3.0, "add-worker", "b"),
                                 (60.0, "remove-worker", "b"), (61.0, "remove-worker", "c")):  # fmt: skip
@@ -137,20 +133,28 @@ def test_a_full_disk_ends_it_with_what_is_done(tmp_path: Path, monkeypatch: pyte
     assert sorted(path.suffix for path in (tmp_path / "results").iterdir()) == [usual_ending()] * 3
     left = tuple(task for task in every if task.name not in store.done())
     store, _ = done(left, made_campaigns.InProcess(made_campaigns.numbers), tmp_path)
-    assert bits(store) == expected(every, tmp_path / "here")
+    assert made_campaigns.bits(store.folder) == expected(every, tmp_path / "here")
 
 
-def test_workers_share_out_the_cores_and_have_one_thread() -> None:
-    code = (
-        "from swashplate.api.campaigns import program; import os; core = program.prepare();"
-        "assert program.prepare() == core; print(core, sorted(os.sched_getaffinity(0)),"
-        " os.environ['OMP_NUM_THREADS'], flush=True); input()"
-    )
-    found = []
-    started = [
-        subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        for _ in sorted(os.sched_getaffinity(0))[:2]
-    ]
+BECOMES_A_WORKER = (
+    "from swashplate.api.campaigns import program; import os; core = program.prepare();"
+    "assert program.prepare() == core; print(core, sorted(os.sched_getaffinity(0)),"
+    " os.environ['OMP_NUM_THREADS'], flush=True); input()"
+)
+
+
+def test_workers_share_out_the_cores_and_have_one_thread(tmp_path: Path) -> None:
+    if program._in_container():
+        pytest.skip("in a container a worker takes no core of its own")
+    found, started = [], []
+    for number in range(min(2, len(os.sched_getaffinity(0)))):
+        own = tmp_path / str(number)  # as where a queue gives each job a temporary folder of its own
+        own.mkdir()
+        environment = {**os.environ, "TMPDIR": str(own)}
+        command = [sys.executable, "-c", BECOMES_A_WORKER]
+        started.append(
+            subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+        )
     for process in started:
         assert process.stdout is not None
         core, _, rest = process.stdout.readline().strip().partition(" ")
@@ -159,6 +163,19 @@ def test_workers_share_out_the_cores_and_have_one_thread() -> None:
     for process in started:
         process.communicate("\n", timeout=30)
     assert len(set(found)) == len(found)
+
+
+def test_a_worker_in_a_container_is_left_to_the_machine() -> None:
+    inside = ["unshare", "--pid", "--fork", "--mount-proc"]
+    if (
+        shutil.which("unshare") is None
+        or subprocess.run([*inside, "true"], capture_output=True, check=False).returncode
+    ):
+        pytest.skip("no namespace of processes can be made here (unshare)")
+    found = subprocess.run(
+        [*inside, sys.executable, "-c", BECOMES_A_WORKER], input="\n", capture_output=True, text=True, check=True
+    ).stdout
+    assert found == f"None {sorted(os.sched_getaffinity(0))} 1\n"
 
 
 @contextmanager
@@ -198,7 +215,7 @@ def test_a_scheduler_by_its_address_and_then_it_is_gone(tmp_path: Path, monkeypa
     every = made_campaigns.tasks()
     with cluster() as (address, scheduler, _):
         store, _ = done(every, DaskEngine(made_campaigns.numbers, workers=1, scheduler=address), tmp_path / "dask")
-        assert bits(store) == expected(every, tmp_path / "here")
+        assert made_campaigns.bits(store.folder) == expected(every, tmp_path / "here")
         engine = DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
         engine.submit(made_campaigns.tasks(1, wait=60.0)[0])
         scheduler.kill()
@@ -234,7 +251,7 @@ def test_a_campaign_whose_workers_have_all_gone_waits_and_says_so(tmp_path: Path
                 process.wait()
     assert told[0] == (0, f"no worker of the scheduler {address}, it waits for one")
     assert told[-1][0] == 1
-    assert bits(store) == expected(every, tmp_path / "here")
+    assert made_campaigns.bits(store.folder) == expected(every, tmp_path / "here")
 
 
 @pytest.mark.proof
@@ -253,7 +270,7 @@ def test_a_worker_that_joins_late_without_the_package_costs_nothing_but_time(tmp
             late.wait()
     assert engine.turned_away, "nobody is told of it"
     assert store.failed() == {}
-    assert bits(store) == expected(every, tmp_path / "here")
+    assert made_campaigns.bits(store.folder) == expected(every, tmp_path / "here")
 
 
 @pytest.mark.proof

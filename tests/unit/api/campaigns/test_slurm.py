@@ -32,10 +32,6 @@ def asked(*words: str) -> str:
     return subprocess.run(words, capture_output=True, text=True, check=False, timeout=30).stdout
 
 
-def bits(folder: Path) -> dict[str, bytes]:
-    return {path.stem: path.read_bytes() for path in sorted((folder / "results").glob("[!.]*"))}
-
-
 @pytest.mark.proof
 def test_a_campaign_on_slurm_outlives_cancelled_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     jobqueue = pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is not installed")
@@ -81,7 +77,7 @@ def test_a_campaign_on_slurm_outlives_cancelled_jobs(tmp_path: Path, monkeypatch
         finally:
             over.set()
             engine.close()
-    same, failed = bits(tmp_path / "slurm") == bits(tmp_path / "here"), there.failed()
+    same, failed = made_campaigns.bits(tmp_path / "slurm") == made_campaigns.bits(tmp_path / "here"), there.failed()
     proof_page.leave(
         "campaign-slurm",
         {
