@@ -9,6 +9,7 @@ Tests marked `proof` and the benchmarks leave JSON files in build/proof (the fol
 `rows` hold texts or numbers; `passed` may be left out. The benchmarks' file (build/proof/benchmarks.json) is what
 `python -m benchmarks.run --out` writes. Files of an earlier run are removed first, so that nothing old is reported.
 With `--put`, nothing runs: sections of the given files take the places of those of the same title, and say their day.
+Such sections stay where a later run has none of that title: it had no Slurm, no Kubernetes or no older code beside it.
 What `make siege` wrote into the page (scripts/siege.py) is kept.
 """
 
@@ -117,6 +118,7 @@ def assemble(folder: Path, runs: Sequence[dict[str, Any]]) -> str:
 
 
 BEGIN, END = "<!-- siege -->", "<!-- end of siege -->"
+BY_ITSELF = "Run by itself on "
 
 
 def siege_of(page: str) -> str:
@@ -131,9 +133,17 @@ def with_siege(page: str, siege: str) -> str:
     return f"{kept}\n\n{BEGIN}\n\n{siege}\n\n{END}\n" if siege else f"{kept}\n"
 
 
+def kept_from(page: str, fresh: str) -> str:
+    """A fresh page with the sections of an earlier one that ran by themselves and that it lacks, at its end."""
+    earlier = [part.strip() for part in page.partition(BEGIN)[0].split("\n## ")[1:]]
+    titles = {line for line in fresh.splitlines() if line.startswith("## ")}
+    kept = [f"## {part}" for part in earlier if BY_ITSELF in part and f"## {part.splitlines()[0]}" not in titles]
+    return "\n\n".join([fresh.rstrip(), *kept]) + "\n"
+
+
 def put(page: str, document: dict[str, Any], today: str) -> str:
     """A page with one section anew, in its place or before those of the siege."""
-    fresh = section({**document, "text": f"Run by itself on {today}. {document.get('text', '')}"})
+    fresh = section({**document, "text": f"{BY_ITSELF}{today}. {document.get('text', '')}"})
     head, begin, siege = page.partition(BEGIN)
     before, title, rest = head.partition(f"## {document['title']}\n")
     _, following, after = rest.partition("\n## ") if title else ("", "", "")
@@ -162,7 +172,7 @@ def main() -> int:
         runs.append(ran(["-m", "pytest", "-m", "proof", "-q", "-n", "2", "--dist", "loadfile"]))
     PAGE.parent.mkdir(exist_ok=True)
     old = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
-    PAGE.write_text(with_siege(assemble(FOLDER, runs), siege_of(old)), encoding="utf-8")
+    PAGE.write_text(with_siege(kept_from(old, assemble(FOLDER, runs)), siege_of(old)), encoding="utf-8")
     print(f"Written: {PAGE.relative_to(ROOT)}")
     return 1 if any(run["code"] for run in runs) else 0
 

@@ -54,3 +54,16 @@ def test_a_section_is_put_anew_and_the_others_stay(proof: Any) -> None:
     assert again != page
     added = proof.put(page, {"title": "C", "text": "more."}, "2026-11-27")
     assert added == page.replace(proof.BEGIN, f"## C\n\nRun by itself on 2026-11-27. more.\n\n{proof.BEGIN}")
+
+
+def test_what_ran_by_itself_stays_where_a_later_run_lacks_it(proof: Any) -> None:
+    page = proof.put("# Proof\n", {"title": "Slurm", "text": "two jobs.", "passed": True}, "2026-11-28")
+    page = proof.put(page, {"title": "Speed", "text": "slow.", "passed": False}, "2026-11-28")
+    page = proof.with_siege(
+        page + "\n" + proof.section({"title": "Gone", "text": "of a whole run."}), "## Siege\n\nkills"
+    )
+    fresh = "# Proof\n\n" + proof.section({"title": "Speed", "text": "fast.", "passed": True}) + "\n"
+    kept = proof.with_siege(proof.kept_from(page, fresh), proof.siege_of(page))
+    assert kept == proof.with_siege(
+        f"{fresh}\n## Slurm\n\n**Passed.** Run by itself on 2026-11-28. two jobs.", "## Siege\n\nkills"
+    )
