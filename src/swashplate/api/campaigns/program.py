@@ -13,6 +13,7 @@ from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
 
+from swashplate.compiled import can_compile
 from swashplate.errors import CampaignError
 from swashplate.extras import version_of
 from swashplate.threads import ONE_THREAD
@@ -39,7 +40,8 @@ def worker_environment() -> dict[str, str]:
 
 
 def program() -> dict[str, str]:
-    """What a result depends on beside its task: versions, our own source and XLA's flags, by name."""
+    """What a result depends on beside its task, by name: versions, our own source, XLA's flags, whether flights and
+    filters are C or XLA's (they differ in the last bits)."""
     versions = dict(_versions())
     flags = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in (_OURS, _ONE_THREAD)]
     return versions | {"XLA flags": " ".join(flags)}
@@ -50,6 +52,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
     versions = {"python": ".".join(platform.python_version_tuple()[:2])} | {
         name: version_of(name) for name in _LIBRARIES
     }
+    versions["generated code"] = f"C by CasADi {version_of('casadi')}" if can_compile() else "XLA"
     every = metadata.entry_points()
     for group in (name for name in every.groups if name.startswith("swashplate.")):
         for point in every.select(group=group):  # packages that bring models, estimators or kinds of their own

@@ -23,6 +23,7 @@ from swashplate.api.campaigns.pool import ProcessPool
 from swashplate.api.campaigns.result_files import usual_ending
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
+from swashplate.compiled import can_compile
 from swashplate.errors import CampaignError, WriteError
 
 
@@ -279,6 +280,13 @@ def test_a_worker_of_another_program_is_refused() -> None:
     with cluster(environment=other) as (address, _, _), pytest.raises(CampaignError) as refused:
         DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
     assert "it has another program: XLA flags is --xla_cpu_enable_fast_math=true" in str(refused.value)
+
+
+@pytest.mark.skipif(not can_compile(), reason="no C compiler here, or no CasADi")
+def test_a_worker_without_a_compiler_is_another_program(tmp_path: Path) -> None:
+    with cluster(environment={"PATH": str(tmp_path)}) as (address, _, _), pytest.raises(CampaignError) as refused:
+        DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+    assert "it has another program: generated code is XLA, expected C by CasADi" in str(refused.value)
 
 
 def test_nobody_at_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
