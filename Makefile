@@ -19,7 +19,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help:
 	@echo "make demo   identify the CoaX from one flight, predict another, write demo/report.html"
 	@echo "make test   ruff, pyrefly, import-linter, pytest and the benchmarks in short"
-	@echo "make proof  the statistics with all their seeds and the benchmarks in full, into docs/proof.md (half an hour)"
+	@echo "make proof  the statistics with all their seeds and the benchmarks in full, into docs/proof.md (hours)"
 	@echo "make siege  damaged files, kills, full disks, packets and hostile pages, into docs/proof.md (an hour)"
 	@echo "make site   the documentation as a site, build/site/index.html; offline, warnings are errors"
 	@echo "make clean  remove .venv and everything that was built"
