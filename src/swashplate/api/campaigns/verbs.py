@@ -98,13 +98,7 @@ def resume_campaign(
     store.plan()
     with store.held():
         made = planned_in(store)
-        changed = differences(made.tasks[0].program if made.tasks else {}, program())
-        if changed:
-            raise CampaignError(
-                f"was begun with another program: {'; '.join(changed)}.",
-                where=store.folder,
-                hint="Install that one again, or `swash campaign run FILE --accept-changes`, which does all anew.",
-            )
+        _check_same_program(made, store)
         if retry_failed:
             for name in store.failed():
                 (store.folder / FAILED / f"{name}.json").unlink(missing_ok=True)
@@ -122,9 +116,12 @@ def replay_campaign(folder: str | Path, number: int) -> Any:
         number: of the row, as the report has it.
 
     Raises:
-        CampaignError: a number that the campaign does not have; a task that cannot be done.
+        CampaignError: a number that the campaign does not have; another program than it was begun with, which may give
+            another row; a task that cannot be done.
     """
-    made = planned_in(CampaignStore(folder))
+    store = CampaignStore(folder)
+    made = planned_in(store)
+    _check_same_program(made, store)
     task = next((t for t in made.tasks if 0 <= number - t.portion.first < t.portion.count), None)
     if task is None:
         raise CampaignError(f"has no {made.kind.rows} {number}; it has {made.rows}.", where=folder)
@@ -137,6 +134,21 @@ def replay_campaign(folder: str | Path, number: int) -> Any:
     if outcome.columns is None:
         raise CampaignError(f"cannot be done again: {outcome.error}", where=f"{made.kind.rows} {number}")
     return outcome.columns
+
+
+def _check_same_program(made: CampaignPlan, store: CampaignStore) -> None:
+    """That this process computes what a campaign's tasks were computed with.
+
+    Raises:
+        CampaignError: with what differs.
+    """
+    changed = differences(made.tasks[0].program if made.tasks else {}, program())
+    if changed:
+        raise CampaignError(
+            f"was begun with another program: {'; '.join(changed)}.",
+            where=store.folder,
+            hint="Install that one again, or `swash campaign run FILE --accept-changes`, which does all anew.",
+        )
 
 
 def _chosen(engine: EngineName | None, scheduler: str | None, workers: int | None) -> Callable[[Work, int], TaskEngine]:

@@ -107,6 +107,8 @@ def test_stopped_and_gone_on_with_it_is_as_in_one_go(
     monkeypatch.setattr(verbs, "program", lambda: {"jax": "9.9"})
     with pytest.raises(CampaignError, match=r"was begun with another program: .*jax is 9\.9"):
         sp.resume_campaign(tmp_path / "parts")
+    with pytest.raises(CampaignError, match=r"was begun with another program: .*jax is 9\.9"):
+        sp.replay_campaign(tmp_path / "whole", 1)
 
 
 def test_a_changed_file_is_refused_with_what_changed(
