@@ -1,6 +1,6 @@
 """Runs every proof and writes docs/proof.md from what came out: `make proof`.
 
-Two thirds of the tests took 54 minutes on two slow cores.
+Three fifths of its tests took 54 minutes on two slow cores.
 
     python scripts/proof.py [--assemble-only | --put FILE ...]
 
