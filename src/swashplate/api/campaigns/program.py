@@ -13,8 +13,8 @@ from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
 
-from swashplate.compiled import can_compile
-from swashplate.errors import CampaignError
+from swashplate.compiled import NATIVE, can_compile, loaded
+from swashplate.errors import CampaignError, SwashError
 from swashplate.extras import version_of
 from swashplate.threads import ONE_THREAD
 
@@ -40,8 +40,8 @@ def worker_environment() -> dict[str, str]:
 
 
 def program() -> dict[str, str]:
-    """What a result depends on beside its task, by name: versions, our own source, XLA's flags, whether flights and
-    filters are C or XLA's (they differ in the last bits)."""
+    """What a result depends on beside its task, by name: versions, our own source, XLA's flags, and whether the filters
+    of fits are C or XLA's."""
     versions = dict(_versions())
     flags = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in (_OURS, _ONE_THREAD)]
     return versions | {"XLA flags": " ".join(flags)}
@@ -52,13 +52,24 @@ def _versions() -> tuple[tuple[str, str], ...]:
     versions = {"python": ".".join(platform.python_version_tuple()[:2])} | {
         name: version_of(name) for name in _LIBRARIES
     }
-    versions["generated code"] = f"C by CasADi {version_of('casadi')}" if can_compile() else "XLA"
+    versions["generated code"] = f"C by CasADi {version_of('casadi')}" if _c_runs() else "XLA"
     every = metadata.entry_points()
     for group in (name for name in every.groups if name.startswith("swashplate.")):
         for point in every.select(group=group):  # packages that bring models, estimators or kinds of their own
             if point.dist is not None:
                 versions[point.dist.name] = point.dist.version
     return tuple({**versions, "source": _source()}.items())
+
+
+def _c_runs() -> bool:
+    """Whether the filters of fits can be C here: with CasADi, and a compiler that has its headers."""
+    if not can_compile():
+        return False
+    try:
+        loaded("#include <math.h>\ndouble swash_root(double x) { return sqrt(x); }\n", options=(NATIVE,))
+    except (SwashError, OSError):
+        return False
+    return True
 
 
 def _source() -> str:

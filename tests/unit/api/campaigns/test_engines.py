@@ -283,7 +283,11 @@ def test_a_worker_of_another_program_is_refused() -> None:
 
 
 @pytest.mark.skipif(not can_compile(), reason="no C compiler here, or no CasADi")
-def test_a_worker_without_a_compiler_is_another_program(tmp_path: Path) -> None:
+@pytest.mark.parametrize("there", [False, True])
+def test_a_worker_without_a_compiler_that_compiles_is_another_program(there: bool, tmp_path: Path) -> None:
+    if there:  # one without headers
+        (tmp_path / "cc").write_text("#!/bin/sh\necho 'fatal error: math.h: No such file or directory' >&2; exit 1\n")
+        (tmp_path / "cc").chmod(0o755)
     with cluster(environment={"PATH": str(tmp_path)}) as (address, _, _), pytest.raises(CampaignError) as refused:
         DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
     assert "it has another program: generated code is XLA, expected C by CasADi" in str(refused.value)
