@@ -72,7 +72,7 @@ def measure(*, short: bool) -> list[Punctual]:
     """Both kinds of page for 60 s; the first alone for 2 s in the short form and without Chromium."""
     seconds = 2.0 if short else 60.0
     readings = [_reading(seconds)]
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-headless-shell", "chromium-browser"))), None)
     if chromium is not None and not short:
         readings.append(_drawn(seconds, chromium))
     return readings

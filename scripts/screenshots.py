@@ -95,7 +95,10 @@ def journeys() -> None:
 def main(wanted: list[str]) -> None:
     if not wanted or "journeys" in wanted:
         journeys()
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    chromium = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome"))),
+        None,
+    )
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=list(CHROMIUM))
         for name, vehicle in (("live-coax", "coax"),):
