@@ -8,7 +8,7 @@ STAMP := .venv/.complete
 WORKERS ?= 3
 # Little compiling, and threads that do not fight for cores; compiled programs are shared.
 QUICK := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
-	XLA_FLAGS="$$XLA_FLAGS --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1" \
+	XLA_FLAGS="$$XLA_FLAGS --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1 --xla_backend_optimization_level=1" \
 	JAX_COMPILATION_CACHE_DIR="$(CURDIR)/build/jax" JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3
 # Three test processes and many started programs would each compile every module anew.
 unexport PYTHONDONTWRITEBYTECODE

@@ -72,6 +72,8 @@ def as_section(former: dict[str, float], this: list[dict[str, float]], revision:
         f"({os.cpu_count()} cores). Left of the clock's time is {share:.2f}, asked {ASKED:.2f} (6 of the 11 minutes "
         "that the former took on its day); so a slow machine slows both. Processor time is without browsers."
     )
+    if failed := int(former["failed"] + former["error"]):
+        text += f" {failed} tests of the former fail here, and its benchmarks, which come after them, did not run."
     columns = ["code", "clock [s]", "processor [s]", "tests passed", "failed"]
     title = "The whole of `make test` beside that of the code before it was made faster"
     return {"title": title, "text": text, "columns": columns, "rows": rows, "passed": whole and share <= ASKED}

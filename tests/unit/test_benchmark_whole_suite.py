@@ -22,6 +22,12 @@ def test_a_failed_test_is_not_fast() -> None:
     assert not as_section(_run(1102.0), [_run(300.0), _run(300.0, failed=1.0)], "abc")["passed"]
 
 
+def test_what_the_former_left_out_is_said() -> None:
+    this = [_run(590.0), _run(610.0)]
+    assert "did not run" not in as_section(_run(1102.0), this, "abc")["text"]
+    assert "3 tests of the former fail here, and its benchmarks" in as_section(_run(1102.0, 3.0), this, "abc")["text"]
+
+
 def test_the_last_line_of_pytest_is_read() -> None:
     output = "x passed\n= 3 failed, 5041 passed, 8 skipped, 1 error in 603.1s (0:10:03) =\nsteps 1.2 in 3 s\n"
     assert said(output) == {"passed": 5041, "failed": 3, "error": 1}
