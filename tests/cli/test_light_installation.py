@@ -135,7 +135,7 @@ def test_a_log_with_attitude_is_inspected_without_what_is_slow_to_import(tmp_pat
         "print([CliRunner().invoke(app, ['inspect', name]).exit_code for name in sys.argv[1:]])\n"
         "slow = ('scipy', 'dask.base', 'h5py', 'jax', 'matplotlib', 'plotly')\n"
         "print([name for name in slow if name in sys.modules])\n"
-        "import swashplate.flights.spectrum, dask.base\n"
+        "import scipy.signal, dask.base\n"
         "print([name for name in ('scipy', 'dask.base') if name in sys.modules])"
     )
     words = [

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -200,9 +199,11 @@ def spectrum(flight: Flight, channel: str, *, start: float | None = None, stop: 
     Raises:
         FlightError: no such channel, or too few samples.
     """
+    from scipy.signal import welch  # half a second to import, and reports import this module
+
     grid, values, rate = _piece(flight, channel, start, stop)
     size = min(values.size, max(_SHORTEST, 2 * values.size // (WINDOWS + 1))) // 2 * 2
-    frequency, density = signal.welch(values, fs=rate, nperseg=size, detrend="constant")
+    frequency, density = welch(values, fs=rate, nperseg=size, detrend="constant")
     count = 1 + (values.size - size) // (size - size // 2)
     unit = _unit(flight, channel)
     return Spectrum(
@@ -222,6 +223,8 @@ def spectrogram(
     Raises:
         FlightError: no such channel, or too few samples.
     """
+    from scipy import signal  # see `spectrum`
+
     grid, values, rate = _piece(flight, channel, start, stop)
     size = int(np.clip(values.size // 40, _SHORTEST, 1024))
     step = max(1, values.size // frames)
