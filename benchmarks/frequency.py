@@ -111,7 +111,7 @@ def x8(*, repeats: int) -> list[Span]:
     fitting = _best(fitted, repeats)
     names = "responses of the X8's roll sweep, 106 s", "transfer function of the X8, two zeros over four poles"
     if find_spec("AircraftIden") is None:
-        missing = "AircraftIden is not installed: not compared this time"
+        missing = "AircraftIden is not installed: not compared"
         return [
             Span(names[0], seconds, X8_WITHIN, missing),
             Span(names[1], fitting, X8_WITHIN, f"J {cost:.1f}; {missing}"),
