@@ -88,6 +88,9 @@ def main() -> None:
     parser.add_argument("revision", help="of git, with a `make test` of its own")
     parser.add_argument("--out", type=Path, help="the section for docs/proof.md, as JSON")
     options = parser.parse_args()
+    known = ["git", "rev-parse", "--quiet", "--verify", f"{options.revision}^{{commit}}"]
+    if subprocess.run(known, cwd=ROOT, capture_output=True, check=False).returncode:
+        parser.error(f"git knows no revision {options.revision}")  # not after the first run
     before, former, after = suite("HEAD"), suite(options.revision), suite("HEAD")
     text = json.dumps(as_section(former, [before, after], options.revision), indent=2)
     print(text)
