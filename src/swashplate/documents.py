@@ -34,7 +34,7 @@ DEEPEST = 24
 _NAMES = {"toml": "TOML", "json": "JSON"}
 _TOKEN = re.compile(
     r'''(?P<quote>"""|\'\'\'|"|')
-    |(?P<key>[A-Za-z0-9_+:-]+|[ \t]+)
+    |(?P<key>[A-Za-z0-9_+: \t-]+)
     |(?P<comment>\#[^\n]*)
     |(?P<dot>\.)
     |(?P<open>[\[{])

@@ -7,6 +7,7 @@ marker says the same a second time.
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -41,8 +42,8 @@ INPUT_COLORS = (ORANGE, PURPLE, SKY, GREEN)
 
 def numbers(values: Any) -> list[float | None]:
     """A row of numbers as short JSON: six significant digits, gaps as null."""
-    row = np.asarray(values, dtype=np.float64).ravel()
-    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in row]
+    row = np.asarray(values, dtype=np.float64).ravel().tolist()
+    return [float(f"{value:.6g}") if math.isfinite(value) else None for value in row]
 
 
 _SMALL = 200

@@ -44,6 +44,10 @@ _ROUNDING = 1e-13
 
 _TOLERANCE = 1e-10
 """m/s^2 and rad/s^2 (and inner rates): far below any sensor, far above rounding."""
+_AT_REST = 1e-3 * _TOLERANCE
+"""Where the search ends, if rounding lets it."""
+_NEAR_REST = 1e4 * _TOLERANCE
+"""Inner rates from where all unknowns are searched for together."""
 
 
 @dataclass(frozen=True)
@@ -168,8 +172,14 @@ def trim(
             hint=f"Give the battery's voltage; the card's is {nominal:g} V.",
         )
 
+    last, answer = np.empty(0), (np.empty(0), np.empty(0))
+
     def residual(z: Array, *, share: float = 1.0) -> tuple[Array, Array]:
-        return unrest_at(equations, z, course * np.where(_MOVING, share, 1.0), row, p)
+        nonlocal last, answer
+        now = np.array([*z, share])
+        if not np.array_equal(now, last):  # one search begins where another has ended
+            answer, last = unrest_at(equations, z, course * np.where(_MOVING, share, 1.0), row, p), now
+        return answer
 
     z = _first_guess(vehicle, residual) if near is None else _unknowns(vehicle, near)
     z, value = _newton(z, residual)
@@ -228,6 +238,8 @@ def _first_guess(vehicle: Vehicle, residual: Residual) -> Array:
     z = np.array([0.0, 0.0, *middle, *inside])
     for _ in range(5):
         value, slope = residual(z)
+        if np.max(np.abs(value[6:]), initial=0.0) < _NEAR_REST:
+            break
         z[z.size - inner :] -= np.linalg.lstsq(slope[6:, z.size - inner :], value[6:], rcond=None)[0]
     return z
 
@@ -244,7 +256,7 @@ def _newton(z: Array, residual: Residual) -> tuple[Array, Array]:
     """Newton's method; a step is halved until the residual shrinks."""
     value, slope = residual(z)
     for _ in range(_STEPS):
-        if not np.all(np.isfinite(slope)) or np.max(np.abs(value)) < 1e-3 * _TOLERANCE:
+        if not np.all(np.isfinite(slope)) or np.max(np.abs(value)) < _AT_REST:
             break
         step = -np.linalg.lstsq(slope, value, rcond=None)[0]
         for fraction in 0.5 ** np.arange(12):

@@ -14,6 +14,7 @@ import swashplate as sp
 from swashplate.physics.backend import JaxBackend
 from swashplate.simulation import dynamics
 from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
+from swashplate.simulation.steady import unrest_at
 
 RULES: dict[str, Callable[[Any, Any, Any], Any]] = {
     "sums": lambda a, b, xp: 2.0 + a - b - 1.0 + (3.0 - a) + (-b) + (+a),
@@ -74,3 +75,15 @@ def test_equality_and_truth_are_those_of_the_value() -> None:
     )
     assert value.tolist() == [1.0, 0.0]
     assert slopes.tolist() == [[0.0, 1.0], [1.0, 0.0]]
+
+
+def test_a_trim_asks_the_equations_once_for_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def counted(equations: Any, z: Any, *rows: Any) -> Any:
+        asked.append(tuple(z))
+        return unrest_at(equations, z, *rows)
+
+    monkeypatch.setattr("swashplate.simulation.trim.unrest_at", counted)
+    sp.trim(sp.vehicle("raptor50"), speed=5.0)
+    assert len(asked) == len(set(asked)) < 8

@@ -254,7 +254,11 @@ def response(z: Complex, A: Array, B: Array, C: Array, D: Array | None) -> Any:
     """C (z - A)^-1 B + D over the frequencies, by the Schur form: one decomposition for all of them."""
     T, U = scipy.linalg.schur(A, output="complex")
     right, left = U.conj().T @ B, C @ U
-    values = np.array(
-        [left @ scipy.linalg.solve_triangular(value * np.eye(len(T)) - T, right, check_finite=False) for value in z]
-    )
+    poles, along, rest = np.diag(T).copy(), np.diag_indices_from(T), np.asfortranarray(-T)
+    if np.isin(z, poles).any():
+        raise np.linalg.LinAlgError("a frequency is a pole of the system.")
+    values = np.empty((len(z), len(C), B.shape[1]), dtype=np.complex128)
+    for value, one in zip(z, values, strict=True):
+        rest[along] = value - poles
+        one[:] = left @ scipy.linalg.blas.ztrsm(1.0, rest, right)  # `solve_triangular` takes twice as long around it
     return values if D is None else values + D

@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import CardError
@@ -322,23 +323,21 @@ class StateSpaceModel:
         c = m["H0"] + s * m["H1"]
         x, left = t @ m["G"], c @ t
         h = c @ x + m["D"]
-        slopes_of = self._element_slopes(free, stepped)
+        moving = self._element_slopes(free, stepped)
         answers, slopes, done = [], [], 0
         for o, i, omega in pairs:
             at = where[done : done + omega.size]
             done += omega.size
             xi, lo, hi = x[at, :, i], left[at, o, :], h[at, o, i]
             jw: Complex = np.asarray(1j * omega, dtype=np.complex128)
-            moved = [(change, slope) for e, slope in slopes_of if (change := _change(e, o, i, xi, lo, jw)) is not None]
             total = np.zeros((omega.size, len(free)), dtype=np.complex128)
-            if moved:
-                total += np.column_stack([change for change, _ in moved]) @ np.array([slope for _, slope in moved])
+            for matrix, entries in moving.items():
+                total += _changes(matrix, entries, o, i, xi, lo, jw)
             expression = self.delays.get(f"{self.outputs[o]}/{self.inputs[i]}", self.delays.get(self.inputs[i]))
             if expression is not None:
                 lag = np.exp(-jw * float(expression(values)))
                 hi, total = hi * lag, total * lag[:, None]
-                for k, name in enumerate(free):
-                    total[:, k] -= jw * hi * (np.imag(expression(stepped[name])) / _STEP)
+                total -= np.outer(jw * hi, self._slopes(expression, free, stepped))
             answers.append(hi)
             slopes.append(total)
         return answers, slopes
@@ -355,17 +354,20 @@ class StateSpaceModel:
         with np.errstate(divide="ignore", invalid="ignore"):
             return h, slopes / h[:, None]
 
+    def _slopes(self, expression: Expression, free: tuple[str, ...], stepped: Mapping[str, Any]) -> list[float]:
+        """An expression's derivatives by the free parameters, of the numbers with each stepped aside."""
+        behind = frozenset().union(*(self._uses[used] for used in expression.names))
+        return [float(np.imag(expression(stepped[name]))) / _STEP if name in behind else 0.0 for name in free]
+
     def _element_slopes(
         self, free: tuple[str, ...], stepped: Mapping[str, Mapping[str, Any]]
-    ) -> list[tuple[Element, Array]]:
-        """The entries that move, each with its derivative by every free parameter."""
-        slopes = []
+    ) -> dict[str, tuple[NDArray[Any], ...]]:
+        """By matrix rows and columns (e,) of the entries that move, and their slopes (e, free)."""
+        moving: dict[str, list[tuple[int, int, list[float]]]] = {}
         for e in self.elements:
-            behind = frozenset().union(*(self._uses[used] for used in e.expression.names))
-            if behind & set(free):
-                row = [np.imag(e.expression(stepped[n])) / _STEP if n in behind else 0.0 for n in free]
-                slopes.append((e, np.array(row)))
-        return slopes
+            if any(row := self._slopes(e.expression, free, stepped)):
+                moving.setdefault(e.matrix, []).append((e.row, e.column, row))
+        return {matrix: tuple(map(np.array, zip(*entries, strict=True))) for matrix, entries in moving.items()}
 
     def __repr__(self) -> str:
         head = f"{self.name}: {len(self.states)} states, inputs {', '.join(self.inputs)}"
@@ -379,18 +381,18 @@ class StateSpaceModel:
         return "\n".join(lines)
 
 
-def _change(e: Element, o: int, i: int, x: Array | Complex, left: Complex, jw: Complex) -> Array | Complex | None:
-    """What one entry's unit change does to one response, None where nothing."""
-    if e.matrix == "F":
-        return left[:, e.row] * x[:, e.column]
-    if e.matrix == "M":
-        return -jw * left[:, e.row] * x[:, e.column]
-    if e.matrix == "G":
-        return left[:, e.row] if e.column == i else None
-    if e.row != o:
-        return None
-    if e.matrix == "H0":
-        return x[:, e.column]
-    if e.matrix == "H1":
-        return jw * x[:, e.column]
-    return np.ones_like(jw) if e.column == i else None
+def _changes(
+    matrix: str, entries: tuple[NDArray[Any], ...], o: int, i: int, x: Array | Complex, left: Complex, jw: Complex
+) -> Array | Complex:
+    """What the entries of one matrix do to one response (n,) for a unit of each free parameter, (n, free)."""
+    rows, columns, slopes = entries
+    if matrix in "FM":
+        moved = (left[:, rows] * x[:, columns]) @ slopes
+        return moved if matrix == "F" else -jw[:, None] * moved
+    here = columns == i if matrix == "G" else rows == o
+    if matrix == "G":
+        return left[:, rows[here]] @ slopes[here]
+    if matrix == "D":
+        return np.sum(slopes[here & (columns == i)], axis=0)
+    seen = x[:, columns[here]] @ slopes[here]
+    return seen if matrix == "H0" else jw[:, None] * seen

@@ -17,7 +17,7 @@ from swashplate.control.lqg.design import design
 from swashplate.control.lqg.file import lqg_document, lqg_from
 from swashplate.control.lqg.observability import in_words, observability
 from swashplate.control.lqg.optimal import regulator, steady_filter, unreached, unseen
-from swashplate.control.lqg.steady_loop import Watched, crossovers
+from swashplate.control.lqg.steady_loop import Watched, crossovers, response
 from swashplate.control.lqg.weights import DISC, total_delays
 from swashplate.errors import ControllerError
 from swashplate.filtering.sensor_suite import suite
@@ -46,6 +46,16 @@ def test_a_scalar_regulator_and_filter_have_their_closed_forms() -> None:
     L, found = steady_filter(a * one, one, q * one, r * one, ["x"], scale=np.array([3.0]), where="toy")
     assert found[0, 0] == pytest.approx(P, rel=1e-9)
     assert L[0, 0] == pytest.approx(P / (P + r), rel=1e-9)
+
+
+def test_a_response_is_that_of_its_matrices_and_none_at_a_pole() -> None:
+    rng = np.random.default_rng(3)
+    A, B, C, D = (rng.standard_normal(shape) for shape in ((6, 6), (6, 2), (3, 6), (3, 2)))
+    z = np.exp(1j * np.array([0.1, 1.0, 3.0]))
+    expected = [C @ np.linalg.solve(value * np.eye(6) - A, B) + D for value in z]
+    np.testing.assert_allclose(response(z, A, B, C, D), expected, rtol=1e-12)
+    with pytest.raises(np.linalg.LinAlgError, match="pole"):
+        response(np.array([1.0 + 0j]), np.diag([1.0, 0.5]), np.eye(2), np.eye(2), None)
 
 
 def test_late_inputs_are_states() -> None:
