@@ -17,7 +17,7 @@ EXTRA_OF: Mapping[str, str] = {
     "equinox": "model",
     "control": "model",
     "matplotlib": "plot",
-    "casadi": "export",
+    "casadi": "model",
     "blackjax": "posterior",
     "pymavlink": "link",
     "imageio_ffmpeg": "live",

@@ -16,7 +16,7 @@ from swashplate.control.controller_file import save_controller
 from swashplate.export import fmu
 from swashplate.models.linear.state_space_file import structure, to_toml
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 
 
 @pytest.mark.parametrize(
@@ -88,9 +88,7 @@ def test_without_a_compiler_the_fmu_has_its_sources_and_says_so(
 
 def test_without_casadi_it_says_which_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "casadi", None)
-    assert "pip install 'swashplate[export]'" in one_message(
-        swash("export", "coax", "--format", "c", "--out", tmp_path)
-    )
+    assert "pip install 'swashplate[model]'" in one_message(swash("export", "coax", "--format", "c", "--out", tmp_path))
     assert swash("export", "coax", "--format", "control", "--out", tmp_path).code == 0
 
 

@@ -157,7 +157,7 @@ int watch(long n, const double *inputs, const double *readings, double model, do
 @pytest.fixture(scope="module")
 def watched(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     """The C that flies on board, with a loop that counts alarms (a new one ten seconds after the last at soonest)."""
-    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
     from swashplate.export.slow_parameters_c import slow_parameters_code
 
     folder = tmp_path_factory.mktemp("alarms")

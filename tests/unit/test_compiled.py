@@ -10,7 +10,7 @@ import pytest
 from swashplate import compiled
 from swashplate.compiler import compiler
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 

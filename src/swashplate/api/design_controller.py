@@ -56,7 +56,7 @@ class ControllerDesign(Shown):
         return Path(path)
 
     def code(self, *, precision: Precision = "double") -> ControllerCode:
-        """One step as C99; needs the extra `export`."""
+        """One step as C99; needs the extra `model`."""
         return controller_code(self.controller, precision=precision)
 
     def to_document(self) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class Mixing(StrEnum):
 Out = Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the controller (.toml).")]
 Rate = Annotated[float, typer.Option("--rate", help="Steps of the controller per second [Hz].", min=1.0)]
 Code = Annotated[
-    Path | None, typer.Option("--c", metavar="FILE", help="Write one step of it as C99 (needs the extra 'export').")
+    Path | None, typer.Option("--c", metavar="FILE", help="Write one step of it as C99 (needs the extra 'model').")
 ]
 CPrecision = Annotated[Precision, typer.Option("--precision", help="Number type of the C code.")]
 

@@ -72,7 +72,7 @@ def export(
 ) -> None:
     """Write a model, published or identified, in the format of another program, with the equations that fly here.
 
-    A controller's file (`swash decouple --out`) is written as C. Formats c, fmu and simulink need the extra 'export';
+    A controller's file (`swash decouple --out`) is written as C. Formats c, fmu and simulink need the extra 'model';
     only fmu needs a C compiler, and does without where there is none. Format mcap takes a flight, or a report.html
     for its fits and predictions over time, and needs the extra 'mcap'. Examples:
 

@@ -1,7 +1,7 @@
 """A controller as C: the very step that Python runs, traced by CasADi into one file without allocation.
 
 CasADi (Andersson, Gillis, Horn, Rawlings and Diehl 2019) traces the scalar step and prints it; of the C library only
-sin, cos, sqrt and atan2 are called. Needs the extra `export`.
+sin, cos, sqrt and atan2 are called. Needs the extra `model`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A filter of slow parameters as C99: the very filter that Python runs, without allocation.
 
-Needs the extra `export`. CasADi traces how the mean moves, the slopes of it and what sensors show. What becomes of the
+Needs the extra `model`. CasADi traces how the mean moves, the slopes of it and what sensors show. What becomes of the
 covariance is written in loops here: over the slopes that are not zero, one half of what is symmetric, reading after
 reading (the same numbers, since the readings' noises do not depend on each other: Bar-Shalom, Li and Kirubarajan 2001,
 sec. 7.4). `SlowCode` says what a step costs.

@@ -86,7 +86,7 @@ class JaxBackend(ArrayBackend):
 
 
 class CasadiBackend:
-    """CasADi expressions: export to C and FMU (needs the extra `export`)."""
+    """CasADi expressions: export to C and FMU (needs the extra `model`)."""
 
     def __init__(self) -> None:
         import casadi

@@ -22,7 +22,7 @@ from swashplate.simulation.dynamics import equations_of, parameter_row, unpack_r
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import trim
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 DT = 0.005

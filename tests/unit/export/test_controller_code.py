@@ -21,7 +21,7 @@ from swashplate.physics.rigid_body import RigidBody
 
 Step = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 COMPILER = shutil.which("cc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 

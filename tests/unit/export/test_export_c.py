@@ -28,7 +28,7 @@ from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 VEHICLES = [

@@ -27,7 +27,7 @@ from swashplate.flights.base_units import base_units, gain_unit, is_unit
 from swashplate.models.linear.state_space_file import structure
 from swashplate.models.vehicle import Vehicle
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 fmpy = pytest.importorskip("fmpy")
 needs_binary = pytest.mark.skipif(compiler() is None or fmu_platform() is None, reason="no C compiler for FMI")
 

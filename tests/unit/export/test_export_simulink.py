@@ -14,7 +14,7 @@ from swashplate.export.formats import Export, export_model
 from swashplate.models.linear.state_space_file import structure
 from swashplate.physics.backend import FloatBackend
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 STUBS = Path(__file__).resolve().parents[2] / "stubs"

@@ -14,7 +14,7 @@ from counted import COUNTING
 from swashplate.filtering.sensor_suite import suite
 from swashplate.identification.recursive.slow_parameters import SlowPlan, slow_plan
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 from swashplate.export.slow_parameters_c import slow_parameters_code
 
 BUDGET = 64 * 1024

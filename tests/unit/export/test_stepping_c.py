@@ -17,7 +17,7 @@ from swashplate.physics.environment import Environment
 from swashplate.simulation.standing import at_rest, standing
 from swashplate.simulation.stepping import Stepping
 
-pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 

@@ -200,7 +200,7 @@ def test_the_c_step_is_the_python_step(which: str, precision: str, tolerance: fl
 
     In single precision the first reading, which shrinks a variance a thousand times, costs most: 1.7e-4.
     """
-    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
     from swashplate.export.controller_c import controller_code
 
     controller, step = in_python(which)

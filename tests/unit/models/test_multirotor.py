@@ -292,7 +292,7 @@ def test_rotors_that_cannot_turn_the_body_are_refused() -> None:
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("kind", ["measured", "both"])
 def test_exported_c_has_the_same_rates(kind: str, tmp_path: Path) -> None:
-    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
     vehicle = sp.vehicle("crazyflie")
     if kind == "both":
         vehicle = _with({**RESISTANCE, **WARMING}, battery="resistance", motors="warming")

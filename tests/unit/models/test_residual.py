@@ -109,7 +109,7 @@ def test_one_of_errors_ahead_serves_for_predictions_only() -> None:
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_exported_c_carries_it(tmp_path: Path) -> None:
-    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
     made, trim = wider(p_p=-3.0, q_motor_1=20.0, v_phi=0.3), sp.trim(sp.vehicle("crazyflie"))
     model = trace_vehicle(made, trim, name="residual")
     run = compiled(model_code(model), tmp_path)

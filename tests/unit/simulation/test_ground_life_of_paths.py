@@ -96,7 +96,7 @@ def traced(made: Vehicle) -> Traced:
 
 def exported_c(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
     """Steps of 0.5 ms, as `stepping_c` takes them."""
-    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
     if compiler() is None:
         pytest.skip("no C compiler")
     model = traced(made)
@@ -108,7 +108,7 @@ def exported_c(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
 
 def fmu(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
     """As a simulator steps it, with the unit's own inner step."""
-    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
     fmpy = pytest.importorskip("fmpy")
     from swashplate.export.fmu import fmu as unit
     from swashplate.export.fmu import fmu_platform

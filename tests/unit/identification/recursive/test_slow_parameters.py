@@ -110,7 +110,7 @@ def test_gaps_clocks_and_inputs_that_are_none_freeze_them() -> None:
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_their_c_is_their_python(tmp_path: Path) -> None:
-    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
     from swashplate.export.slow_parameters_c import slow_parameters_code
 
     plan = slow_plan(sp.vehicle("coax"), ("mass",), sensors=SENSORS, rate=100.0, wander=0.02)

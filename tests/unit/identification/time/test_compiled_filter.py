@@ -28,7 +28,7 @@ from swashplate.physics.backend import FloatBackend
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.runge_kutta import rk4_step
 
-pytestmark = pytest.mark.skipif(not can_compile(), reason="there is no C compiler, or the extra 'export' is missing")
+pytestmark = pytest.mark.skipif(not can_compile(), reason="there is no C compiler, or the extra 'model' is missing")
 
 _FREE = {
     "coax": ["linkage_lower", "tau_f_upper", "inertia_zz"],

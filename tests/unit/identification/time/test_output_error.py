@@ -19,7 +19,7 @@ from swashplate.identification.time.output_error import OutputError
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.dynamics import enable_double_precision
 
-needs_c = pytest.mark.skipif(not can_compile(), reason="there is no C compiler, or the extra 'export' is missing")
+needs_c = pytest.mark.skipif(not can_compile(), reason="there is no C compiler, or the extra 'model' is missing")
 
 _FREE = {"coax": ["linkage_lower", "tau_f_upper", "inertia_zz"], "xcell60": ["mass", "bar_gain"], "x8": ["mass"]}
 
