@@ -1,7 +1,7 @@
 """How long an identification takes: 15 parameters from 40 s of flight at 100 Hz, warm, cold, and by the paper's way.
 
 python -m benchmarks.identifying METHOD    one identification in this process; prints its seconds as JSON
-python -m benchmarks.identifying RIVAL     simplex or scipy: its row as JSON
+python -m benchmarks.identifying RIVAL     scipy: its row as JSON
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import sys
 import tempfile
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,6 @@ from benchmarks.timing import Span
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.core.scoring import minimise
-from swashplate.identification.time.nelder_mead import minimise_squares
 from swashplate.identification.time.output_error import OutputError
 
 WARM = {"output-error": 5.0, "prediction-error": 12.0}
@@ -176,63 +174,7 @@ def scipy_least_squares(logged: sp.Flight) -> Span:
     return Span("output error beside SciPy's least squares", ours, WARM["output-error"], note)
 
 
-@dataclass
-class _ParametersOnly:
-    """A likelihood in which only the parameters move: what Nelder and Mead's simplex can still handle."""
-
-    whole: OutputError
-
-    def __post_init__(self) -> None:
-        self.places = self.whole.row.places("parameter")
-        self.row = type(self.whole.row)(tuple(self.whole.row.entries[i] for i in self.places))
-
-    def _full(self, row: np.ndarray) -> np.ndarray:
-        full = self.whole.row.starts()
-        full[self.places] = row
-        return full
-
-    def cost(self, row: np.ndarray) -> float:
-        return self.whole.cost(self._full(row))
-
-    def refresh(self, row: np.ndarray) -> None:
-        """The weights stay those of the start, as the simplex has them."""
-
-    def scores(self, row: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        cost, gradient, information = self.whole.scores(self._full(row))
-        return cost, gradient[self.places], information[np.ix_(self.places, self.places)]
-
-
-def nelder_mead(logged: sp.Flight) -> Span:
-    """Nelder and Mead's simplex against output error: same simulator, same entries, down to the same cost.
-
-    The simplex is stopped when it has had `RATIO` times as long, or has come as far down.
-    """
-    likelihood = OutputError(parameterize(_start(), "full"), records(logged, sp.vehicle("coax")))
-    likelihood.refresh(likelihood.row.starts())
-    only = _ParametersOnly(likelihood)
-    minimise(only, iterations=2, together=True)
-    begin = time.process_time()
-    best = minimise(only, together=True)
-    ours = time.process_time() - begin
-    lowest = [np.inf]
-
-    def told(_: int, cost: float) -> None:
-        lowest[0] = cost
-        if cost <= best.cost + 1.0 or time.process_time() - begin > RATIO * ours:
-            raise StopIteration
-
-    begin = time.process_time()
-    minimise_squares(likelihood, progress=told)
-    theirs = time.process_time() - begin
-    above = lowest[0] - best.cost
-    told_of = f"and was still {above:,.0f} above in log-likelihood" if above > 1.0 else "to the same cost"
-    note = f"processor time; output error took {ours:.2f} s, the simplex {theirs:.1f} s {told_of}"
-    kept = above > 1.0 or theirs >= RATIO * ours
-    target = theirs / RATIO if above <= 1.0 else WARM["output-error"]  # one that ends above gets there at no time
-    return Span(f"output error to where the simplex is after {RATIO:g} times as long", ours, target, note, kept)
-
-
-RIVALS = {"simplex": nelder_mead, "scipy": scipy_least_squares}
+RIVALS = {"scipy": scipy_least_squares}
 """Each against output error: `python -m benchmarks.identifying NAME`."""
 
 

@@ -88,7 +88,6 @@ if TYPE_CHECKING:
     from swashplate.identification.responses.frequency_response import FrequencyResponse
     from swashplate.identification.responses.respond import respond
     from swashplate.identification.time.equation_error import equation_error, stepwise
-    from swashplate.identification.time.linear_frequency_fit import fit_in_frequency
     from swashplate.identification.time.linear_time_fit import fit_in_time
     from swashplate.identification.time.vehicle_time_fit import fit_vehicle
     from swashplate.links.live.film import film_replay
@@ -166,7 +165,6 @@ __all__ = [
     "export_model",
     "fetch_dataset",
     "film_replay",
-    "fit_in_frequency",
     "fit_in_time",
     "fit_ss",
     "fit_state_space",

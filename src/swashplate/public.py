@@ -43,7 +43,6 @@ _LIGHT: Mapping[str, str] = {
     "export_flight": "swashplate.api.export:export_flight",
     "fetch_dataset": "swashplate.flights.datasets:fetch",
     "film_replay": "swashplate.links.live.film:film_replay",
-    "fit_in_frequency": "swashplate.identification.time.linear_frequency_fit:fit_in_frequency",
     "fit_state_space": "swashplate.identification.frequency.state_space_fit:fit_state_space",
     "fit_tf": "swashplate.api.fit_tf:fit_tf",
     "fit_transfer_function": "swashplate.identification.frequency.transfer_function_fit:fit_transfer_function",

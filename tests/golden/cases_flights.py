@@ -11,7 +11,7 @@ import swashplate as sp
 
 from . import extract
 from .case import Values, apart, case
-from .inner import equation_error, fit_in_frequency, fit_in_time
+from .inner import equation_error, fit_in_time
 
 AUGUST, JULY = "coax56/flight_2011-08-01_vertical", "coax56/flight_2011-07-25_hover_crash"
 
@@ -100,11 +100,6 @@ def simulated_prediction_error_with_wind(folder: Path) -> Values:
     return simulated("prediction-error", wind=True)
 
 
-@case()
-def simulated_nelder_mead(folder: Path) -> Values:
-    return simulated("nelder-mead")
-
-
 @case(data=["fvsysid"])
 def hfb320_filter_error(folder: Path) -> Values:
     """A business jet in turbulence, its own equations and sensors, from published start values."""
@@ -162,10 +157,6 @@ def unstable_aircraft(folder: Path) -> Values:
     for method in ("output-error", "filter-error", "prediction-error"):
         one = extract.of_time_fit(fit_in_time(model, flight, shifts=False, method=method))
         found |= {f"{method}.{name}": value for name, value in one.items()}
-    banded = fit_in_frequency(model, flight, band=(0.05, 2.0))
-    for e in banded.estimates:
-        if not e.fixed:
-            found |= apart(f"frequency.{e.name}", (e.value, e.sigma))
     errors = equation_error(az, np.column_stack([w, q, elevator]), ["w", "q", "de"], dt=0.05, band=(0.05, 2.0))
     found |= apart("equation.values", (errors[n] for n in ("w", "q", "de")))
     return found | apart("equation.sigmas", errors.sigmas)

@@ -8,7 +8,6 @@ from swashplate.flights.provenance import Provenance
 from swashplate.identification.frequency.transfer_function_fit import as_state_space
 from swashplate.identification.frequency.transfer_function_forms import suggest
 from swashplate.identification.time.equation_error import equation_error
-from swashplate.identification.time.linear_frequency_fit import fit_in_frequency
 from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.validation.verify import verify_inside
 
@@ -17,7 +16,6 @@ __all__ = [
     "Provenance",
     "as_state_space",
     "equation_error",
-    "fit_in_frequency",
     "fit_in_time",
     "stream",
     "suggest",

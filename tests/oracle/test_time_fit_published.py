@@ -11,7 +11,6 @@ import pytest
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight, stream
 from swashplate.identification.time.equation_error import equation_error
-from swashplate.identification.time.linear_frequency_fit import fit_in_frequency
 from swashplate.identification.time.linear_simulation import delayed
 from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -47,11 +46,6 @@ def test_unstable_aircraft_is_the_truth_within_a_percent(shared_data: Path) -> N
     for name in ("Zw", "Mw", "Mq"):
         assert fit[name].value == pytest.approx(float(table["true"][name]), rel=0.01)
     assert fit.solution.eigenvalues()[-1].real > 0.5  # it is unstable
-    # Over frequencies nothing is integrated: within half a percent of the truth, as the table's estimators are.
-    banded = fit_in_frequency(aircraft.with_values(held, free=False), flight, band=(0.05, 2.0))
-    assert banded.converged
-    for name in ("Zw", "Mw", "Mq"):
-        assert banded[name].value == pytest.approx(float(table["true"][name]), rel=0.005)
 
 
 @pytest.mark.parametrize("method", ["filter-error", pytest.param("prediction-error", marks=pytest.mark.proof)])
@@ -155,5 +149,3 @@ def test_what_the_fit_in_time_cannot_do_is_said() -> None:
     fixed = structure("heave").with_values({"Zw": -1.0, "Zcol": -20.0, "tau_collective": 0.0}, free=False)
     with pytest.raises(IdentificationError, match="no free parameter"):
         fit_in_time(fixed, flight)
-    with pytest.raises(IdentificationError, match="lines between"):
-        fit_in_frequency(structure("heave"), flight, band=(40.0, 41.0))

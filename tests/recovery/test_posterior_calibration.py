@@ -22,8 +22,6 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.physics.environment import Environment
 
 FLIGHTS = int(os.environ.get("SWASHPLATE_SBC_FLIGHTS", "200"))
-BY_VALUES = max(FLIGHTS // 2, 1)
-"""Flights that Metropolis is asked about, which takes ten times as long as NUTS."""
 PRIOR = {"Lb": (60.0, 5.0), "tau": (0.2, 0.02), "A": (0.5, 0.04)}
 NOISE = (0.1, 5.0, 0.25)
 GUSTS = (0.5, 0.02)
@@ -60,8 +58,6 @@ def ranked(seed: int, *, gusts: bool) -> dict[str, Array]:
     method = "filter-error" if gusts else "output-error"
     fit = sp.identify(rolling(), flown, free=list(PRIOR), priors=PRIOR, outputs=OUTPUTS_OF_ROLL, method=method)
     asked: dict[str, dict[str, Any]] = {"laplace": {}, "nuts": {"chains": 2, "warmup": 60, "draws": 2000}}
-    if not gusts and seed < BY_VALUES:
-        asked["metropolis"] = {"draws": 2000}
     found = {}
     for name, how in asked.items():
         drawn = sp.posterior(fit, method=name, seed=seed, **how).posterior

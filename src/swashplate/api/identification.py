@@ -31,7 +31,7 @@ from swashplate.validation.controller_law import check_closed
 from swashplate.validation.validation import Validation
 from swashplate.validation.verb import validate
 
-TRACKED = ("prediction-error", "output-error", "nelder-mead")
+TRACKED = ("prediction-error", "output-error")
 """Methods that are checked for a tracked pose before anything is computed."""
 
 
@@ -120,7 +120,7 @@ def identify_and_validate(
         free, method, outputs, ties, fixed, priors, prior_card: as of `identify`.
         iterations, keep_unexcited, wind, rotor_line, leave_out, horizon, residual: as of `identify`.
         close_loop: as of `validate`.
-        posterior: "laplace", "metropolis" or "nuts" for draws of what the fit does not know (`swashplate.posterior`).
+        posterior: "laplace" or "nuts" for draws of what the fit does not know (`swashplate.posterior`).
             One that did not converge is left out, and `refused` says why.
         names: what the user calls the flights and the hold-outs, for messages.
         say: told what is being done.

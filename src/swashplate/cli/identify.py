@@ -33,8 +33,7 @@ def identify(
         str,
         typer.Option(
             "--method",
-            help="prediction-error, output-error, nelder-mead, collocation (any equations, unstable ones and start "
-            "values of zero too), or another package's.",
+            help="prediction-error, output-error, or another package's.",
         ),
     ] = "prediction-error",
     outputs: Annotated[
@@ -100,7 +99,7 @@ def identify(
             "--posterior",
             metavar="laplace|nuts",
             help="Draw models from the fit's uncertainty, into posterior.nc (for ArviZ) and for Monte Carlo: "
-            "laplace (normal, fast), metropolis (from the likelihood, minutes) or nuts (the same; extra 'posterior').",
+            "laplace (normal, fast) or nuts (from the likelihood, minutes; extra 'posterior').",
         ),
     ] = None,
     rate: options.Rate = 100.0,

@@ -36,7 +36,6 @@ class Question:
         keep_unexcited, wind, rotor_line, leave_out: see `identify`.
         environment: wind, density and gravity.
         shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
-        band: lowest and highest frequency [Hz], for methods that fit lines of a transform.
         horizon: seconds ahead, first and last, of the errors that are made small after maximum likelihood.
         residual: also a linear residual, of what the fit itself made small.
         progress: told the iteration and the cost.
@@ -56,7 +55,6 @@ class Question:
     environment: Environment | None = None
     shifts: bool | None = None
     biases: Sequence[str] = ()
-    band: tuple[float, float] | None = None
     horizon: Sequence[float] | None = None
     residual: bool = False
     progress: Callable[[int, float], None] | None = None
@@ -93,15 +91,12 @@ ESTIMATORS: Registry[Estimator] = Registry(
     own={
         "prediction-error": "swashplate.identification.time.identify:PREDICTION_ERROR",
         "output-error": "swashplate.identification.time.identify:OUTPUT_ERROR",
-        "nelder-mead": "swashplate.identification.time.identify:NELDER_MEAD",
         "filter-error/vehicle": "swashplate.identification.time.vehicle_time_fit:FILTER_ERROR",
         "prediction-error/vehicle": "swashplate.identification.time.vehicle_time_fit:PREDICTION_ERROR",
         "output-error/vehicle": "swashplate.identification.time.vehicle_time_fit:OUTPUT_ERROR",
         "output-error/linear": "swashplate.identification.time.linear_time_fit:OUTPUT_ERROR",
         "filter-error/linear": "swashplate.identification.time.linear_time_fit:FILTER_ERROR",
         "prediction-error/linear": "swashplate.identification.time.linear_time_fit:PREDICTION_ERROR",
-        "collocation": "swashplate.identification.time.collocation:COLLOCATION",
-        "frequency-lines": "swashplate.identification.time.linear_frequency_fit:FREQUENCY_LINES",
         "frequency-responses": "swashplate.identification.frequency.state_space_fit:FREQUENCY_RESPONSES",
     },
 )

@@ -36,7 +36,6 @@ def identify(
     environment: Environment | None = None,
     shifts: bool | None = None,
     biases: Sequence[str] = (),
-    band: tuple[float, float] | None = None,
     horizon: Sequence[float] | None = None,
     residual: bool = False,
     progress: Callable[[int, float], None] | None = None,
@@ -50,10 +49,9 @@ def identify(
         free: "full", "flight" (the paper's six) or names; "full" where nothing is said and the vehicle has that choice.
             A state-space model says itself what is free.
         method: one of `ESTIMATORS`; None takes the first that suits model and data. For helicopters with their pose
-            tracked "prediction-error" (flights in disturbed air or under feedback), "output-error" (undisturbed
-            open-loop flights and simulations) or "nelder-mead" (the paper's own way, for comparison); for any other
-            equations and for state-space models "filter-error", "prediction-error" or "output-error"; for any of them
-            "collocation", which needs no stable model and no good start values.
+            tracked "prediction-error" (flights in disturbed air or under feedback) or "output-error" (undisturbed
+            open-loop flights and simulations); for any other equations and for state-space models "filter-error",
+            "prediction-error" or "output-error".
         ties: "name = expression" each.
         fixed: values of parameters that are not to move.
         priors: mean and standard deviation by name.
@@ -70,7 +68,6 @@ def identify(
         environment: wind, density and gravity, for equations of your own.
         shifts: constants in the states' rates, per record (None: for state-space models alone).
         biases: outputs with a constant of their own, per record.
-        band: lowest and highest frequency [Hz] for the method "frequency-lines".
         horizon: (FIRST, LAST) in seconds: after maximum likelihood, make errors FIRST, 2 FIRST, ... LAST seconds ahead
             small, predicted from the filter's states; for methods with a filter (`core.multi_step`). Bounds are those
             of this criterion, corrected for predictions that overlap.
@@ -110,7 +107,6 @@ def identify(
         environment=environment,
         shifts=shifts,
         biases=tuple(biases),
-        band=band,
         horizon=None if horizon is None else tuple(horizon),
         residual=residual,
         progress=progress,

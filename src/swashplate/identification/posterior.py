@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -12,18 +11,16 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.extras import library
-from swashplate.identification.core import accuracy, metropolis
+from swashplate.identification.core import accuracy
 from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.posterior_draws import LEAST_ESS, SPLIT_RHAT, Posterior
 from swashplate.identification.core.result import Fitted, Result, bounds_of
 from swashplate.identification.core.whitened import Chains, effective, split_rhat
 
-METHODS = ("laplace", "metropolis", "nuts")
+METHODS = ("laplace", "nuts")
 WARMUP = 25
 """Draws of each chain of NUTS in which it looks for its step."""
-LEARNING = 300
-"""Steps of each chain of Metropolis between two looks at the reference that it learns."""
 BLOCK = 50
 """Draws of each chain between two looks at whether they are enough."""
 _LEAST = 100
@@ -32,7 +29,7 @@ _LEAST = 100
 def posterior(
     result: Result[Any, Any],
     *,
-    method: Literal["laplace", "metropolis", "nuts"] | str = "laplace",
+    method: Literal["laplace", "nuts"] | str = "laplace",
     draws: int = 1000,
     chains: int = 4,
     warmup: int | None = None,
@@ -41,23 +38,19 @@ def posterior(
 ) -> Result[Any, Any]:
     """A fit with draws of what it does not know, which `draw`, Monte Carlo and the control check then take.
 
-    "laplace" is free: normal about the estimates from the covariance of the likelihood. The others draw from the
+    "laplace" is free: normal about the estimates from the covariance of the likelihood. "nuts" draws from the
     likelihood and the priors themselves, with every start state, delay, bias and noise that the fit moved, from the fit
-    and in the metric of the Fisher information. "metropolis" needs values of the likelihood only, and so takes every
-    likelihood of records in time (preconditioned Crank-Nicolson proposals about a normal distribution that it learns:
-    Cotter et al. 2013; Rudolf and Sprungk 2018); each draw that is kept is its twentieth step. "nuts" goes along exact
-    gradients (No-U-Turn sampler, Hoffman and Gelman 2014). Both see skewed and bounded parameters as they are, and end
-    when every number has a split-R-hat below 1.01 and every parameter 400 effective draws. Residuals count as the
-    likelihood has them (white): where the fit corrects its bounds for coloured ones, `draw` widens the draws by the
-    same matrices.
+    and in the metric of the Fisher information, along exact gradients (No-U-Turn sampler, Hoffman and Gelman 2014). It
+    sees skewed and bounded parameters as they are, and ends when every number has a split-R-hat below 1.01 and every
+    parameter 400 effective draws. Residuals count as the likelihood has them (white): where the fit corrects its bounds
+    for coloured ones, `draw` widens the draws by the same matrices.
 
     Args:
         result: of a fit in this program, or any with a covariance ("laplace").
-        method: "laplace", "metropolis" or "nuts".
+        method: "laplace" or "nuts".
         draws: of each chain at most.
         chains: how many.
-        warmup: draws of each chain in which it looks for its step ("nuts"), or steps of each chain between two looks
-            at the reference ("metropolis", five times); None: `WARMUP`, `LEARNING`.
+        warmup: draws of each chain in which it looks for its step; None: `WARMUP`.
         seed: of all that is random.
         progress: told draws of a chain so far, and at most.
 
@@ -68,9 +61,8 @@ def posterior(
     """
     where = f"the fit of {result.name}"
     check_posterior(method)
-    warming = (WARMUP if method == "nuts" else LEARNING) if warmup is None else warmup
-    least_warm = 10 if method == "metropolis" else 0
-    for name, value, least in (("draws", draws, _LEAST), ("chains", chains, 2), ("warmup", warming, least_warm)):
+    warming = WARMUP if warmup is None else warmup
+    for name, value, least in (("draws", draws, _LEAST), ("chains", chains, 2), ("warmup", warming, 0)):
         if value < least:
             raise IdentificationError(f"is {value}, expected at least {least}.", channel=name)
     if result.failed:
@@ -78,20 +70,19 @@ def posterior(
     if method == "laplace":
         return replace(result, posterior=_laplace(result, draws=draws, chains=chains, seed=seed, where=where))
     fitted = result.fitted
-    called = "NUTS" if method == "nuts" else "Metropolis"
-    if fitted is None or (method == "nuts" and not hasattr(fitted.likelihood, "traced")):
+    if fitted is None or not hasattr(fitted.likelihood, "traced"):
         told = "comes from a file" if fitted is None else f"is by {result.method}"
         raise IdentificationError(
-            f"{told}, and {called} needs the likelihood of records in time itself.",
+            f"{told}, and NUTS needs the likelihood of records in time itself.",
             where=where,
             channel="posterior",
-            hint=f"Fit the flights again with --posterior {method} (without a horizon), or take 'laplace'.",
+            hint="Fit the flights again with --posterior nuts (without a horizon), or take 'laplace'.",
         )
     if not result.converged:
         raise IdentificationError(
             "did not converge: chains would start from nowhere.", where=where, hint="Allow more iterations."
         )
-    made = _drawn(result, fitted, method, draws=draws, chains=chains, warmup=warming, seed=seed, progress=progress)
+    made = _drawn(result, fitted, draws=draws, chains=chains, warmup=warming, seed=seed, progress=progress)
     made.check(where=where)
     return replace(result, posterior=made)
 
@@ -130,7 +121,6 @@ def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, wh
 def _drawn(
     result: Result[Any, Any],
     fitted: Fitted,
-    method: str,
     *,
     draws: int,
     chains: int,
@@ -150,13 +140,11 @@ def _drawn(
         good = np.all(effective(so_far.rows[:, :, :k]) >= LEAST_ESS)
         return bool(good and np.all(split_rhat(so_far.rows) < SPLIT_RHAT))
 
-    if method == "nuts":
-        from swashplate.identification.core import nuts
+    from swashplate.identification.core import nuts
 
-        draw = partial(nuts.sample, likelihood.traced(), row)
-    else:
-        draw = partial(metropolis.sample, likelihood)
-    sampled = draw(
+    sampled = nuts.sample(
+        likelihood.traced(),
+        row,
         fitted.row,
         covariance,
         chains=chains,
@@ -168,7 +156,7 @@ def _drawn(
         progress=progress,
     )
     return Posterior(
-        method,
+        "nuts",
         row.names,
         k,
         tuple(result[name].unit for name in result.names),

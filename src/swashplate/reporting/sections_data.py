@@ -59,7 +59,6 @@ def method_words(method: str) -> str:
     return {
         "prediction-error": "prediction error (maximum likelihood with process noise)",
         "output-error": "output error (maximum likelihood without process noise)",
-        "nelder-mead": "Nelder and Mead's search on the squared error, the paper's own way",
     }.get(method, method)
 
 

@@ -93,7 +93,7 @@ def test_what_has_no_posterior_is_refused(tmp_path: Path) -> None:
     fit = fitted("output-error")
     from_file = sp.load(fit.save(tmp_path / "fit.json"), equations=rolling())
     for asked, words in (
-        ({"method": "gibbs"}, "'gibbs' is no posterior; there are laplace, metropolis, nuts"),
+        ({"method": "gibbs"}, "'gibbs' is no posterior; there are laplace, nuts"),
         ({"chains": 1}, "chains: is 1, expected at least 2"),
         ({"draws": 5}, "draws: is 5, expected at least 100"),
     ):

@@ -34,7 +34,7 @@ class Posterior:
     """Draws of a fit's row of numbers: the model's parameters first, then what belongs to records and noise.
 
     Attributes:
-        method: "laplace" (normal about the optimum), "metropolis" or "nuts".
+        method: "laplace" (normal about the optimum) or "nuts".
         names: of the numbers. parameters: how many of them are the model's.
         units: of the model's parameters.
         draws: shape (chains, draws, numbers), in units.

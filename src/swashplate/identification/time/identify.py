@@ -30,7 +30,7 @@ from swashplate.identification.core.scoring import Optimum, Progress, minimise
 from swashplate.identification.core.sources import sources_of
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.identification.time import feedback, nelder_mead
+from swashplate.identification.time import feedback
 from swashplate.identification.time.belonging import unrelated
 from swashplate.identification.time.estimates import LAGS, Found, constants, estimates_of, found_at
 from swashplate.identification.time.flight_details import FlightDetails, moving_air
@@ -257,11 +257,6 @@ def _scoring_together(likelihood: OutputError, iterations: int, progress: Progre
     return minimise_over_valleys(likelihood, iterations=iterations, together=True, progress=progress)
 
 
-def _simplex(likelihood: OutputError, iterations: int, progress: Progress | None) -> Optimum:
-    del iterations
-    return nelder_mead.minimise_squares(likelihood, progress=progress)
-
-
 def _together(
     by: FlightEstimator[L], alone: PredictionError, row: Array, residual: LinearResidual, question: Question
 ) -> tuple[L, Found, Array]:
@@ -317,7 +312,6 @@ PREDICTION_ERROR = FlightEstimator(
     _found_ahead,
 )
 OUTPUT_ERROR = FlightEstimator("output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together, _found)
-NELDER_MEAD = FlightEstimator("nelder-mead", _TAKES | {"keep_unexcited"}, _output_error, _simplex, _found)
 
 SHORTEST = 6.0
 """Seconds below which a piece is left out: the filter settles in a quarter of that."""

@@ -52,7 +52,7 @@ def test_conditioning_filters_nothing_that_was_not_asked_for() -> None:
     assert "lowpass" not in steps
 
 
-@pytest.mark.parametrize("method", ["prediction-error", "output-error", "nelder-mead"])
+@pytest.mark.parametrize("method", ["prediction-error", "output-error"])
 def test_a_fit_of_a_low_passed_flight_is_refused(method: str) -> None:
     with pytest.raises(FlightError, match=r"low-pass at 15 Hz \(order 4\).*cutoff=0.*at most 37.5 Hz"):
         sp.identify(sp.vehicle("coax"), _measured(15.0), method=method)
