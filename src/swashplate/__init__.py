@@ -102,7 +102,6 @@ if TYPE_CHECKING:
     from swashplate.physics.environment import Environment
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
-    from swashplate.simulation.adaptive import simulate_adaptive
     from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
     from swashplate.simulation.derivatives_over_speed import derivatives
     from swashplate.simulation.height_velocity import height_velocity
@@ -221,7 +220,6 @@ __all__ = [
     "show_replay",
     "show_structure",
     "simulate",
-    "simulate_adaptive",
     "simulate_batch",
     "simulate_bench",
     "simulate_closed_loop",

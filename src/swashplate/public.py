@@ -128,7 +128,6 @@ _COMPUTING: Mapping[str, str] = {
     "replay": "swashplate.links.live.replay:replay",
     "show_replay": "swashplate.api.live:show_replay",
     "simulate": "swashplate.simulation.integrate:simulate",
-    "simulate_adaptive": "swashplate.simulation.adaptive:simulate_adaptive",
     "simulate_batch": "swashplate.api.simulate_batch:simulate_batch",
     "simulate_bench": "swashplate.api.bench:simulate_bench",
     "simulate_closed_loop": "swashplate.simulation.closed_loop:simulate_closed_loop",

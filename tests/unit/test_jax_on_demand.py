@@ -44,7 +44,7 @@ def _loading(tree: ast.Module) -> Iterator[int]:
 def test_no_module_loads_jax_when_it_is_imported() -> None:
     sources = {str(path.relative_to(SOURCE)): path.read_text(encoding="utf-8") for path in SOURCE.rglob("*.py")}
     found = {name for name, code in sources.items() if _NAMED.search(code) and any(_loading(ast.parse(code)))}
-    around = {"identification/core/nuts.py", "simulation/adaptive.py"}  # BlackJAX and diffrax, loaded where asked for
+    around = {"identification/core/nuts.py"}  # BlackJAX, loaded where asked for
     assert found == around, "take jax and jnp from swashplate.jax_on_demand"
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
 import jax
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from swashplate.api.simulate_batch import simulate_batch
+from swashplate.arrays import Array
 from swashplate.errors import DivergenceError, FlightError, SwashError, TrimError
 from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
@@ -15,7 +19,6 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation import trigonometry
-from swashplate.simulation.adaptive import simulate_adaptive
 from swashplate.simulation.batch import BLOCK
 from swashplate.simulation.dynamics import equations_of
 from swashplate.simulation.integrate import simulate, trajectory
@@ -33,6 +36,27 @@ def excited(coax: Vehicle, samples: int, rate: float = 100.0) -> dict[str, objec
     time = np.arange(samples) / rate
     moving = {"servo_pitch": 0.1 * np.sin(3.0 * time), "servo_roll": 0.05 * np.cos(2.0 * time)}
     return {**trim(coax).commands(), **moving, "voltage": 12.22 - 0.02 * time, "wind_north": 0.3 * np.sin(time)}
+
+
+def fly_by_scipy(
+    vehicle: Vehicle, inputs: dict[str, object], start: dict[str, float], *, rate: float, held: bool
+) -> Array:
+    """The states (samples, states) by another program: SciPy's method of order 8 on the equations as they stand."""
+    given = {name: np.asarray(values, dtype=float) for name, values in inputs.items()}
+    n = max(values.size for values in given.values())
+    names = (*vehicle.input_names, "wind_north", "voltage")
+    rows = np.stack([np.broadcast_to(given[name], n) for name in names], axis=1)
+    par, xp, count = vehicle.values(), FloatBackend(), len(vehicle.input_names)
+    states = [np.array([start[name] for name in vehicle.state_names])]
+    for now, after in pairwise(rows):
+
+        def rates(t: float, x: Array, now: Array = now, after: Array = after) -> Array:
+            row = (now if held else now + t * rate * (after - now)).tolist()
+            air = Environment(wind_north=row[count], voltage=row[count + 1])
+            return np.array(vehicle.rates(x.tolist(), row[:count], par, air, xp))
+
+        states.append(solve_ivp(rates, (0.0, 1.0 / rate), states[-1], method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1])
+    return np.array(states)
 
 
 def largest_difference(a: Flight, b: Flight, names: tuple[str, ...]) -> float:
@@ -57,43 +81,23 @@ def test_the_fixed_step_converges_with_order_four(coax: Vehicle, interpolation: 
     rough = [name for name in coax.parameter_names if name.startswith(("a_alpha", "a_beta", "drag"))]
     smooth = coax.with_values(dict.fromkeys(rough, 0.0))
     inputs = excited(coax, 16, rate=20.0)
+    how: dict[str, Any] = {"rate": 20.0, "interpolation": interpolation}
     start = {**trim(coax).states(), "p": 0.5, "q": -0.3, "r": 0.2, "u": 0.7, "phi": 0.1}
-    truth, *found = (
-        simulate_adaptive(smooth, inputs, rate=20.0, interpolation=interpolation, start=start),
-        *(
-            simulate(smooth, inputs, rate=20.0, interpolation=interpolation, start=start, substeps=substeps)
-            for substeps in (4, 8, 16)
-        ),
-    )
-    errors = [largest_difference(flight, truth, coax.state_names) for flight in found]
+    truth = fly_by_scipy(smooth, inputs, start, rate=20.0, held=interpolation == "held")
+    errors = [
+        np.max(np.abs(simulate(smooth, inputs, start=start, **how, substeps=n).array(coax.state_names) - truth))
+        for n in (4, 8, 16)
+    ]
     np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / np.array(errors[1:])), 4.0, atol=0.2)
 
 
-@pytest.mark.proof
-def test_the_usual_step_is_accurate(coax: Vehicle) -> None:
+@pytest.mark.parametrize("interpolation", ["held", "linear"])
+def test_the_usual_step_is_accurate(coax: Vehicle, interpolation: str) -> None:
     """10 ms with the card's own non-smooth terms: far below what a motion-capture system resolves."""
-    inputs = excited(coax, 201)
-    truth = simulate_adaptive(coax, inputs)
-    flight = simulate(coax, inputs, interpolation="linear")
-    assert largest_difference(flight, truth, ("x", "y", "z")) < 1e-6
-    assert largest_difference(flight, truth, ("phi", "theta", "psi", "p", "q", "r")) < 1e-5
-
-
-def test_the_usual_step_is_that_of_plain_floats(coax: Vehicle) -> None:
-    """The same by another program, for half a second: SciPy's method of order 8 on the equations as they stand."""
-    inputs = excited(coax, 201)
-    flight = simulate(coax, inputs)
-    rows = np.stack([np.broadcast_to(inputs[name], 201) for name in (*coax.input_names, "wind_north", "voltage")])
-    x, par, xp, count = np.array(trim(coax).state), coax.values(), FloatBackend(), len(coax.input_names)
-    for k in range(50):
-        inside, (north, voltage) = rows[:count, k].tolist(), rows[count:, k].tolist()
-        air = Environment(wind_north=north, voltage=voltage)
-
-        def rates(_: float, x: np.ndarray, inside: list[float] = inside, air: Environment = air) -> np.ndarray:
-            return np.array(coax.rates(x.tolist(), inside, par, air, xp))
-
-        x = solve_ivp(rates, (0.0, 0.01), x, method="DOP853", rtol=1e-9, atol=1e-9).y[:, -1]
-    found = dict(zip(coax.state_names, x, strict=True))
+    inputs = excited(coax, 51)
+    truth = fly_by_scipy(coax, inputs, trim(coax).states(), rate=100.0, held=interpolation == "held")
+    flight = simulate(coax, inputs, start=trim(coax), interpolation=interpolation)
+    found = dict(zip(coax.state_names, truth[-1], strict=True))
     for names, most in ((("x", "y", "z"), 1e-6), (("phi", "theta", "psi", "p", "q", "r"), 1e-5)):
         assert max(abs(flight.values(name)[50] - found[name]) for name in names) < most
     assert abs(found["q"]) > 0.01

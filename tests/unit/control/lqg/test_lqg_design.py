@@ -9,7 +9,6 @@ import pytest
 
 from swashplate.control.analysis.margins import promised_disc
 from swashplate.control.analysis.stability import loop_modes
-from swashplate.control.analysis.stability_limit import with_servos
 from swashplate.control.controller_file import read_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
@@ -129,16 +128,6 @@ def test_a_place_is_held_as_tightly_as_delays_and_margins_allow(made: Lqg) -> No
     assert promised_disc(S) < DISC or np.any(crossovers(w, S) > most)
     strays, strayed = (analyse(controller).spread["x"] for controller in (made, wide))
     assert strays < 0.85 * strayed
-
-
-def test_servo_lags_are_first_order() -> None:
-    coax = vehicle("coax")
-    model = linearize(coax, trim(coax))
-    slow = with_servos(model, 0.05)
-    values = np.linalg.eigvals(slow.A)
-    assert np.sum(np.abs(values + 20.0) < 1e-6) == 2
-    steady = slow.A[: len(model.A), len(model.A) :]
-    np.testing.assert_allclose(steady, model.B[:, 2:], atol=1e-12)
 
 
 def test_observability_in_words() -> None:
