@@ -17,11 +17,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.batch import Precision, trajectories
 from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision, equations_of, parameter_row
+from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.trim import trim
 
 PROMISED = 1e9

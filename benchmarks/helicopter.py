@@ -6,9 +6,9 @@ import jax
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.models.catalogue import vehicle
 from swashplate.simulation.derivatives import derivative_table
-from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
 from swashplate.simulation.integrate import trajectory
 from swashplate.simulation.lpv import simulate_lpv
 from swashplate.simulation.reduction import PAPER_INPUTS

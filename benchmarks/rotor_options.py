@@ -8,8 +8,8 @@ import jax
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.models.catalogue import vehicle
-from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
 from swashplate.simulation.integrate import trajectory
 from swashplate.simulation.trim import trim
 

@@ -12,9 +12,9 @@ import jax
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row, unpack_rows
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.physics.backend import CasadiBackend
-from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row, unpack_rows
 from swashplate.simulation.integrate import trajectory
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import trim

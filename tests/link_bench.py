@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.compiled import can_compile
+from swashplate.engine.equations import SURROUNDINGS
 from swashplate.export.stepping_c import CompiledEngine
 from swashplate.links.ardupilot.session import ArduPilotSession
 from swashplate.links.estimating import Estimating
@@ -21,7 +22,6 @@ from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing

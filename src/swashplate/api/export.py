@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from swashplate.codegen.c_text import Precision, identifier
 from swashplate.control.controller_file import read_controller
+from swashplate.engine.c_text import Precision, identifier
 from swashplate.errors import SwashError
 from swashplate.export import formats
 from swashplate.export.control_json import read_linear

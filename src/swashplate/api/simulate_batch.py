@@ -8,13 +8,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.jax_on_demand import jax
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.batch import Batch, FlyBatch, Precision, fly_batch
 from swashplate.simulation.driving import Interpolation
-from swashplate.simulation.dynamics import SURROUNDINGS, Equations, enable_double_precision, equations_of, parameter_row
+from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.codegen.c_text import Precision
 from swashplate.compiled import NATIVE, loaded
+from swashplate.engine.c_text import Precision
+from swashplate.engine.equations import Equations
 from swashplate.export.c_lanes import lane_code
-from swashplate.simulation.dynamics import Equations
 
 _OPTIONS = (
     *("-O3", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd"),

@@ -11,12 +11,12 @@ import re
 from collections.abc import Iterable, Sequence
 from itertools import chain
 
-from swashplate.codegen.c_expression import Statement, Statements, statements
-from swashplate.codegen.c_loops import SETTLED, Search, searches
-from swashplate.codegen.c_split import ROOTS, split
-from swashplate.codegen.c_text import REAL, Precision, literal
-from swashplate.simulation.dynamics import Equations
-from swashplate.simulation.traced_rates import traced_rates
+from swashplate.engine.c_expression import Statement, Statements, statements
+from swashplate.engine.c_loops import SETTLED, Search, searches
+from swashplate.engine.c_split import ROOTS, split
+from swashplate.engine.c_text import REAL, Precision, literal
+from swashplate.engine.equations import Equations
+from swashplate.engine.trace import traced_rates
 from swashplate.simulation.trigonometry import KERNELS
 
 LANES: dict[Precision, int] = {"double": 16, "single": 32}

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from swashplate.codegen.c_expression import printed, statements
-from swashplate.codegen.c_loops import looped
-from swashplate.codegen.c_split import FIXED, split
-from swashplate.codegen.c_text import Precision
+from swashplate.engine.c_expression import printed, statements
+from swashplate.engine.c_loops import looped
+from swashplate.engine.c_split import FIXED, split
+from swashplate.engine.c_text import Precision
 
 if TYPE_CHECKING:
     from swashplate.export.traced import Traced

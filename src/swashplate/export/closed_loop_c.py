@@ -14,13 +14,13 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
 from swashplate.control.kinds import FELT, draw_names, kind_of
+from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import SwashError
 from swashplate.export.controller_c import printed_function
 from swashplate.export.model_c import flying_code
 from swashplate.export.traced import trace_vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import REFERENCES, Controller, FlyLoop, LoopTables
-from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.trim import Trim
 
 _OPTIONS = ("-O1", "-w", NATIVE, "-ftree-vectorize", "-fno-trapping-math")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swashplate.atomic import folder_when_complete, write_bytes
-from swashplate.codegen.c_text import Precision, identifier
+from swashplate.engine.c_text import Precision, identifier
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear, logged_delays, of_state_space, of_vehicle
 from swashplate.models.delays import input_delays

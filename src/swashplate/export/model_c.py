@@ -7,8 +7,8 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from swashplate.codegen.c_expression import body
-from swashplate.codegen.c_text import REAL, Precision, array, words
+from swashplate.engine.c_expression import body
+from swashplate.engine.c_text import REAL, Precision, array, words
 from swashplate.export.c_stages import stages
 from swashplate.export.traced import Traced, Variable, late_notes
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.codegen.c_text import identifier, words
 from swashplate.control.lqg.traced import CasadiMatrices
+from swashplate.engine.c_text import identifier, words
 from swashplate.export.controller_c import operations_of, printed_function
 from swashplate.export.regression_c import CYCLES
 from swashplate.extras import library

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.codegen.looping import require_casadi
 from swashplate.compiled import loaded
+from swashplate.engine.equations import SURROUNDINGS
+from swashplate.engine.roots import require_casadi
 from swashplate.export.model_c import frame_code
 from swashplate.export.traced import trace_vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.stepping import motion_row
 from swashplate.simulation.trim import Trim
 

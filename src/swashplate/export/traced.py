@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.codegen.c_text import identifier
-from swashplate.codegen.looping import Looped, Looping, require_casadi
+from swashplate.engine.c_text import identifier
+from swashplate.engine.roots import Looped, Looping, require_casadi
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear
 from swashplate.flights.schema import channel, is_known

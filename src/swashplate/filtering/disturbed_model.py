@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from swashplate.engine.equations import CONSTANTS, Equations, equations_of
 from swashplate.filtering.block_matrices import blocks, diagonal
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.filter_loop import filtered
@@ -29,13 +30,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 from swashplate.simulation.discretisation import held_series
-from swashplate.simulation.dynamics import (
-    CONSTANTS,
-    Equations,
-    equations_of,
-    jax_backend,
-    row_rates,
-)
+from swashplate.simulation.dynamics import jax_backend, row_rates
 from swashplate.simulation.runge_kutta import rk4_step
 
 N_DISTURBANCES = len(DISTURBED)

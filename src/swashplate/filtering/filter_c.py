@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.codegen.c_expression import printed, statements
-from swashplate.codegen.c_loops import looped
-from swashplate.codegen.c_split import ROOTS, split
-from swashplate.codegen.c_tangents import VECTORS, Tangents
-from swashplate.codegen.looping import require_casadi
+from swashplate.engine.c_expression import printed, statements
+from swashplate.engine.c_loops import looped
+from swashplate.engine.c_split import ROOTS, split
+from swashplate.engine.c_tangents import VECTORS, Tangents
+from swashplate.engine.roots import require_casadi
+from swashplate.engine.trace import traced_rates
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.physics.backend import CasadiBackend
-from swashplate.simulation.traced_rates import traced_rates
 
 _FOUND = ("nu", "corrected", "acting", "rest")
 

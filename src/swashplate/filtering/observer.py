@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import Equations
 from swashplate.errors import ControllerError
 from swashplate.filtering.disturbances import DISTURBED, Unrest, on_axes
 from swashplate.filtering.matrix_operations import Matrices, change
@@ -26,7 +27,6 @@ from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.discretisation import held_series
-from swashplate.simulation.dynamics import Equations
 
 _BODY = len(RigidBody._fields)
 

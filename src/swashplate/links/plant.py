@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight
 from swashplate.links.recorder import Recorder
@@ -16,7 +17,6 @@ from swashplate.links.servos import ServoMapping
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.record import simulated_flight
 from swashplate.simulation.standing import at_rest
 from swashplate.simulation.stepping import MakeEngine, Motion, Stepping, at_standstill

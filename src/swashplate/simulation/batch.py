@@ -12,10 +12,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
+from swashplate.engine.equations import Equations
 from swashplate.flights.flight import Flight
 from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.dynamics import Equations, row_rates
+from swashplate.simulation.dynamics import row_rates
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trigonometry import vector_backend

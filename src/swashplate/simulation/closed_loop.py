@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
@@ -19,15 +20,7 @@ from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import QUICK_FLIGHT, lengthened, shared_length
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    row_force,
-    row_rates,
-)
+from swashplate.simulation.dynamics import enable_double_precision, row_force, row_rates
 from swashplate.simulation.late import steps_late
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_step

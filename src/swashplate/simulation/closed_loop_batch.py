@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.errors import CardError, SwashError
 from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
@@ -20,15 +21,7 @@ from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.batch import Batch
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
 from swashplate.simulation.compilation import QUICK_FLIGHT, lengthened, shared_length
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    row_force,
-    row_rates,
-)
+from swashplate.simulation.dynamics import enable_double_precision, row_force, row_rates
 from swashplate.simulation.late import quantised, quantum_of, steps_late
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trigonometry import vector_backend

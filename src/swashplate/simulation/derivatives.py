@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row, unpack_rows
 from swashplate.errors import SwashError
 from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.conventional.derivative_table import COLUMNS, CONTROLS, MOTIONS, DerivativeTable
@@ -19,19 +20,11 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    jax_backend,
-    parameter_row,
-    unpack_rows,
-)
+from swashplate.simulation.dynamics import enable_double_precision, jax_backend
 from swashplate.simulation.trim import Trim
 
 if TYPE_CHECKING:
-    from swashplate.simulation.dynamics import Rows
+    from swashplate.engine.equations import Rows
 
 _FAST = ("a1", "b1", "lam0", "lam_c", "lam_s")
 """States that follow without delay in a table of derivatives with six degrees of freedom."""

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import SURROUNDINGS
 
 Interpolation = Literal["held", "linear"]
 Inputs = Flight | Mapping[str, ArrayLike] | NDArray[np.float64]

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.jax_on_demand import jax, jit, jnp
@@ -18,14 +19,7 @@ from swashplate.physics.earth import Earth
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import QUICK_FLIGHT, lengthened, shared_length
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    row_rates,
-)
+from swashplate.simulation.dynamics import enable_double_precision, row_rates
 from swashplate.simulation.earth_flight import PLACES, from_earth, over_earth, to_earth
 from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.record import check_divergence, simulated_flight

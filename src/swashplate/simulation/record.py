@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.flights.schema import CHANNELS
 from swashplate.models.doubts import envelope
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.dynamics import SURROUNDINGS
 
 _ABSURD = {"m": 1e6, "m/s": 1e4, "rad": 1e4, "rad/s": 1e5}
 """Beyond these no small helicopter flies: a simulation that gets there has diverged, finite or not."""

@@ -10,6 +10,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.errors import SwashError
 from swashplate.flights.conditioning.resample import values_at
 from swashplate.flights.flight import Flight, stream
@@ -17,13 +18,7 @@ from swashplate.flights.schema import POSITION, QUATERNION, RATES
 from swashplate.jax_on_demand import jax, jit
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    equations_of,
-    parameter_row,
-    row_force,
-)
+from swashplate.simulation.dynamics import row_force
 
 
 @dataclass(frozen=True)

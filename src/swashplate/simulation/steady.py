@@ -10,11 +10,12 @@ import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import IMAGINARY, Array
+from swashplate.engine.equations import Equations
 from swashplate.jax_on_demand import jax, jnp
 from swashplate.physics.backend import ArrayBackend, Backend
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import Equations, jax_backend, rates_and_slopes, row_rates
+from swashplate.simulation.dynamics import jax_backend, rates_and_slopes, row_rates
 
 Slopes = Callable[[Array, Array, Array], tuple[Any, Any, Any]]
 """Rates and their slopes by state and driving row, of (x, w, p)."""

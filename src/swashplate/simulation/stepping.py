@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.errors import DivergenceError
 from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.surroundings import environment_of
@@ -27,14 +28,7 @@ from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector, body_to_local
 from swashplate.physics.rigid_body import RigidBody, gravity
 from swashplate.simulation.compilation import QUICK_FLIGHT
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    row_rates,
-)
+from swashplate.simulation.dynamics import enable_double_precision, row_rates
 from swashplate.simulation.runge_kutta import rk4_and_slope
 from swashplate.simulation.tumbling import TumblingBody, counted_on, from_euler, seen, tumbling
 

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.errors import TrimError
 from swashplate.models.doubts import doubts, nominal_voltage
 from swashplate.models.nesting import leaves
@@ -19,12 +20,7 @@ from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.ground_contact import Grip
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-)
+from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.steady import ACCELERATIONS, ANGULAR_ACCELERATIONS, BODY, assemble, unrest_at
 
 _XP = ArrayBackend()

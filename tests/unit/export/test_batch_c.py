@@ -12,13 +12,13 @@ import pytest
 from swashplate.api.simulate_batch import simulate_batch
 from swashplate.arrays import Array
 from swashplate.compiler import compiler
+from swashplate.engine.equations import equations_of, parameter_row, unpack_rows
 from swashplate.errors import ExportError
 from swashplate.export import batch_c, c_lanes
 from swashplate.export.batch_c import fly_in_c
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
-from swashplate.simulation.dynamics import equations_of, parameter_row, unpack_rows
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import trim
 

@@ -14,8 +14,8 @@ import pytest
 
 import swashplate as sp
 from exported import compiled
-from swashplate.codegen.c_text import identifier, literal, words
 from swashplate.compiler import compiler, shared_library
+from swashplate.engine.c_text import identifier, literal, words
 from swashplate.errors import ExportError
 from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space

@@ -16,12 +16,12 @@ import swashplate as sp
 from heli_autopilot import servo_packet
 from link_bench import QUICK, Bench, bench
 from swashplate.atomic import added_when_complete
+from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import LinkError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.growing import Growing
 from swashplate.links.plant import unflown
 from swashplate.links.recorder import Recorder, begin, numbered, recover
-from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.record import simulated_flight
 
 IDLE = [1500, 1500, 1500, 1500, 1300, 1300]

@@ -10,6 +10,7 @@ import pytest
 import swashplate as sp
 from exported import compiled
 from swashplate.compiler import compiler
+from swashplate.engine.equations import equations_of
 from swashplate.errors import CardError
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import trace_vehicle
@@ -18,7 +19,6 @@ from swashplate.models.residual import ROWS, coefficients, facing, refuse_predic
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
-from swashplate.simulation.dynamics import equations_of
 
 
 def wider(name: str = "crazyflie", **changes: float) -> Vehicle:

@@ -18,12 +18,12 @@ import pytest
 import swashplate as sp
 from exported import compiled
 from swashplate.compiler import compiler
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced, trace_vehicle
 from swashplate.links.live import world
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
 from swashplate.simulation.standing import at_rest, standing
 from swashplate.simulation.stepping import LONGEST_STEP
 from swashplate.simulation.tumbling import from_euler, to_euler, tumbling

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from swashplate.api.simulate_batch import simulate_batch
 from swashplate.arrays import Array
+from swashplate.engine.equations import equations_of
 from swashplate.errors import DivergenceError, FlightError, SwashError, TrimError
 from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
@@ -20,7 +21,6 @@ from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation import trigonometry
 from swashplate.simulation.batch import BLOCK
-from swashplate.simulation.dynamics import equations_of
 from swashplate.simulation.integrate import simulate, trajectory
 from swashplate.simulation.sensors import Sensors
 from swashplate.simulation.trim import trim

@@ -36,6 +36,7 @@ from swashplate.control.lqg.weights import (
     total_delays,
     typical,
 )
+from swashplate.engine.equations import equations_of, parameter_row
 from swashplate.errors import ControllerError
 from swashplate.filtering import disturbances, observer
 from swashplate.filtering.disturbances import Unrest
@@ -46,7 +47,6 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.discretisation import with_late_inputs, zero_order_hold
-from swashplate.simulation.dynamics import equations_of, parameter_row
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.speeds import trims_over_speed
 

@@ -13,6 +13,7 @@ from swashplate import documents
 from swashplate.arrays import Array
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.law import INTEGRALS, Feedback
+from swashplate.engine.equations import equations_of, parameter_row
 from swashplate.errors import CardError, ControllerError
 from swashplate.filtering import observer
 from swashplate.filtering.disturbances import Unrest
@@ -21,7 +22,6 @@ from swashplate.filtering.sensor_suite import KINDS, Sensor
 from swashplate.models.card import card_from
 from swashplate.models.catalogue import from_card
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import equations_of, parameter_row
 from swashplate.simulation.trim import Trim
 
 SCHEMA = 1

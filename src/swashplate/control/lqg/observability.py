@@ -17,6 +17,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.control.lqg.optimal import UnreachedDirection, plain, shares, unseen
 from swashplate.control.lqg.weights import typical
+from swashplate.engine.equations import equations_of, parameter_row
 from swashplate.filtering import disturbances, observer
 from swashplate.filtering.disturbances import DISTURBED, Unrest
 from swashplate.filtering.observer import Numbers, ObserverPlan
@@ -24,7 +25,6 @@ from swashplate.filtering.riccati import gain_at
 from swashplate.filtering.sampled_observer_model import SampledObserverModel, sampled_observer_model
 from swashplate.filtering.sensor_suite import BIASED, Suite
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.dynamics import equations_of, parameter_row
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 

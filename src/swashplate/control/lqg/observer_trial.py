@@ -16,18 +16,12 @@ from jaxtyping import Float, Int
 from swashplate.arrays import Array
 from swashplate.control.lqg.constant_gain import steady_sigmas
 from swashplate.control.lqg.controller import Lqg, SensedStep
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import REFERENCES, told
 from swashplate.simulation.compilation import QUICK_FLIGHT
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    row_rates,
-)
+from swashplate.simulation.dynamics import enable_double_precision, row_rates
 from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.wind import Gusts, dryden
 

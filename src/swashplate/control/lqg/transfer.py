@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.control.lqg.controller import Lqg
+from swashplate.engine.equations import parameter_row
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.dynamics import parameter_row
 from swashplate.simulation.trim import Trim
 
 

@@ -17,18 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from swashplate.arrays import Array, Complex
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.identification.core.records import POSE
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    rates_and_slopes,
-)
+from swashplate.simulation.dynamics import enable_double_precision, rates_and_slopes
 from swashplate.simulation.trim import Trim, trim
 
 DELAY_SIGMA = 0.05

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import equations_of, parameter_row
 from swashplate.errors import IdentificationError
 from swashplate.filtering import observer
 from swashplate.filtering.disturbances import Unrest, unrest_of
@@ -25,7 +26,7 @@ from swashplate.jax_on_demand import jit, jnp
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dynamics import enable_double_precision, equations_of, parameter_row
+from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.trim import Trim, trim
 
 

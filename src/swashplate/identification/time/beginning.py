@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from swashplate.arrays import IMAGINARY, Array, Complex
+from swashplate.engine.equations import CONSTANTS
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.filter_library import filter_library
@@ -35,7 +36,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import CONSTANTS, rates_and_slopes
+from swashplate.simulation.dynamics import rates_and_slopes
 from swashplate.simulation.steady import Slopes, assemble, unrest_at
 
 if TYPE_CHECKING:

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import IMAGINARY, Array
+from swashplate.engine.equations import CONSTANTS
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.filter_library import FilterLibrary, filter_library, flat
 from swashplate.identification.time.beginning import Begun, FilterNumbers, first_state, numbers_and_constants
-from swashplate.simulation.dynamics import CONSTANTS
 
 
 class FilterRun(NamedTuple):

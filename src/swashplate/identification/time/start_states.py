@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import CONSTANTS, equations_of
 from swashplate.errors import TrimError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
@@ -19,7 +20,7 @@ from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body, turned_about_z
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import CONSTANTS, equations_of, jax_backend, rates_function
+from swashplate.simulation.dynamics import jax_backend, rates_function
 from swashplate.simulation.steady import assemble, unrest
 from swashplate.simulation.trim import trim
 

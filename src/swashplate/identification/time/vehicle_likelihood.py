@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, Equations, equations_of
 from swashplate.errors import IdentificationError
 from swashplate.filtering.filter_loop import Correct, Predict, filtered
 from swashplate.filtering.riccati import kalman_gain
@@ -31,14 +32,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.simulation.dynamics import (
-    CONSTANTS,
-    SURROUNDINGS,
-    Equations,
-    equations_of,
-    row_force,
-    row_rates,
-)
+from swashplate.simulation.dynamics import row_force, row_rates
 from swashplate.simulation.gathered_noise import gathered_noise
 from swashplate.simulation.runge_kutta import rk4_step
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.errors import SwashError
 from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.links.gym.tasks import Task
@@ -20,15 +21,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.simulation.compilation import QUICK_FLIGHT, enable_compilation_cache
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    jax_backend,
-    parameter_row,
-    row_rates,
-)
+from swashplate.simulation.dynamics import enable_double_precision, jax_backend, row_rates
 from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.standing import at_rest, standing
 from swashplate.simulation.stepping import LONGEST_STEP

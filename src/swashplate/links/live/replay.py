@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import DivergenceError, FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import records
@@ -24,7 +25,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.usual import HELICOPTER, USUAL
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
-from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision
+from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
 from swashplate.validation.prediction import predict

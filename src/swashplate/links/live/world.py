@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
 from swashplate.errors import ControllerError, SwashError
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.jax_on_demand import jit, jnp
@@ -24,15 +25,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import Controller, Step
 from swashplate.simulation.compilation import QUICK_FLIGHT
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    row_force,
-    row_rates,
-)
+from swashplate.simulation.dynamics import enable_double_precision, row_force, row_rates
 from swashplate.simulation.record import check_divergence
 from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.stepping import LONGEST_STEP

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from swashplate.codegen.c_expression import Statement
-from swashplate.codegen.c_tangents import VECTORS, Tangents
 from swashplate.compiled import NATIVE, loaded
 from swashplate.compiler import compiler
+from swashplate.engine.c_expression import Statement
+from swashplate.engine.c_tangents import VECTORS, Tangents
 from swashplate.simulation.dynamics import enable_double_precision
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")

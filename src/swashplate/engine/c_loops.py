@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swashplate.codegen.c_expression import Statement, Statements
-from swashplate.codegen.c_text import Precision, literal
+from swashplate.engine.c_expression import Statement, Statements
+from swashplate.engine.c_text import Precision, literal
 
 SETTLED: dict[Precision, float] = {"double": 1e-8, "single": 1e-4}
 """Relative change of a step after which the error, of the order of its square, is below rounding."""

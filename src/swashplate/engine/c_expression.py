@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from swashplate.codegen.c_text import Precision, literal
+from swashplate.engine.c_text import Precision, literal
 from swashplate.errors import ExportError
 
 _BINARY = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/"}

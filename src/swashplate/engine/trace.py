@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from swashplate.codegen.looping import Looped, Looping, require_casadi
+from swashplate.engine.equations import Equations, unpack_rows
+from swashplate.engine.roots import Looped, Looping, require_casadi
 from swashplate.errors import ExportError
-from swashplate.simulation.dynamics import Equations, unpack_rows
 
 
 def traced_rates(equations: Equations) -> Looped:

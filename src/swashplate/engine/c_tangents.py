@@ -11,8 +11,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from swashplate.codegen.c_expression import Statement, Statements
-from swashplate.codegen.c_loops import searches
+from swashplate.engine.c_expression import Statement, Statements
+from swashplate.engine.c_loops import searches
 
 VECTORS = """#if defined(__AVX512F__)
 enum { V = 8 };

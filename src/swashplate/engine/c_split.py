@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from swashplate.codegen.c_expression import Statement, Statements
+from swashplate.engine.c_expression import Statement, Statements
 
 FIXED = "c"
 ROOTS = ("guess[", "root[")
