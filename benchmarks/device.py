@@ -17,12 +17,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from swashplate.engine.card import batch_program
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.batch import Precision, trajectories
-from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.batch import Precision
 from swashplate.simulation.trim import trim
 
 PROMISED = 1e9
@@ -78,7 +77,6 @@ def measure(
         repeats: the best of so many.
         peaks: of the device, floating point operations and bytes per second.
     """
-    enable_double_precision()
     steps, second = round(seconds * RATE), round(RATE)
     single = _Compiled(vehicle, vehicles, steps, "float32")
     fastest = np.inf
@@ -106,8 +104,9 @@ class _Compiled:
         row = np.array([*hover.inputs, *(getattr(hover.environment, name) for name in SURROUNDINGS)])
         rows = np.tile(row[:, None], (steps + 1, 1, 1))
         numbers = parameter_row(vehicle, hover.environment)[:, None]
-        given = [jnp.asarray(values, precision) for values in (x, rows, numbers, 1.0 / RATE)]
-        program = trajectories.lower(equations_of(vehicle), *given, keep=steps, held=True).compile()
+        jax.config.update("jax_enable_x64", True)
+        given = [jnp.asarray(values, precision) for values in (x, rows[:-1], numbers, 1.0 / RATE)]
+        program = batch_program(equations_of(vehicle), steps).lower(*given).compile()
         self.run = lambda: program(*given)
         told = program.cost_analysis() or {}
         told = told[0] if isinstance(told, list) else told
@@ -142,7 +141,6 @@ def main() -> None:
     parser.add_argument("--bytes", type=float, help="peak of the device's memory, bytes per second")
     parser.add_argument("--crazyflow", action="store_true", help="Crazyflow's quadrotor beside it")
     options = parser.parse_args()
-    enable_compilation_cache()
     peaks = None if options.flops is None or options.bytes is None else (options.flops, options.bytes)
     # First, for `measure` switches JAX to double precision, in which Crazyflow would then compute.
     steps = round(options.seconds * RATE)

@@ -1,4 +1,4 @@
-"""4,096 vehicles at once on all cores, float64 and float32, as users fly them: their own C in lanes, and `vmap`."""
+"""4,096 vehicles at once on all cores, float64 and float32, as users fly them: their own C in lanes."""
 
 from __future__ import annotations
 
@@ -7,38 +7,32 @@ import time
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
-from swashplate.api.simulate_batch import Engine, simulate_batch
+from swashplate.api.simulate_batch import simulate_batch
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.simulation.batch import Precision
 from swashplate.simulation.trim import trim
 
 TARGETS = {"float64": 12e6, "float32": 25e6}
 """Vehicle steps per second of CoaXes on two cores, in C."""
-BY_JAX = {"float64": 0.8e6, "float32": 2.5e6}
 VEHICLES = 4096
 
 
 def batches(name: str, precision: Precision, *, steps: int, repeats: int, promised: bool = True) -> list[Result]:
-    """`simulate_batch`, in C and by `vmap`: one card, inputs alike, starts that differ."""
+    """`simulate_batch`: one card, inputs alike, starts that differ."""
     vehicle = load_vehicle(name)
     hover = trim(vehicle)
     start = {**hover.states(), "p": np.linspace(-0.1, 0.1, VEHICLES)}
     inputs = {n: np.full(steps + 1, value) for n, value in zip(vehicle.input_names, hover.inputs, strict=True)}
-    results = []
-    engines: dict[Engine, tuple[str, dict[str, float]]] = {"c": ("own C in lanes", TARGETS), "jax": ("vmap", BY_JAX)}
-    for engine, (how, targets) in engines.items():
-        seconds: list[float] = []
+    seconds: list[float] = []
 
-        def run(engine: Engine = engine, seconds: list[float] = seconds) -> None:
-            begin = time.process_time()
-            simulate_batch(
-                vehicle, inputs, start=start, environment=hover.environment, keep=steps, precision=precision,
-                engine=engine,
-            )  # fmt: skip
-            seconds.append(time.process_time() - begin)
+    def run() -> None:
+        begin = time.process_time()
+        simulate_batch(
+            vehicle, inputs, start=start, environment=hover.environment, keep=steps, precision=precision
+        )  # fmt: skip
+        seconds.append(time.process_time() - begin)
 
-        rate = best_rate(run, steps * VEHICLES, repeats=repeats)
-        note = f"vehicle steps, all cores; {1e9 * min(seconds) / (steps * VEHICLES):.0f} ns of processor time each"
-        target = targets[precision] if promised else None
-        results.append(Result(f"{VEHICLES} {name}, {how}, {precision}", rate, target, note))
-    return results
+    rate = best_rate(run, steps * VEHICLES, repeats=repeats)
+    note = f"vehicle steps, all cores; {1e9 * min(seconds) / (steps * VEHICLES):.0f} ns of processor time each"
+    target = TARGETS[precision] if promised else None
+    return [Result(f"{VEHICLES} {name}, own C in lanes, {precision}", rate, target, note)]

@@ -2,28 +2,28 @@
 
 from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
 
 from swashplate.control.kinds import ControllerKind
 from swashplate.errors import ControllerError
+from swashplate.simulation.controller import StepController
 
 STATES = {"z": 2, "w": 5, "phi": 6, "theta": 7, "psi": 8, "p": 9, "q": 10, "r": 11}  # places in a rigid body's row
 GAINS = ("hover", "straight", "height", "sink", "lean", "turn", "rate")
 
 
-def step(memory, time, measured, reference, gains):
-    """One step, traced by JAX: memory after it, and the commands (fan, roll, pitch, yaw)."""
+def step(memory, measured, reference, gains, xp):
+    """One step: memory after it, and the commands (fan, roll, pitch, yaw)."""
     s = {name: measured[place] for name, place in STATES.items()}
     hover, straight, height, sink, lean, turn, rate = gains
-    off = jnp.arctan2(jnp.sin(s["psi"] - reference[3]), jnp.cos(s["psi"] - reference[3]))
+    off = xp.arctan2(xp.sin(s["psi"] - reference[3]), xp.cos(s["psi"] - reference[3]))
     fan = hover + height * (s["z"] - reference[2]) + sink * s["w"]
     roll, pitch = -lean * s["phi"] - rate * s["p"], -lean * s["theta"] - rate * s["q"]
-    return memory, jnp.stack([fan, roll, pitch, straight - turn * off - rate * s["r"]])
+    return memory, xp.stack([fan, roll, pitch, straight - turn * off - rate * s["r"]])
 
 
 @dataclass(frozen=True)
-class AttitudePD:
+class AttitudePD(StepController):
     """What `sp.simulate_closed_loop` flies: a rate [Hz], a memory, gains and a step; `type` says its kind."""
 
     gains: np.ndarray

@@ -63,7 +63,6 @@ if TYPE_CHECKING:
     from swashplate.control.laws.hover_trim import hover_trim
     from swashplate.control.laws.linear_decoupling import coupling, dynamic_decoupling, static_decoupling
     from swashplate.control.laws.state_hold import state_hold
-    from swashplate.control.lqg.observer_trial import trial as observer_trial
     from swashplate.errors import SwashError
     from swashplate.export.control_json import read_control
     from swashplate.flights.conditioning.reconstruction import reconstruct
@@ -197,7 +196,6 @@ __all__ = [
     "new_card",
     "observability",
     "observe",
-    "observer_trial",
     "omit_derivatives",
     "open_logs",
     "plan_bench",

@@ -119,7 +119,6 @@ _COMPUTING: Mapping[str, str] = {
     "monte_carlo": "swashplate.api.monte_carlo:monte_carlo",
     "observability": "swashplate.api.observability:observability",
     "observe": "swashplate.simulation.sensors:observe",
-    "observer_trial": "swashplate.control.lqg.observer_trial:trial",
     "omit_derivatives": "swashplate.simulation.reduction:omit_derivatives",
     "plan_bench": "swashplate.bench.plan:plan",
     "posterior": "swashplate.identification.posterior:posterior",

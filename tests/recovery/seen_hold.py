@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 from scipy.spatial.transform import Rotation
@@ -22,7 +21,7 @@ from swashplate.arrays import Array
 from swashplate.control.laws.state_hold import state_hold_step
 from swashplate.flights.schema import POSITION, QUATERNION
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.controller import Step, StepController
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.record import simulated_flight
 from swashplate.simulation.sensors import MotionCapture
@@ -44,13 +43,25 @@ _FAR = 0.02
 
 
 @dataclass(frozen=True)
-class SeenHold:
-    """`state_hold` behind a Kalman filter of the linear model, for `simulate_closed_loop`."""
+class SeenHold(StepController):
+    """`state_hold` behind a Kalman filter of the linear model, for `simulate_closed_loop`.
+
+    Attributes:
+        errors: of its cameras, a row per sample: of the pose, and 1 where there is a frame, 0 where there is none.
+    """
 
     rate: float
     memory: Array
     gains: Array
     step: Step
+    errors: Array
+
+    @property
+    def drawn(self) -> int:
+        return self.errors.shape[1]
+
+    def draws(self, samples: int, seed: int | None = None) -> Array:
+        return self.errors[:samples]
 
 
 def seen_hold(seed: int, *, duration: float) -> Callable[[Vehicle, Trim], SeenHold]:
@@ -73,15 +84,13 @@ def seen_hold(seed: int, *, duration: float) -> Callable[[Vehicle, Trim], SeenHo
         P = scipy.linalg.solve_discrete_are(A.T, C.T, Q, np.diag(R))
         L = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(R))
         errors = camera_errors(vehicle, seed, duration=duration)[:: round(camera.rate / inner.rate)]
-        gains = np.concatenate([inner.gains, *(part.ravel() for part in (A, B, L, errors))])
-        step = partial(seen_hold_step, inputs=m, states=n, rate=inner.rate)
-        return SeenHold(inner.rate, np.zeros(n + m), gains, _STEPS.setdefault((m, n), step))
+        frames = np.isfinite(errors).all(axis=1)
+        told = np.column_stack([np.where(frames[:, None], errors, 0.0), frames])
+        gains = np.concatenate([inner.gains, *(part.ravel() for part in (A, B, L))])
+        step = partial(seen_hold_step, inputs=m, states=n)
+        return SeenHold(inner.rate, np.zeros(n + m), gains, step, told)
 
     return hold
-
-
-_STEPS: dict[tuple[int, int], Step] = {}
-"""One function per size, so that other seeds compile nothing anew."""
 
 
 def camera_errors(vehicle: Vehicle, seed: int, *, duration: float) -> Array:
@@ -101,30 +110,29 @@ def camera_errors(vehicle: Vehicle, seed: int, *, duration: float) -> Array:
 
 
 def seen_hold_step(
-    memory: Any, time: Any, measured: Any, reference: Any, gains: Any, *, inputs: int, states: int, rate: float
+    memory: Any, measured: Any, reference: Any, gains: Any, xp: Any, *, inputs: int, states: int
 ) -> tuple[Any, Any]:
     """Estimated deviations from the trim and from the inputs of before in, the same and the commands out."""
     n, m, k = states, inputs, len(POSE)
-    parts = np.cumsum([m * n + m + n, n * n, n * m, n * k])
-    hold, A, B, L, errors = jnp.split(gains, parts)
-    A, B, L, errors = A.reshape(n, n), B.reshape(n, m), L.reshape(n, k), errors.reshape(-1, k)
+    parts = np.cumsum([m * n + m + n, n * n, n * m])
+    hold, A, B, L = np.split(gains, parts)
+    A, B, L = A.reshape(n, n), B.reshape(n, m), L.reshape(n, k)
     rest, held = hold[m * n + m :], hold[m * n : m * n + m]
     expected = A @ memory[:n] + B @ memory[n:]
-    error = errors[jnp.rint(time * rate).astype(int)]
+    voltage, error, there = measured[n], measured[n + 1 : n + 1 + k], measured[n + 1 + k]
     # The cameras turn about the body's axes: what this does to the angles.
     phi, theta = measured[6], measured[7]
-    across = error[4] * jnp.sin(phi) + error[5] * jnp.cos(phi)
-    angles = jnp.stack(
+    across = error[4] * xp.sin(phi) + error[5] * xp.cos(phi)
+    angles = xp.stack(
         [
-            error[3] + across * jnp.tan(theta),
-            error[4] * jnp.cos(phi) - error[5] * jnp.sin(phi),
-            across / jnp.cos(theta),
+            error[3] + across * xp.tan(theta),
+            error[4] * xp.cos(phi) - error[5] * xp.sin(phi),
+            across / xp.cos(theta),
         ]
     )
-    pose = jnp.concatenate([measured[:3] + error[:3], measured[6:9] + angles])
-    innovation = pose - (expected + rest)[jnp.array([0, 1, 2, 6, 7, 8])]
-    estimate = expected + L @ jnp.where(jnp.isnan(innovation), 0.0, innovation)
-    _, commands = state_hold_step(
-        jnp.zeros(1), time, jnp.append(estimate + rest, measured[-1]), reference, hold, inputs=m, states=n
-    )
-    return jnp.concatenate([estimate, commands - held]), commands
+    pose = xp.concatenate([measured[:3] + error[:3], measured[6:9] + angles])
+    innovation = pose - (expected + rest)[[0, 1, 2, 6, 7, 8]]
+    estimate = expected + L @ (there * innovation)
+    seen = xp.concatenate([estimate + rest, xp.atleast_1d(voltage)])
+    _, commands = state_hold_step(np.zeros(1), seen, reference, hold, xp, inputs=m, states=n)
+    return xp.concatenate([estimate, commands - held]), commands

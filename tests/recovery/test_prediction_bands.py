@@ -40,7 +40,7 @@ def _flown(model: StochasticModel, x: Any, parameters: Any, gains: Any, wanted: 
         x, gust, drift, memory = now
         added, white, kick, walk = at
         voltage = jnp.asarray(12.0)
-        memory, u = hold_step(memory, 0.0, jnp.append(x, voltage), wanted, gains)  # type: ignore[arg-type]
+        memory, u = hold_step(memory, jnp.append(x, voltage), wanted, gains, jnp)
         u = u + added
         after = model.step(x, gust + drift + white, u, numbers, voltage)
         return (after, fade * gust + kick, drift + walk, memory), (x, u)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import jax
@@ -14,16 +13,19 @@ from benchmarks import device
 import swashplate as sp
 
 
-@partial(jax.jit, static_argnums=0, static_argnames=("keep", "held"))
-def _turning(equations: Any, x0: Any, rows: Any, p: Any, dt: Any, *, keep: int, held: bool) -> Any:
+def _turning(equations: Any, keep: int) -> Any:
     """In place of a vehicle: states that turn, compiled in no time."""
-    del equations, rows, p, held
-    end = jax.lax.fori_loop(0, keep, lambda _, x: x + dt * jnp.sin(x), x0)
-    return jnp.stack([x0, end])
+    del equations
+
+    def program(x0: Any, rows: Any, p: Any, dt: Any) -> Any:
+        del rows, p
+        return jax.lax.fori_loop(0, keep, lambda _, x: x + dt * jnp.sin(x), x0)[None]
+
+    return jax.jit(program)
 
 
 def test_a_batch_is_measured_on_the_device_that_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(device, "trajectories", _turning)
+    monkeypatch.setattr(device, "batch_program", _turning)
     vehicle = sp.vehicle("coax")
     found = device.measure(vehicle, vehicles=4, repeats=1, peaks=(1e12, 1e11))
     assert (found.device, found.vehicles, found.steps) == (jax.devices()[0].device_kind, 4, 100)

@@ -14,12 +14,11 @@ from swashplate.control.analysis.check import check_controller as judge
 from swashplate.control.analysis.check_gusts import InGusts
 from swashplate.control.analysis.requirements import ATTITUDE_COUPLING, GAIN_MARGIN, PHASE_MARGIN, REJECTION_PEAK
 from swashplate.control.lateness import lateness
-from swashplate.export.closed_loop_c import loop_in_c
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.control_check import compose_check
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import trim
 from swashplate.simulation.wind import INDOOR, Gusts
 from swashplate.text_table import text_table
@@ -100,7 +99,6 @@ def check_controller(
         delays=delays,
         computation=computation,
         required_delay=required_delay,
-        fly=loop_in_c(vehicle, made, at),
     )
     return ControllerCheck(check, name, lateness(vehicle, made, given=delays))
 

@@ -9,7 +9,7 @@ from swashplate.control.controller_file import read_controller
 from swashplate.control.kinds import kind_of
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 
 
@@ -58,4 +58,4 @@ def flown_by(
     if isinstance(controller, str | Path):
         return from_file(controller, seed=seed)(vehicle, trim), Path(controller).name
     made: Controller = kind_of(controller).about(controller, vehicle, trim, seed=seed)
-    return made, str(getattr(controller, "type", type(controller).__name__))
+    return made, controller.type or type(controller).__name__

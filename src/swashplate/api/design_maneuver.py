@@ -22,7 +22,7 @@ from swashplate.identification.design.information import sensed
 from swashplate.identification.design.powers import best_powers
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 from swashplate.validation.validate import observer_of
 

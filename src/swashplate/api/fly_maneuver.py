@@ -19,7 +19,8 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.flight_page import compose_flight
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
-from swashplate.simulation.closed_loop import Controller, simulate_maneuver
+from swashplate.simulation.closed_loop import simulate_maneuver
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.sensors import QUIET, Sensors, observe
 from swashplate.simulation.trim import Trim
 

@@ -26,11 +26,10 @@ from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import dispatch_in_line
 from swashplate.simulation.record import monitored
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
-from swashplate.simulation.stepping import MakeEngine, SteppingEngine, XlaEngine
+from swashplate.simulation.stepping import MakeEngine, SteppingEngine, VirtualEngine
 from swashplate.simulation.trim import Trim
 
 if TYPE_CHECKING:
@@ -107,7 +106,6 @@ def mapping_of(vehicle: Vehicle, servos: str | Path | None, *, name: str | None,
 def _own_process() -> None:
     if threading.current_thread() is threading.main_thread():  # started in a shell's background it would be ignored
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    dispatch_in_line()
 
 
 def link_ardupilot(
@@ -312,7 +310,7 @@ def _plant(asked: _Asked, suffix: Literal["", "_px4"], notice: Say) -> tuple[Pla
 
 
 def link_engine(notice: Say) -> MakeEngine:
-    """The vehicle's own C where this machine can compile it, which is quicker; XLA elsewhere."""
+    """The vehicle's own C where this machine can compile it, which is quicker; the virtual machine elsewhere."""
     from swashplate.compiled import can_compile
     from swashplate.export.stepping_c import CompiledEngine
 
@@ -321,8 +319,8 @@ def link_engine(notice: Say) -> MakeEngine:
             try:
                 return CompiledEngine(moved, environment)
             except (SwashError, OSError) as error:  # a compiler without headers, a folder that nothing runs from
-                notice(f"The vehicle's C cannot be used here, JAX steps instead: {error}")
-        return XlaEngine(moved, environment)
+                notice(f"The vehicle's C cannot be used here, a slower virtual machine steps instead: {error}")
+        return VirtualEngine(moved, environment)
 
     return make
 

@@ -10,8 +10,7 @@ from swashplate.control.controller_file import read_controller
 from swashplate.errors import SwashError
 from swashplate.links.live.replay import Replay, as_json
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import Controller
-from swashplate.simulation.compilation import dispatch_in_line, enable_compilation_cache
+from swashplate.simulation.controller import Controller
 
 
 def _silent(_: str) -> None:
@@ -62,8 +61,6 @@ def live(
     place = Path(folder)
     if place.exists() and not place.is_dir():
         raise SwashError("is a file, expected a folder.", where=place, channel="--out")
-    enable_compilation_cache()
-    dispatch_in_line()  # another thread would have to wait for a processor of its own at every step
     chosen = read_controller(controller) if isinstance(controller, str | Path) else controller
     check_page()
     with serving.listen(host, port, allow_remote=allow_remote) as listening:

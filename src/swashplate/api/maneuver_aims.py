@@ -14,7 +14,8 @@ from swashplate.control.kinds import kind_of
 from swashplate.errors import ManeuverError
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
-from swashplate.simulation.closed_loop import Controller, flown_delays
+from swashplate.simulation.closed_loop import flown_delays
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim, trim
 

@@ -19,6 +19,7 @@ from swashplate.control.draws.spread import Limits, Spread, spread
 from swashplate.control.draws.variations import draw_delays, draw_numbers, load_them, tolerances_of
 from swashplate.control.kinds import kind_of
 from swashplate.control.lateness import lateness
+from swashplate.engine.law import REFERENCES
 from swashplate.errors import DivergenceError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
@@ -30,8 +31,8 @@ from swashplate.reporting.monte_carlo import compose_monte_carlo
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
 from swashplate.simulation.batch import Batch
-from swashplate.simulation.closed_loop import REFERENCES, Controller
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim, trim
 from swashplate.simulation.wind import Gusts, dryden
 

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, Literal
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
+from swashplate.engine.c_text import Precision as Digits
+from swashplate.engine.card import fly_on_card
+from swashplate.engine.equations import SURROUNDINGS, parameter_row
+from swashplate.engine.fly import FlightPlan, fly
 from swashplate.errors import CardError, FlightError, SwashError
-from swashplate.jax_on_demand import jax
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.batch import Batch, FlyBatch, Precision, fly_batch
+from swashplate.simulation.batch import Batch, Precision
 from swashplate.simulation.driving import Interpolation
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
-
-Engine = Literal["auto", "c", "jax"]
 
 
 def simulate_batch(
@@ -35,8 +33,7 @@ def simulate_batch(
     delays: Delays = None,
     keep: int = 1,
     precision: Precision = "float64",
-    engine: Engine = "auto",
-    notice: Callable[[str], None] = print,
+    card: bool = False,
 ) -> Batch:
     """Fly many vehicles of one kind at once; agrees with `simulate` to 1e-11 in float64.
 
@@ -52,15 +49,13 @@ def simulate_batch(
         delays: as in `simulate`.
         keep: every how many steps a sample is kept (memory: 8 x 18 bytes per sample and vehicle).
         precision: "float32" is faster and loses about nine digits.
-        engine: "c" is the vehicle's own C, compiled in seconds and five times as fast as "jax" (decision 59); "auto"
-            takes C where it can be had and vehicles fly on a processor.
-        notice: where a line goes that says why "auto" did not take C.
+        card: fly on a graphics card, by JAX (extra `cuda`); held inputs only.
 
     Raises:
         CardError, FlightError, SwashError: for what does not fit the vehicle, or is not told.
-        ExportError: for "c" where there is no compiler or no C of the equations.
+        ExportError: for equations that cannot be traced.
+        MissingLibraryError: for a card, without JAX.
     """
-    enable_double_precision()
     surroundings = surroundings_of_start(vehicle, start, environment)
     numbers = {name: np.asarray(values, dtype=np.float64) for name, values in (parameters or {}).items()}
     for name in numbers:
@@ -84,32 +79,12 @@ def simulate_batch(
         if values.ndim:
             x0[vehicle.index(name)] = values
 
-    dtype = np.dtype(precision)
     acting = acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first)
-    arguments = (np.asarray(values, dtype) for values in (x0, acting, p, 1.0 / rate))
-    fly = batch_engine(engine, notice)
-    later = fly(equations_of(vehicle), *arguments, keep=keep, held=interpolation == "held")
+    plan = FlightPlan(x0, p, acting, 1.0 / rate, keep=keep, held=interpolation == "held")
+    digits: Digits = "double" if precision == "float64" else "single"
+    later = fly_on_card(vehicle, plan, precision=digits) if card else fly(vehicle, plan, precision=digits)[0]
     kept = np.arange(0, steps + 1, keep)
-    return Batch(vehicle, kept / rate, np.asarray(later)[: kept.size], rows[kept])
-
-
-def batch_engine(engine: Engine, notice: Callable[[str], None]) -> FlyBatch:
-    """What flies a batch; arguments as in `simulate_batch`."""
-    if engine == "jax" or (engine == "auto" and jax.default_backend() != "cpu"):
-        return fly_batch
-    from swashplate.export.batch_c import fly_in_c
-
-    if engine == "c":
-        return fly_in_c
-
-    def fly(equations: Equations, *tables: Any, keep: int, held: bool) -> NDArray[Any]:
-        try:
-            return fly_in_c(equations, *tables, keep=keep, held=held)
-        except (SwashError, OSError) as error:  # no compiler, one without headers, equations that are no C
-            notice(f"The vehicles' C cannot be used here, JAX flies them five times slower: {error}")
-        return fly_batch(equations, *tables, keep=keep, held=held)
-
-    return fly
+    return Batch(vehicle, kept / rate, later, rows[kept])
 
 
 def _series(

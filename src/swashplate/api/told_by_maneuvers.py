@@ -17,7 +17,8 @@ from swashplate.flights.maneuvers.composed import ComposedMultisine, composed
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.identification.design.information import DELAY_SIGMA, Sensed, bounds_from, line_information
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import Controller, simulate_maneuver
+from swashplate.simulation.closed_loop import simulate_maneuver
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 
 _PROBE = 0.2

@@ -10,7 +10,7 @@ from swashplate import documents
 from swashplate.atomic import write_text
 from swashplate.control.kinds import CONTROLLERS, kind_of
 from swashplate.errors import ControllerError
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 
 
 def save_controller(controller: Controller, path: str | Path) -> None:

@@ -1,6 +1,6 @@
 """Kinds of controllers: what each can be asked beside its step, found by the `type` of its file.
 
-A controller itself is small (`swashplate.simulation.closed_loop.Controller`): a rate, a memory, gains, a step. Its kind
+A controller itself is small (`swashplate.simulation.controller.Controller`): a rate, a memory, a step. Its kind
 knows how it becomes a file, how it is taken to another vehicle, which loop is judged, and how its step becomes C. A
 controller says its kind by an attribute `type`; one that says none is of the plain kind. Another package adds a kind by
 an entry point of the group `swashplate.controllers` that names an instance of a `ControllerKind`.
@@ -11,15 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-import numpy as np
-
-from swashplate.arrays import Array
 from swashplate.control.analysis.judged_loop import Aircraft, JudgedLoop, judged_with_states
 from swashplate.control.analysis.margins import Margins
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 
 C = TypeVar("C", bound=Controller)
@@ -100,29 +97,7 @@ class ControllerKind(Generic[C]):
         Raises:
             ControllerError: where its step cannot be printed as C.
         """
-        raise ControllerError("has no C: its step is written for JAX only.", where=type(controller).__name__)
-
-    def flown(self, controller: C) -> TracedStep:
-        """One step as a simulation calls it: `measured` names states of the vehicle, "voltage" and, where it has
-        sensors of its own, the specific force (`FELT`) and its `draws`.
-
-        Raises:
-            ControllerError: where its step cannot be printed as C.
-        """
-        return self.traced(controller)
-
-    def draws(self, controller: C, samples: int) -> Array:
-        """What its sensors draw for each of its samples, shape (samples, draws)."""
-        return np.zeros((samples, 0))
-
-
-FELT = ("felt_x", "felt_y", "felt_z")
-"""The specific force at the centre of gravity among what a simulation tells a controller [m/s^2]."""
-
-
-def draw_names(count: int) -> tuple[str, ...]:
-    """The draws of one sample among what a simulation tells a controller."""
-    return tuple(f"draw_{k}" for k in range(count))
+        raise ControllerError("has no C of its own yet.", where=type(controller).__name__)
 
 
 PLAIN: ControllerKind[Any] = ControllerKind()
@@ -142,5 +117,4 @@ CONTROLLERS: Registry[ControllerKind[Any]] = Registry(
 
 def kind_of(controller: Controller) -> ControllerKind[Any]:
     """The kind of a controller, by its `type`."""
-    name = getattr(controller, "type", None)
-    return PLAIN if name is None else CONTROLLERS[name]
+    return CONTROLLERS[controller.type] if controller.type else PLAIN

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 
 
 def lateness(vehicle: Vehicle, controller: Controller | None, *, given: Mapping[str, float] | float | None) -> str:
@@ -29,12 +29,12 @@ def _further(
     vehicle: Vehicle, controller: Controller | None, *, given: Mapping[str, float] | float | None, inside: str
 ) -> str:
     """What is late beside what the equations delay."""
-    known, believed = input_delays(vehicle), dict(getattr(controller, "delays", {}))
+    known, believed = input_delays(vehicle), {} if controller is None else dict(controller.delays)
     if given is not None:
         late, whose = complete_delays(vehicle, given), "as given"
         if any(known.get(name, 0.0) > value + 1e-4 for name, value in late.items()):
             whose += f"; Careful: identified were {_listed(known)}"
-    elif getattr(controller, "at_once", False):
+    elif controller is not None and controller.at_once:
         left = f"; the identified {_listed(known)} are left out" if any(known.values()) else ""
         return f"nothing: the hold acts at once{left}"
     elif known:

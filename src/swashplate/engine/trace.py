@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import Any
+
 from swashplate.engine.equations import Equations, unpack_rows
 from swashplate.engine.roots import Looped, Looping, require_casadi
 from swashplate.errors import ExportError
+from swashplate.models.nesting import rebuild
+from swashplate.physics.backend import CasadiBackend
+from swashplate.physics.quaternion import Quaternion, euler_of
 
 
 def traced_rates(equations: Equations) -> Looped:
@@ -20,5 +26,43 @@ def traced_rates(equations: Equations) -> Looped:
     looping = Looping(casadi)
     try:
         return looping.looped([x, w, p], [casadi.vertcat(*vehicle.rates(x, *unpack_rows(equations, w, p), looping))])
+    except Exception as error:  # whatever a model of another package does with numbers that are none
+        raise ExportError(f"CasADi cannot trace the equations: {error}", where=vehicle.name) from error
+
+
+def traced_force(equations: Equations) -> Any:
+    """The specific force [m/s^2] as a CasADi function of (x, w, p); rows as in `traced_rates`."""
+    casadi, vehicle = require_casadi(), equations.vehicle
+    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
+    x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
+    u, parameters, environment = unpack_rows(equations, w, p)
+    state = rebuild(vehicle.state, [x[i] for i in range(sizes[0])])
+    commands = vehicle.inputs(*(u[i] for i in range(len(vehicle.input_names))))
+    felt = vehicle.specific_force(state, commands, parameters, environment, CasadiBackend())
+    return casadi.Function("felt", [x, w, p], [casadi.densify(casadi.vertcat(*felt))], {"cse": True})
+
+
+def traced_angles() -> Any:
+    """Roll, pitch and yaw [rad] as a CasADi function of a quaternion."""
+    casadi = require_casadi()
+    q = casadi.SX.sym("q", 4)
+    angles = euler_of(Quaternion(*(q[i] for i in range(4))), CasadiBackend())
+    return casadi.Function("angles", [q], [casadi.vertcat(*angles)], {"cse": True})
+
+
+@lru_cache(maxsize=32)
+def unrolled_rates(equations: Equations) -> Any:
+    """The rates as a CasADi function of (x, w, p), with roots sought in a fixed number of steps.
+
+    Raises:
+        ExportError: for equations that CasADi cannot trace.
+        MissingLibraryError: without CasADi.
+    """
+    casadi, vehicle = require_casadi(), equations.vehicle
+    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
+    x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
+    try:
+        rates = vehicle.rates(x, *unpack_rows(equations, w, p), CasadiBackend())
+        return casadi.Function("rates", [x, w, p], [casadi.densify(casadi.vertcat(*rates))], {"cse": True})
     except Exception as error:  # whatever a model of another package does with numbers that are none
         raise ExportError(f"CasADi cannot trace the equations: {error}", where=vehicle.name) from error

@@ -6,21 +6,18 @@ sin, cos, sqrt and atan2 are called. Needs the extra `model`.
 
 from __future__ import annotations
 
-import re
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from swashplate.atomic import scratch_folder, write_text
+from swashplate.atomic import write_text
 from swashplate.control.kinds import TracedStep, kind_of
+from swashplate.engine.law import REFERENCES, print_function
 from swashplate.extras import library
-from swashplate.simulation.closed_loop import REFERENCES, Controller
+from swashplate.simulation.controller import Controller
 
 Precision = Literal["double", "float"]
-
-_OWN = {"fmax(x, y)": "x > y ? x : y", "fmin(x, y)": "x < y ? x : y", "fabs(x)": "x > 0 ? x : -x"}
-"""What CasADi takes from the C library, written out."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
     library("casadi", what="C code")
     traced = kind_of(controller).traced(controller)
     function = traced.function
-    printed, calls = printed_function(function, precision)
+    printed, calls = print_function(function, precision)
     size = 8 if precision == "double" else 4
     return ControllerCode(
         source=_heading(controller, traced, precision) + printed + _ending(traced, precision),
@@ -73,23 +70,6 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
         memory_bytes=len(traced.start) * size,
         precision=precision,
     )
-
-
-def printed_function(function: Any, precision: Precision) -> tuple[str, dict[str, int]]:
-    """A CasADi function as C without its heading, and calls of the C library by name, as they stand in it."""
-    import casadi
-
-    with scratch_folder() as folder:
-        made = casadi.CodeGenerator("traced.c", {"casadi_real": precision, "casadi_int": "int"})
-        made.add(function)
-        printed = Path(made.generate(f"{folder}/")).read_text(encoding="utf-8")
-    calls = {name: len(re.findall(rf"(?<![\w]){name}\(", printed)) for name in ("sin", "cos", "sqrt", "atan2")}
-    for name, own in _OWN.items():
-        printed = printed.replace(f"return {name};", f"return {own};")
-    if precision == "float":  # no constant and no function may lift the arithmetic to double
-        printed = re.sub(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?)(?![\w.])", r"\1f", printed)
-        printed = re.sub(r"(?<![\w])(sin|cos|sqrt|atan2)\(", r"\1f(", printed)
-    return printed, {name: count for name, count in calls.items() if count}
 
 
 def operations_of(function: Any) -> int:
@@ -127,7 +107,7 @@ def _heading(controller: Controller, traced: TracedStep, precision: Precision) -
 
 def _late(controller: Controller) -> str:
     """From reading to action, as it was designed for."""
-    waits = ", ".join(f"{n} {1e3 * d:g} ms" for n, d in getattr(controller, "delays", {}).items() if d)
+    waits = ", ".join(f"{n} {1e3 * d:g} ms" for n, d in controller.delays.items() if d)
     return f"{waits}, computation included" if waits else "designed for commands that act at once"
 
 

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.control.lqg.traced import CasadiMatrices
 from swashplate.engine.c_text import identifier, words
-from swashplate.export.controller_c import operations_of, printed_function
+from swashplate.engine.law import print_function
+from swashplate.export.controller_c import operations_of
 from swashplate.export.regression_c import CYCLES
 from swashplate.extras import library
 from swashplate.filtering import observer
+from swashplate.filtering.matrix_operations import CasadiMatrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate
 from swashplate.identification.recursive.fourier_regression import EARLY, LATE
 from swashplate.identification.recursive.slow_parameters import SlowPlan
@@ -63,7 +64,7 @@ def slow_parameters_code(plan: SlowPlan, *, name: str = "slow") -> SlowCode:
     library("casadi", what="C code")
     own, called = plan.observer, identifier(name)
     function, slopes, seen = _traced(plan)
-    printed, _ = printed_function(function, "double")
+    printed, _ = print_function(function, "double")
     N, m, depth = len(own.names), own.inputs + 1, 1 + max(own.delays)
     sizes = {"ESTIMATED": N, "INPUTS": m, "CHANNELS": len(own.channels), "SENSORS": len(own.sensors), "DEPTH": depth}
     sizes |= {"MOVES": own.moves, "SLOPES": len(slopes), "SEEN": len(seen), "TERMS": _TERMS}

@@ -1,4 +1,4 @@
-"""The few matrix operations of the observer, for JAX here and for CasADi in `swashplate.export`.
+"""The few matrix operations of the observer, for JAX and for CasADi.
 
 The observer is written once, on columns (n, 1) and matrices with `@`, `.T`, `*`, `+` and slices, which both have; what
 they write differently is here.
@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
+import numpy as np
+
 from swashplate.jax_on_demand import jax, jnp
-from swashplate.physics.backend import Backend
+from swashplate.physics.backend import Backend, CasadiBackend
 from swashplate.simulation.dynamics import jax_backend
 from swashplate.simulation.runge_kutta import rk4_change
 
@@ -85,3 +87,54 @@ class JaxMatrices:
     def diagonal(self, values: Any, /) -> Any:
         """A matrix of a row's values."""
         return jnp.eye(len(values)) * values
+
+
+class CasadiMatrices:
+    """The observer's matrix operations as CasADi expressions."""
+
+    looped = False
+
+    def __init__(self) -> None:
+        self.xp: Backend = CasadiBackend()
+        self._made: dict[Any, Any] = {}
+
+    def column(self, scalars: Sequence[Any], /) -> Any:
+        import casadi
+
+        return casadi.vertcat(*scalars)
+
+    def scalars(self, column: Any, /) -> list[Any]:
+        return [column[i] for i in range(column.shape[0])]
+
+    def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
+        """Without the slopes, which a call would compute all the same."""
+        import casadi
+
+        key = (f.__code__, x.shape[0], w.shape[0], "value")
+        if key not in self._made:
+            xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
+            outputs = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
+            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [outputs])
+        return self._made[key](x, w)
+
+    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
+        """Traced once per place in the program: the four stages of a Runge-Kutta step call one function."""
+        import casadi
+
+        key = (f.__code__, x.shape[0], w.shape[0])
+        if key not in self._made:
+            xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
+            outputs = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
+            slopes = casadi.jacobian(outputs, xs)
+            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [outputs, slopes])
+        return tuple(self._made[key](x, w))
+
+    def stacked(self, parts: Sequence[Any], /) -> Any:
+        import casadi
+
+        return casadi.vertcat(*parts)
+
+    def diagonal(self, values: Any, /) -> Any:
+        import casadi
+
+        return casadi.diag(casadi.DM(np.asarray(values)))

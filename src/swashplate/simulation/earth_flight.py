@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
+from swashplate.engine.tumbling import Tumbling, TumblingBody, tumbling
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.atmosphere import density_at
 from swashplate.physics.backend import Backend, FloatBackend, Scalar
@@ -28,7 +29,6 @@ from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local
 from swashplate.physics.quaternion import Quaternion, quaternion_rates
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.tumbling import Tumbling, TumblingBody, tumbling
 
 PLACES = {"latitude": "deg", "longitude": "deg", "altitude": "m"}
 """Channels of a flight over the Earth beside the vehicle's own, with their units."""

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import CardError, SwashError
-from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
@@ -23,12 +21,6 @@ Delays = Mapping[str, float] | float | None
 def steps_late(delays: Array, rate: float) -> NDArray[np.int_]:
     """Delays [s] in steps of a simulation at `rate` [Hz], rounded up: no command acts before it can."""
     return np.asarray(np.ceil(np.asarray(delays) * rate - 1e-6), dtype=np.int_)
-
-
-def quantised(command: Float[jax.Array, ...], quantum: Float[jax.Array, ...]) -> Float[jax.Array, ...]:
-    """A command in whole steps of `quantum`, to the nearest; as it is where that is zero."""
-    step = jnp.where(quantum > 0.0, quantum, 1.0)
-    return jnp.where(quantum > 0.0, step * jnp.round(command / step), command)
 
 
 def quantum_of(limits: Array, bits: int | None) -> Array:

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
-from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row, unpack_rows
 from swashplate.errors import SwashError
 from swashplate.flights.conditioning.resample import values_at
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.schema import POSITION, QUATERNION, RATES
-from swashplate.jax_on_demand import jax, jit
+from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import row_force
 
 
 @dataclass(frozen=True)
@@ -181,11 +180,8 @@ def specific_forces(flight: Flight, vehicle: Vehicle, *, environment: Environmen
     """What accelerometers at the centre of gravity read along a simulated flight [m/s^2], shape (n, 3)."""
     states = flight.array(vehicle.state_names)
     rows = flight.array((*vehicle.input_names, *SURROUNDINGS))
-    p = parameter_row(vehicle, environment or Environment())
-    return np.asarray(_specific_forces(equations_of(vehicle), states, rows, p))
-
-
-@jit(static_argnums=0)
-def _specific_forces(equations: Equations, states: Array, rows: Array, p: Array) -> Any:
-    felt = row_force(equations)
-    return jax.vmap(lambda x, w: felt(x, w, p))(states, rows)
+    numbers = parameter_row(vehicle, environment or Environment())
+    u, parameters, around = unpack_rows(equations_of(vehicle), rows.T, numbers)
+    state = rebuild(vehicle.state, list(states.T))
+    felt = vehicle.specific_force(state, vehicle.inputs(*u), parameters, around, ArrayBackend())
+    return np.stack([np.broadcast_to(part, len(states)) for part in felt], axis=1)

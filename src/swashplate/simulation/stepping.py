@@ -1,8 +1,4 @@
-"""One vehicle stepped from outside, a compiled call a step: for programs that wait for every answer.
-
-Dispatch is what such a step costs, so all that changes goes in as one row, all that is wanted comes out as one row, and
-nothing is left outside the loop: XLA hoists what does not change in it into some hundred kernels of their own, unless a
-barrier holds it (measured on two cores: 170 us a step with them, 23 us without, 9 us of it the bare call).
+"""One vehicle stepped from outside, a call a step: for programs that wait for every answer.
 
 Attitude is carried as a quaternion (`tumbling`): what an autopilot or a hand does may end upside down.
 """
@@ -11,26 +7,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from jaxtyping import Float
 
 from swashplate.arrays import Array
-from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
+from swashplate.engine.trace import unrolled_rates
+from swashplate.engine.tumbling import TumblingBody, counted_on, from_euler, seen, tumbling
+from swashplate.engine.virtual import rk4_graph
 from swashplate.errors import DivergenceError
-from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, FloatBackend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector, body_to_local
 from swashplate.physics.rigid_body import RigidBody, gravity
-from swashplate.simulation.compilation import QUICK_FLIGHT
-from swashplate.simulation.dynamics import enable_double_precision, row_rates
-from swashplate.simulation.runge_kutta import rk4_and_slope
-from swashplate.simulation.tumbling import TumblingBody, counted_on, from_euler, seen, tumbling
 
 LONGEST_STEP = 5e-4
 """s, of one Runge-Kutta step: skids on the ground are the stiffest part (friction of a light body: 1/1400 s)."""
@@ -58,7 +50,7 @@ class Motion(NamedTuple):
 
 
 class SteppingEngine(Protocol):
-    """What moves a state row of `tumbling`: compiled by XLA here, or C (`export.stepping_c`)."""
+    """What moves a state row of `tumbling`: by a virtual machine here, or C (`export.stepping_c`)."""
 
     def place(self, row: Array) -> None:
         """Put the vehicle into a state row of `tumbling`, shape (n_states + 1,)."""
@@ -82,7 +74,7 @@ class Stepping:
         vehicle: what moves; from `standing` where it may touch the ground.
         state: its state row at the start.
         environment: air and gravity, and wind and voltage at the start.
-        engine: makes what moves it; None for XLA.
+        engine: makes what moves it; None for the virtual machine.
     """
 
     def __init__(
@@ -90,7 +82,7 @@ class Stepping:
     ) -> None:
         self.vehicle = vehicle
         around = environment_of(vehicle, environment)
-        self._engine: SteppingEngine = (engine or XlaEngine)(tumbling(vehicle), around)
+        self._engine: SteppingEngine = (engine or VirtualEngine)(tumbling(vehicle), around)
         self._n = len(vehicle.state_names)
         self._around = np.array([getattr(around, name) for name in SURROUNDINGS])
         self._limits = [(float(low), float(high)) for low, high in vehicle.input_limits]
@@ -132,24 +124,25 @@ class Stepping:
         return Motion(RigidBody._make(body), Vector._make(velocity), Vector._make(force), self._last)
 
 
-class XlaEngine:
-    """Steps compiled by XLA, a call a frame."""
+class VirtualEngine:
+    """Steps by CasADi's virtual machine: where there is no compiler."""
 
     def __init__(self, moved: Vehicle, environment: Environment) -> None:
-        enable_double_precision()
-        self._advance = _compiled(equations_of(moved))
-        self._parameters = jax.device_put(parameter_row(moved, environment))
+        equations = equations_of(moved)
+        self._step, self._rates = rk4_graph(equations), unrolled_rates(equations)
+        self._parameters = parameter_row(moved, environment)
         self._gravity = float(environment.gravity)
 
     def place(self, row: Array) -> None:
-        self._state = jax.device_put(row)
+        self._state = row
 
     def advance(self, inputs: Sequence[float], around: Array, step: float, steps: int) -> list[float]:
-        row = np.concatenate([inputs, around, (step, float(steps))])
-        self._state, told = self._advance(self._state, row, self._parameters)
-        numbers = np.asarray(told).tolist()
-        n = len(numbers) // 2
-        return motion_row(numbers[:n], numbers[n:], self._gravity, _FLOATS)
+        w = np.concatenate([inputs, around])
+        for _ in range(steps):
+            self._state = self._step(self._state, w, w, w, self._parameters, step)
+        rates = self._rates(self._state, w, self._parameters)
+        states, changes = (np.asarray(column, dtype=np.float64).ravel().tolist() for column in (self._state, rates))
+        return motion_row(states, changes, self._gravity, _FLOATS)
 
 
 def motion_row(states: Sequence[Scalar], rates: Sequence[Scalar], g: Scalar, xp: Backend) -> list[Scalar]:
@@ -175,22 +168,3 @@ def at_standstill(states: Array | Sequence[float], g: float) -> Motion:
     body = RigidBody._make(row[: len(RigidBody._fields)])
     weight = gravity(1.0, g, body.attitude, _FLOATS).scaled(-1.0)
     return Motion(body, Vector(0.0, 0.0, 0.0), weight, row)
-
-
-@lru_cache(maxsize=16)
-def _compiled(equations: Equations) -> Any:
-    return jax.jit(partial(_advance, equations), donate_argnums=0, compiler_options=QUICK_FLIGHT)
-
-
-def _advance(
-    equations: Equations,
-    x: Float[jax.Array, " states"],
-    row: Float[jax.Array, " row"],
-    p: Float[jax.Array, " parameters"],
-) -> tuple[Any, Any]:
-    """Steps of Runge-Kutta under held inputs: the state row, and it again with its derivative behind it."""
-    rates = row_rates(equations, padded=True)
-    w, h, steps = row[:-2], row[-2], row[-1].astype(jnp.int32)
-    barrier: Any = jax.lax.optimization_barrier
-    x, slope = rk4_and_slope(lambda x: rates(*barrier((x, w, p))), x, h, steps)
-    return x, jnp.concatenate([x, slope])

@@ -64,7 +64,7 @@ def test_pulses_of_the_dual_frame_are_the_pitches_that_were_meant() -> None:
     assert made.inputs([*pulses[:7], 1000], 0.5)[4] == 0.0
     # The rebuilt law's mixer says the same of the same commands.
     hover = sp.trim(COAXIAL)
-    mixed = mixer_of(made, COAXIAL, hover).mix(np.array([0.2, 0.1, 0.5, 0.5]), {"H_CYC_MAX": 2500.0})
+    mixed = mixer_of(made, COAXIAL, hover).mix(np.array([0.2, 0.1, 0.5, 0.5]), {"H_CYC_MAX": 2500.0}, np)
     np.testing.assert_allclose(np.asarray(mixed.inputs)[:4], [theta0, B1, A1, theta0d], atol=1e-7)
 
 

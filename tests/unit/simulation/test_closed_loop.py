@@ -10,17 +10,10 @@ from swashplate.control.laws.hold import hover_hold
 from swashplate.errors import SwashError
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation import closed_loop
 from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.sensors import QUIET, InertialUnit, MotionCapture, Sensors, observe, specific_forces
 from swashplate.simulation.trim import trim
-
-
-@pytest.fixture(autouse=True)
-def one_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Flights of every length here are compiled once: samples too many are cut off."""
-    monkeypatch.setattr(closed_loop, "shared_length", lambda n: 8192)
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +46,7 @@ def test_a_rate_that_is_no_multiple_of_the_controllers_is_refused(coax: Vehicle)
         simulate_closed_loop(coax, hover_hold(coax, trim(coax), rate=30.0), duration=1.0)
 
 
-@pytest.mark.proof
 def test_the_controller_runs_at_its_own_rate(coax: Vehicle) -> None:
-    """In short: `test_shared_lengths`."""
     controller = hover_hold(coax, trim(coax), rate=25.0)
     flight = simulate_closed_loop(coax, controller, duration=3.0, start={"phi": 0.1})
     command = flight.values("servo_roll")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.engine.equations import equations_of, parameter_row
 from swashplate.physics.backend import JaxBackend
 from swashplate.simulation import dynamics
 from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
@@ -49,7 +50,7 @@ def test_slopes_of_a_vehicle_are_those_that_xla_compiles() -> None:
     hover = sp.trim(coax)
     x = hover.state + np.random.default_rng(0).normal(scale=1e-2, size=hover.state.size)
     w = np.array([*hover.inputs, 0.5, 0.0, -0.2, hover.environment.voltage])
-    rows = dynamics.equations_of(coax), x, w, dynamics.parameter_row(coax, hover.environment)
+    rows = equations_of(coax), x, w, parameter_row(coax, hover.environment)
     for own, expected in zip(dynamics.rates_and_slopes(*rows), dynamics._compiled_slopes(*rows), strict=True):
         np.testing.assert_allclose(own, expected, rtol=1e-12, atol=1e-14 * np.max(np.abs(expected)))
 
@@ -63,7 +64,7 @@ def test_equations_with_sums_over_arrays_go_to_xla(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(dynamics, "_compiled_slopes", lambda *rows: asked.append(rows) or (np.zeros(1),) * 3)
     coax = sp.vehicle("coax")
     row = np.zeros(3)
-    assert len(dynamics.rates_and_slopes(dynamics.equations_of(coax), row, row, row)) == 3
+    assert len(dynamics.rates_and_slopes(equations_of(coax), row, row, row)) == 3
     assert len(asked) == 1
     assert TypeError in CANNOT
 

@@ -19,6 +19,7 @@ import swashplate as sp
 from exported import compiled
 from swashplate.compiler import compiler
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
+from swashplate.engine.tumbling import from_euler, to_euler, tumbling
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced, trace_vehicle
 from swashplate.links.live import world
@@ -26,7 +27,6 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.standing import at_rest, standing
 from swashplate.simulation.stepping import LONGEST_STEP
-from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
 
 DT = 0.01
 Flown = Callable[[Vehicle, np.ndarray, Path], np.ndarray]

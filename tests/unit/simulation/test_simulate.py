@@ -5,23 +5,21 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
-import jax
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from swashplate.api.simulate_batch import simulate_batch
 from swashplate.arrays import Array
-from swashplate.engine.equations import equations_of
+from swashplate.engine import fly as engine_fly
+from swashplate.engine.equations import Equations, equations_of
 from swashplate.errors import DivergenceError, FlightError, SwashError, TrimError
 from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation import trigonometry
-from swashplate.simulation.batch import BLOCK
-from swashplate.simulation.integrate import simulate, trajectory
+from swashplate.simulation.integrate import simulate
 from swashplate.simulation.sensors import Sensors
 from swashplate.simulation.trim import trim
 
@@ -113,18 +111,12 @@ def test_the_same_call_gives_the_same_bits(coax: Vehicle) -> None:
         simulate(coax, inputs, sensors=Sensors())
 
 
-@pytest.mark.parametrize(
-    ("interpolation", "engine"),
-    [
-        ("held", "c"),
-        *(pytest.param(*e, marks=pytest.mark.proof) for e in (("held", "jax"), ("linear", "c"), ("linear", "jax"))),
-    ],
-)
-def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str, engine: str) -> None:
+@pytest.mark.parametrize("interpolation", ["held", "linear"])
+def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str) -> None:
     """To 1e-11 of each state's largest value, over two seconds and with other masses and starts."""
     inputs, masses, rolls = excited(coax, 201), np.array([0.302, 0.31, 0.333]), np.array([0.0, 0.1, -0.1])
     varied = {"parameters": {"mass": masses}, "start": {"phi": rolls}}
-    batch = simulate_batch(coax, inputs, **varied, interpolation=interpolation, engine=engine)
+    batch = simulate_batch(coax, inputs, **varied, interpolation=interpolation)
     for i in range(3):
         start = {"phi": float(rolls[i])}
         hover = {name: value for name, value in trim(coax).states().items() if name != "phi"}
@@ -136,19 +128,6 @@ def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str, eng
         assert apart.max() < 1e-11
 
 
-@pytest.mark.proof
-def test_a_batch_in_blocks_is_the_batch(coax: Vehicle) -> None:
-    """More vehicles than a block holds, kept every tenth step, inputs of their own."""
-    count = BLOCK + 3
-    inputs = {**trim(coax).commands(), "servo_roll": np.linspace(-0.1, 0.1, count) * np.ones((11, 1))}
-    batch = simulate_batch(coax, inputs, keep=10, engine="jax")
-    assert batch.states.shape == (2, 18, count)
-    some = [0, BLOCK - 1, -1]  # of the first block and of the rest, as many as the rest so that nothing more compiles
-    few = simulate_batch(coax, {**inputs, "servo_roll": inputs["servo_roll"][:, some]}, keep=10, engine="jax")
-    np.testing.assert_allclose(batch.states[:, :, some], few.states, atol=1e-13)
-    assert len(batch) == count
-
-
 def test_single_precision_is_near(coax: Vehicle) -> None:
     inputs, masses = excited(coax, 201), {"mass": np.array([0.302, 0.31, 0.333])}
     double, single = (
@@ -158,36 +137,18 @@ def test_single_precision_is_near(coax: Vehicle) -> None:
     assert 0.0 < np.max(np.abs(double["theta"] - single["theta"])[:101]) < 1e-5
 
 
-@pytest.mark.parametrize(("kind", "tolerance"), [("float64", 3e-16), ("float32", 2e-7)])
-def test_polynomial_trigonometry(kind: str, tolerance: float) -> None:
-    angles = np.linspace(-50.0, 50.0, 20_001).astype(kind)
-    exact = angles.astype(np.longdouble)
-    sine, cosine, tangent = (
-        np.asarray(jax.jit(f)(angles)) for f in (trigonometry.sin, trigonometry.cos, trigonometry.tan)
-    )
-    assert np.max(np.abs(sine - np.sin(exact))) < tolerance
-    assert np.max(np.abs(cosine - np.cos(exact))) < tolerance
-    near = np.abs(np.cos(exact)) > 0.3
-    apart = np.abs(tangent - np.tan(exact)) / (1.0 + np.tan(exact) ** 2)
-    assert np.max(apart[near]) < 4.0 * tolerance
-
-
-def test_another_card_does_not_compile_again(coax: Vehicle) -> None:
+def test_another_card_compiles_nothing(coax: Vehicle, monkeypatch: pytest.MonkeyPatch) -> None:
     inputs = excited(coax, 201)
     simulate(coax, inputs)
-    compiled = trajectory._cache_size()
+    asked: list[Equations] = []
+    flight_code = engine_fly.flight_code
+    monkeypatch.setattr(engine_fly, "flight_code", lambda e, *a, **k: (asked.append(e), flight_code(e, *a, **k))[1])
     simulate(vehicle("coax").with_values({"mass": 0.333}), inputs)
-    assert trajectory._cache_size() == compiled
-    assert equations_of(vehicle("coax", mixing="as_printed")) != equations_of(coax)  # what is compiled anew
-
-
-@pytest.mark.proof
-def test_another_option_compiles_again(coax: Vehicle) -> None:
-    inputs = excited(coax, 201)
-    simulate(coax, inputs)
-    compiled = trajectory._cache_size()
+    assert not asked
+    engine_fly._open_program.cache_clear()
     simulate(vehicle("coax", mixing="as_printed"), inputs)
-    assert trajectory._cache_size() == compiled + 1
+    assert asked
+    assert equations_of(vehicle("coax", mixing="as_printed")) != equations_of(coax)
 
 
 def test_a_flight_drives_its_own_simulation(coax: Vehicle) -> None:

@@ -14,16 +14,16 @@ import swashplate as sp
 from heli_autopilot import servo_packet
 from link_bench import QUICK, bench
 from swashplate.control.laws.hold import hover_hold
+from swashplate.engine import fly as engine_fly
+from swashplate.engine.tumbling import from_euler, to_euler
 from swashplate.models.catalogue import vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, euler_rates
 from swashplate.physics.quaternion import euler_of, quaternion_of, quaternion_rates
-from swashplate.simulation import closed_loop, integrate
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 from swashplate.simulation.stepping import MakeEngine, Stepping
-from swashplate.simulation.tumbling import from_euler, to_euler
 
 FLOATS = FloatBackend()
 ANGLES = slice(6, 9)
@@ -126,7 +126,7 @@ def test_a_simulated_flight_through_the_vertical_is_what_its_gyros_add_up_to(mon
         return float(np.degrees((turned.inv() * Rotation.from_euler("ZYX", attitude[-1, ::-1])).magnitude()))
 
     assert away() < 0.05
-    monkeypatch.setattr(integrate, "steep", lambda states: False)
+    monkeypatch.setattr(engine_fly, "steep_at", lambda pitch: np.zeros(1, dtype=bool))
     assert away() > 5.0
 
 
@@ -148,18 +148,15 @@ def _apart(one: sp.Flight, other: sp.Flight, every: int) -> float:
     return float(np.degrees((first.inv() * second).magnitude()).max())
 
 
-@pytest.mark.proof
 def test_closed_loops_fly_through_the_vertical(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(closed_loop, "shared_length", lambda n: 768)  # programs of one length for both rates
     usual, fine = _thrown(100.0), _thrown(1600.0)
     assert np.abs(usual.values("theta")).max() > np.radians(80.0)
     right = _apart(usual, fine, 16)
     assert right < 0.1
-    monkeypatch.setattr(closed_loop, "steep", lambda states: False)
+    monkeypatch.setattr(engine_fly, "steep_at", lambda pitch: np.zeros(1, dtype=bool))
     assert _apart(_thrown(100.0), fine, 16) > 10.0 * right
 
 
-@pytest.mark.proof
 def test_a_batch_flies_through_the_vertical_as_one_does_and_leaves_the_others_alone() -> None:
     coax = sp.vehicle("coax")
     trim = sp.trim(coax)

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from swashplate.arrays import Array, Complex
 from swashplate.control.laws.ardupilot.filters import HARMONICS
@@ -19,9 +17,7 @@ from swashplate.control.laws.ardupilot.law import GRAVITY
 from swashplate.control.laws.ardupilot.mixers import Mixer
 from swashplate.control.laws.ardupilot.parameters import AXES
 from swashplate.errors import ControllerError
-from swashplate.jax_on_demand import jax, jit
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 
@@ -95,10 +91,9 @@ def cascade_plant(
     return CascadePlant(w, response, effect, 1.0 / rate, delays)
 
 
-@jit(compiler_options=RUN_RARELY)
-def _mixed(mixer: Mixer, wanted: Float[jax.Array, "sets commands"], parameters: dict[str, float]) -> Any:
+def _mixed(mixer: Mixer, wanted: Array, parameters: dict[str, float]) -> Array:
     """Inputs of sets of commands, shape (sets, inputs)."""
-    return jax.vmap(lambda commands: mixer.mix(commands, parameters).inputs)(wanted)
+    return np.stack([np.asarray(mixer.mix(commands, parameters, np).inputs) for commands in wanted])
 
 
 def _one(s: Complex, hertz: Array | float) -> Complex:

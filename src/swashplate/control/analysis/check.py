@@ -29,7 +29,8 @@ from swashplate.control.kinds import kind_of
 from swashplate.errors import ControllerError, IdentificationError, SwashError
 from swashplate.identification.frequency.handling import Handling, delay_words, handling_qualities
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import Controller, FlyLoop, flown_delays
+from swashplate.simulation.closed_loop import flown_delays
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.wind import INDOOR, Gusts
 
@@ -160,7 +161,6 @@ def check_controller(
     computation: float | None = None,
     required_delay: float | None = None,
     points: int = 600,
-    fly: FlyLoop | None = None,
 ) -> ControlCheck:
     """Judge a controller about a trim.
 
@@ -181,7 +181,6 @@ def check_controller(
         required_delay: delay margin that every loop and all together must have [s]; where not given a sample of the
             controller and the computation. Less is a problem.
         points: of the frequency grid.
-        fly: see `swashplate.simulation.closed_loop.simulate_closed_loop`.
 
     Raises:
         SwashError: for a task that is not known, or a vehicle without a rotor radius where no scale is given.
@@ -211,8 +210,8 @@ def check_controller(
     else:
         held = judged.held
     left = {state: judged.sensitivity(w, state) for state in _DISTURBED} if margins else {}
-    steps = fly_steps(flying, controller, held, duration, problems, fly=fly)
-    blown = fly_gusts(flying, controller, gusts, held if margins else (), duration, problems, notes, fly=fly)
+    steps = fly_steps(flying, controller, held, duration, problems)
+    blown = fly_gusts(flying, controller, gusts, held if margins else (), duration, problems, notes)
     commanded = _commanded(loop) if told else []
     check = ControlCheck(
         vehicle=vehicle,

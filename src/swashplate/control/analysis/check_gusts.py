@@ -10,7 +10,8 @@ import numpy as np
 from swashplate.control.analysis.check_steps import LEAD, flying_rate
 from swashplate.control.analysis.judged_loop import Aircraft
 from swashplate.errors import DivergenceError
-from swashplate.simulation.closed_loop import Controller, FlyLoop, simulate_closed_loop
+from swashplate.simulation.closed_loop import simulate_closed_loop
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.wind import Gusts, dryden
 
 FLIGHTS = 4
@@ -48,8 +49,6 @@ def fly_gusts(
     duration: float,
     problems: list[str],
     notes: list[str],
-    *,
-    fly: FlyLoop | None = None,
 ) -> InGusts | None:
     """Fly `FLIGHTS` times in turbulence about a trim.
 
@@ -60,7 +59,6 @@ def fly_gusts(
         duration: of each flight, as long as a step's so that nothing is compiled anew [s].
         problems: a lost flight is told here.
         notes: why there is none.
-        fly: see `simulate_closed_loop`.
     """
     if gusts is None or not held:
         return None
@@ -73,18 +71,16 @@ def fly_gusts(
     start, squares = trim.states(), []
     for seed in range(FLIGHTS):
         wind = {n: series[:, 0] for n, series in dryden(gusts, samples=samples, rate=rate, seed=seed).items()}
-        again = getattr(controller, "starting_at", None)  # a controller with sensors draws other noise
         try:
             flight = simulate_closed_loop(
                 vehicle,
-                controller if again is None else again(trim, seed=seed),
+                controller.with_seed(seed),
                 duration=LEAD + duration,
                 wind=wind,
                 delays=delays,
                 start=trim,
                 rate=rate,
                 environment=trim.environment,
-                fly=fly,
             )
         except DivergenceError as error:
             problems.append(f"A flight in gusts was lost after {error.time:.2f} s ({error.state}).")

@@ -13,7 +13,8 @@ from swashplate.control.analysis.requirements import ATTITUDE_COUPLING
 from swashplate.control.analysis.step_response import StepMetrics, cross_ratio, step_metrics
 from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight
-from swashplate.simulation.closed_loop import Controller, FlyLoop, simulate_closed_loop
+from swashplate.simulation.closed_loop import simulate_closed_loop
+from swashplate.simulation.controller import Controller
 
 STEPS: Mapping[str, tuple[str, str, float]] = {
     "roll": ("phi", "p", 0.1),
@@ -66,8 +67,6 @@ def fly_steps(
     answered: Sequence[str],
     duration: float,
     problems: list[str],
-    *,
-    fly: FlyLoop | None = None,
 ) -> list[Step]:
     """Steps of those references that are answered, each from the trim.
 
@@ -76,7 +75,6 @@ def fly_steps(
         answered: references; a speed is left out where a place is held, which takes it back.
         duration: after the step [s].
         problems: a lost flight is told here.
-        fly: see `simulate_closed_loop`.
     """
     vehicle, trim, delays = flying
     rate = flying_rate(controller)
@@ -97,7 +95,6 @@ def fly_steps(
                 start=trim,
                 rate=rate,
                 environment=trim.environment,
-                fly=fly,
             )
         except DivergenceError as error:
             problems.append(f"The step of {reference} was lost after {error.time:.2f} s ({error.state}).")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 
 

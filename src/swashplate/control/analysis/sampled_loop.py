@@ -8,19 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from swashplate.arrays import Array, Complex
+from swashplate.engine.law import REFERENCES, LawGraph
+from swashplate.engine.roots import require_casadi
 from swashplate.errors import SwashError
-from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
-from swashplate.simulation.compilation import RUN_RARELY
+from swashplate.simulation.closed_loop import flown_delays
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.discretisation import held_late, with_late_inputs
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 
@@ -119,23 +117,11 @@ def sampled_loop(
     Raises:
         SwashError: where the loop is not finite there.
     """
-    enable_double_precision()
     states = trim.states()
     reference = np.array([states.get(name, 0.0) for name in REFERENCES])
-    felt = [0.0] * 3 if getattr(controller.step, "feels", False) else []  # an observer's; here the states are known
-    measured = np.array([*trim.state, *felt, trim.environment.voltage], dtype=np.float64)
-    inputs, *parts = (
-        np.asarray(part, dtype=np.float64)
-        for part in _decisions(
-            controller.step,
-            measured,
-            np.asarray(controller.memory, dtype=np.float64),
-            controller.gains,
-            reference,
-            np.array(vehicle.input_limits).T,
-            len(vehicle.state_names),
-        )
-    )
+    # Specific force and draws are an observer's; here the states are known.
+    told = np.array([*trim.state, *np.zeros(3), trim.environment.voltage], dtype=np.float64)
+    inputs, *parts = _decisions(controller.law(vehicle), controller.memory_of_law(), told, reference, vehicle)
     around = linearize(vehicle, replace(trim, inputs=inputs))
     if not all(np.all(np.isfinite(part)) for part in (around.A, around.B, *parts)):
         raise SwashError("the closed loop has no derivative at this hover.", where=vehicle.name)
@@ -163,26 +149,18 @@ def sampled_loop(
     return made(np.zeros(len(late)))
 
 
-@jit(static_argnums=(0, 6), compiler_options=RUN_RARELY)
-def _decisions(
-    control: Step,
-    measured: Float[jax.Array, " measured"],
-    memory: Float[jax.Array, " memory"],
-    gains: Float[jax.Array, " gains"],
-    reference: Float[jax.Array, " references"],
-    limits: Float[jax.Array, "2 inputs"],
-    n: int,
-) -> Any:
+def _decisions(law: LawGraph, memory: Array, told: Array, reference: Array, vehicle: Vehicle) -> tuple[Array, ...]:
     """The command, and the derivatives of command and memory by (state, memory) and by the reference."""
-
-    def deciding(
-        both: Float[jax.Array, " both"], reference: Float[jax.Array, " references"]
-    ) -> tuple[tuple[Any, Any], Any]:
-        after, command = control(both[n:], 0.0, jnp.concatenate([both[:n], measured[n:]]), reference, gains)
-        limited = jnp.clip(command, limits[0], limits[1])
-        return (limited, after), limited
-
-    both = jnp.concatenate([measured[:n], memory])
-    slopes, inputs = jax.jacfwd(deciding, argnums=(0, 1), has_aux=True)(both, reference)
-    (command, command_reference), (after, memory_reference) = slopes
-    return inputs, command, after, command_reference, memory_reference
+    casadi = require_casadi()
+    n, carried, k = len(vehicle.state_names), law.memory, law.memory - law.fixed
+    both, asked = casadi.MX.sym("both", n + k), casadi.MX.sym("asked", len(reference))
+    everything = casadi.vertcat(both[:n], casadi.DM(told[n:]), casadi.DM.zeros(law.draws))
+    before = casadi.vertcat(both[n:], casadi.DM(memory[k:]))
+    result = law.function(before, everything[law.places.tolist()], asked)
+    low, high = (casadi.DM(list(limits)) for limits in zip(*vehicle.input_limits, strict=True))
+    command = casadi.fmin(casadi.fmax(result[carried:], low), high)
+    parts = [command, casadi.jacobian(command, both), casadi.jacobian(result[:k], both)]
+    parts += [casadi.jacobian(command, asked), casadi.jacobian(result[:k], asked)]
+    at = casadi.Function("decisions", [both, asked], parts)(np.concatenate([told[:n], memory[:k]]), reference)
+    commands, *slopes = (np.asarray(casadi.DM(part).full(), dtype=np.float64) for part in at)
+    return (commands[:, 0], *slopes)

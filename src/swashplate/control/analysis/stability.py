@@ -13,7 +13,7 @@ from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.errors import ControllerError
 from swashplate.identification.responses.crossing_delays import crossing_delays
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 
 _LOWEST = 0.02

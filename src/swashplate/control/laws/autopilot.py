@@ -2,7 +2,7 @@
 
 Its modes differ in numbers only. "manual" is the paper's experiment: a pilot's cyclic commands, decoupled, with height
 and heading held. "speed" holds a speed, "place" a place; a pilot's command is added in every mode. One step is a pure
-function of scalars, for floats, JAX and CasADi alike.
+function of scalars, for floats and CasADi alike.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.control.laws.decoupling import Decoupler, Lag, decouple, decoupler, fit_into_limits
@@ -23,14 +22,14 @@ from swashplate.control.laws.height_yaw import (
     coaxial_rotors,
     height_yaw_step,
 )
+from swashplate.engine.law import REFERENCES
+from swashplate.engine.symbols import ArrayFunctions, Symbols
 from swashplate.errors import SwashError
-from swashplate.jax_on_demand import jax
 from swashplate.models.coax import CoaxInputs
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import ArrayBackend, Backend, Scalar
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.closed_loop import REFERENCES, Step
-from swashplate.simulation.dynamics import jax_backend
+from swashplate.simulation.controller import Step, StepController
 from swashplate.simulation.trim import Trim
 
 Mode = Literal["manual", "speed", "place"]
@@ -171,7 +170,7 @@ def _limited(value: Scalar, most: Scalar, xp: Backend) -> Scalar:
 
 
 @dataclass(frozen=True)
-class Autopilot:
+class Autopilot(StepController):
     """A controller for `simulate_closed_loop`.
 
     Attributes:
@@ -276,7 +275,7 @@ def autopilot(
     return Autopilot(vehicle.name, vehicle.card.title, mode, numbers)
 
 
-def unpack(row: Float[jax.Array, " gains"]) -> Gains:
+def unpack(row: Symbols) -> Gains:
     """The gains from their row."""
     values = iter(row[i] for i in range(len(row)))
 
@@ -288,18 +287,11 @@ def unpack(row: Float[jax.Array, " gains"]) -> Gains:
 
 
 def row_step(
-    memory: Float[jax.Array, " memory"],
-    time: Float[jax.Array, ""],
-    measured: Float[jax.Array, " measured"],
-    reference: Float[jax.Array, " references"],
-    gains: Float[jax.Array, " gains"],
+    memory: Symbols, measured: Symbols, reference: Symbols, gains: Symbols, xp: ArrayFunctions
 ) -> tuple[Any, Any]:
-    """`step` on JAX rows, as `simulate_closed_loop` calls it."""
-    import jax.numpy as jnp
-
-    xp = jax_backend()
+    """`step` on rows, as `simulate_closed_loop` calls it."""
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     wanted = Reference(*(reference[i] for i in range(len(REFERENCES))))
     carried = Memory(HeightYawMemory(memory[0], memory[1], memory[2]), memory[3], memory[4])
-    after, commands = step(carried, body, measured[-1], wanted, unpack(gains), xp)
-    return jnp.stack([*after.motors, after.ahead, after.right]), jnp.stack(commands)
+    after, commands = step(carried, body, measured[-1], wanted, unpack(gains), ArrayBackend(xp))
+    return xp.stack([*after.motors, after.ahead, after.right]), xp.stack(commands)

@@ -6,17 +6,16 @@ Enough to keep a CoaX in the room during a sweep; it is not meant to be a good c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import NDArray
 
+from swashplate.engine.symbols import ArrayFunctions, Symbols
 from swashplate.errors import SwashError
-from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.controller import Step, StepController
 from swashplate.simulation.trim import Trim
 
 _BODY = len(RigidBody._fields)
@@ -45,14 +44,14 @@ class HoldGains(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Hold:
+class Hold(StepController):
     """A controller for `simulate_closed_loop`: see `hover_hold`."""
 
     rate: float
     memory: NDArray[np.float64]
     gains: NDArray[np.float64]
     step: Step
-    at_once: bool = True
+    at_once: ClassVar[bool] = True
 
 
 def hover_hold(
@@ -89,11 +88,7 @@ def hover_hold(
 
 
 def hold_step(
-    memory: Float[jax.Array, " memory"],
-    time: Float[jax.Array, ""],
-    measured: Float[jax.Array, " measured"],
-    reference: Float[jax.Array, " references"],
-    gains: Float[jax.Array, " gains"],
+    memory: Symbols, measured: Symbols, reference: Symbols, gains: Symbols, xp: ArrayFunctions
 ) -> tuple[Any, Any]:
     """One step: integrals of height and heading error and the sample time in, the same and four inputs out."""
     g = HoldGains._make(gains[i] for i in range(len(HoldGains._fields)))
@@ -104,27 +99,27 @@ def hold_step(
 
     # Height: the wanted acceleration upwards, and 1/(cos cos) for what the lean takes away from the thrust.
     too_low = body.z - reference[2]
-    c_phi, c_theta = jnp.cos(body.phi), jnp.cos(body.theta)
-    upwards = jnp.sin(body.theta) * body.u - c_theta * (jnp.sin(body.phi) * body.v + c_phi * body.w)
+    c_phi, c_theta = xp.cos(body.phi), xp.cos(body.theta)
+    upwards = xp.sin(body.theta) * body.u - c_theta * (xp.sin(body.phi) * body.v + c_phi * body.w)
     wanted = g.height * too_low - g.climb * upwards + g.height_integral * height_sum
-    load = jnp.clip((1.0 + wanted / gravity) / jnp.maximum(c_phi * c_theta, 0.5), 0.5, 1.5)
-    speed_up = jnp.sqrt(load) - 1.0
+    load = xp.clip((1.0 + wanted / gravity) / xp.maximum(c_phi * c_theta, 0.5), 0.5, 1.5)
+    speed_up = xp.sqrt(load) - 1.0
 
     # Heading: the shorter way round; the two rotors share the torque and their thrusts about cancel.
     turn = reference[3] - body.psi
-    turn = jnp.arctan2(jnp.sin(turn), jnp.cos(turn))
-    yaw = jnp.clip(g.yaw * turn - g.yaw_rate * body.r + g.yaw_integral * heading_sum, -6.0, 6.0)
+    turn = xp.arctan2(xp.sin(turn), xp.cos(turn))
+    yaw = xp.clip(g.yaw * turn - g.yaw_rate * body.r + g.yaw_integral * heading_sum, -6.0, 6.0)
 
     # Place: lean against speed and distance, in body axes; the servos lean it.
-    c_psi, s_psi = jnp.cos(body.psi), jnp.sin(body.psi)
+    c_psi, s_psi = xp.cos(body.psi), xp.sin(body.psi)
     north, east = reference[0] - body.x, reference[1] - body.y
     ahead, right = c_psi * north + s_psi * east, -s_psi * north + c_psi * east
-    phi = jnp.clip(g.place * right - g.speed * body.v, -g.lean_limit, g.lean_limit)
-    theta = jnp.clip(-g.place * ahead + g.speed * body.u, -g.lean_limit, g.lean_limit)
+    phi = xp.clip(g.place * right - g.speed * body.v, -g.lean_limit, g.lean_limit)
+    theta = xp.clip(-g.place * ahead + g.speed * body.u, -g.lean_limit, g.lean_limit)
     servo_roll = g.lean * (phi - body.phi) - g.lean_rate * body.p
     servo_pitch = -g.lean * (theta - body.theta) + g.lean_rate * body.q
 
-    correction = jnp.stack(
+    correction = xp.stack(
         [
             lower_gain * speed_up - lower_yaw * yaw,
             upper_gain * speed_up + upper_yaw * yaw,
@@ -132,5 +127,5 @@ def hold_step(
             servo_pitch,
         ]
     )
-    sums = jnp.stack([jnp.clip(height_sum + dt * too_low, -2.0, 2.0), jnp.clip(heading_sum + dt * turn, -2.0, 2.0), dt])
+    sums = xp.stack([xp.clip(height_sum + dt * too_low, -2.0, 2.0), xp.clip(heading_sum + dt * turn, -2.0, 2.0), dt])
     return sums, trim_inputs + correction

@@ -5,49 +5,26 @@ The law cancels what speed does across the motion (eqs 19, 20) and so needs a ve
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-import numpy as np
-from jaxtyping import Float
-
 from swashplate.arrays import Array
-from swashplate.control.laws.autopilot import Autopilot, Memory, Reference, step, unpack
+from swashplate.control.laws.autopilot import Autopilot, Memory, Reference, step
 from swashplate.control.laws.height_yaw import HeightYawMemory
-from swashplate.control.lqg.controller import Lqg, SensedStep
-from swashplate.control.lqg.controller_step import Law
+from swashplate.control.lqg.controller import Lqg
+from swashplate.engine.law import LawGraph
 from swashplate.errors import ControllerError
-from swashplate.jax_on_demand import jax
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import jax_backend
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 
 _BODY = len(RigidBody._fields)
 
 
 @dataclass(frozen=True)
-class ObservedStep(SensedStep):
-    """The autopilot's step behind the observer's; the autopilot's numbers end the row of gains."""
-
-    autopilot_gains: int = 0
-
-    def law(self, gains: Float[jax.Array, " gains"]) -> Law | None:
-        numbers = unpack(gains[gains.shape[0] - self.autopilot_gains :])
-
-        def decided(
-            memory: list[Any], x: list[Any], late: list[Any], voltage: Any, reference: list[Any]
-        ) -> tuple[list[Any], list[Any]]:
-            carried = Memory(HeightYawMemory(*memory[:3]), memory[3], memory[4])
-            body = RigidBody(*x[:_BODY])
-            after, commands = step(carried, body, voltage, Reference(*reference), numbers, jax_backend())
-            return [*after.motors, after.ahead, after.right, memory[5]], list(commands)
-
-        return decided
-
-
-@dataclass(frozen=True)
-class ObservedAutopilot:
+class ObservedAutopilot(Controller):
     """An autopilot fed by an observer; a controller for `simulate_closed_loop`.
 
     Attributes:
@@ -77,24 +54,32 @@ class ObservedAutopilot:
         return self.observer.delays
 
     @property
-    def step(self) -> ObservedStep:
-        speeds = len(self.observer.feedback.speeds)
-        return ObservedStep(self.observer.plan, speeds, autopilot_gains=self.autopilot.gains.size)
+    def drawn(self) -> int:
+        return self.observer.drawn
 
-    @property
-    def gains(self) -> Array:
-        return np.concatenate([self.observer.gains, self.autopilot.gains])
+    def law(self, vehicle: Vehicle) -> LawGraph:
+        numbers = self.autopilot.numbers
 
-    @property
-    def memory(self) -> Array:
-        return self.memories([self.observer.seed])[:, 0]
+        def decided(
+            memory: list[Any], x: list[Any], late: list[Any], voltage: Any, reference: list[Any]
+        ) -> tuple[list[Any], list[Any]]:
+            carried = Memory(HeightYawMemory(*memory[:3]), memory[3], memory[4])
+            body = RigidBody(*x[:_BODY])
+            after, commands = step(carried, body, voltage, Reference(*reference), numbers, CasadiBackend())
+            return [*after.motors, after.ahead, after.right, memory[5]], list(commands)
 
-    def memories(self, seeds: Iterable[int]) -> Array:
-        """Starts with other noise and biases each, shape (memory, number of seeds)."""
-        starts = self.observer.memories(seeds)
-        end = self.observer.inner_memory.size
-        starts[end - 6 : end - 1] = self.autopilot.memory[:, None]
-        return starts
+        return self.observer.law_with(vehicle, decided)
+
+    def memory_of_law(self, seed: int | None = None) -> Array:
+        start, end = self.observer.memory_of_law(seed), self.observer.inner_memory.size
+        start[end - 6 : end - 1] = self.autopilot.memory
+        return start
+
+    def draws(self, samples: int, seed: int | None = None) -> Array:
+        return self.observer.draws(samples, seed)
+
+    def with_seed(self, seed: int) -> ObservedAutopilot:
+        return replace(self, observer=self.observer.with_seed(seed))
 
     def starting_at(self, trim: Trim, *, seed: int | None = None) -> ObservedAutopilot:
         """The same at another start, with other noise."""

@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
 
 from swashplate.arrays import Array
+from swashplate.engine.symbols import ArrayFunctions, Symbols
 from swashplate.errors import SwashError
-from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.controller import Step, StepController
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 
@@ -37,7 +36,7 @@ _GROWS = 1.001
 
 
 @dataclass(frozen=True)
-class StateHold:
+class StateHold(StepController):
     """A controller for `simulate_closed_loop`: see `state_hold`."""
 
     rate: float
@@ -127,11 +126,11 @@ _STEPS: dict[tuple[int, int], Step] = {}
 
 
 def state_hold_step(
-    memory: Float[jax.Array, " memory"],
-    time: Float[jax.Array, ""],
-    measured: Float[jax.Array, " measured"],
-    reference: Float[jax.Array, " references"],
-    gains: Float[jax.Array, " gains"],
+    memory: Symbols,
+    measured: Symbols,
+    reference: Symbols,
+    gains: Symbols,
+    xp: ArrayFunctions,
     *,
     inputs: int,
     states: int,
@@ -141,12 +140,14 @@ def state_hold_step(
     commanded, rest = gains[inputs * states : inputs * states + inputs], gains[inputs * states + inputs :]
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     turned = body.psi - reference[3]
-    turned = jnp.arctan2(jnp.sin(turned), jnp.cos(turned))
-    c, s = jnp.cos(reference[3]), jnp.sin(reference[3])
+    turned = xp.arctan2(xp.sin(turned), xp.cos(turned))
+    c, s = xp.cos(reference[3]), xp.sin(reference[3])
     north, east = body.x - reference[0], body.y - reference[1]
     # The gains belong to a heading of zero: the place error is turned into the wanted heading's axes, and cut.
-    ahead = jnp.clip(c * north + s * east, -3.0, 3.0)
-    right = jnp.clip(-s * north + c * east, -3.0, 3.0)
-    below = jnp.clip(body.z - reference[2], -2.0, 2.0)
-    deviation = (measured[:states] - rest).at[0].set(ahead).at[1].set(right).at[2].set(below).at[8].set(turned)
+    ahead = xp.clip(c * north + s * east, -3.0, 3.0)
+    right = xp.clip(-s * north + c * east, -3.0, 3.0)
+    below = xp.clip(body.z - reference[2], -2.0, 2.0)
+    away = measured[:states] - rest
+    place, heading = xp.stack([ahead, right, below]), xp.atleast_1d(turned)
+    deviation = xp.concatenate([place, away[3:8], heading, away[9:]])
     return memory, commanded - K @ deviation

@@ -1,159 +1,38 @@
 """A linear-quadratic controller with an observer, one pure step: readings in, commands out.
 
-`Lqg` is a controller for `simulate_closed_loop`: there its step first makes the readings from the true flight, with
+`Lqg` is a controller for `simulate_closed_loop`: there its law first makes the readings from the true flight, with
 noise, biases, rates and delays; `lqg_step`, what an aircraft runs, sees readings only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
-from swashplate.control.lqg.controller_step import (
-    Law,
-    carried_from,
-    carried_row,
-    carried_size,
-    lqg_step,
-    numbers_from,
-    numbers_row,
-    sizes,
-)
+from swashplate.control.lqg.controller_step import LawOnEstimates, sizes
+from swashplate.control.lqg.graph import readings_kept, sensed_graph, step_graph
 from swashplate.control.lqg.law import Feedback
+from swashplate.engine.law import FELT, LawGraph, draw_names
 from swashplate.errors import ControllerError
 from swashplate.filtering import disturbances, observer
-from swashplate.filtering.batched_matrices import StackMatrices
-from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.filtering.observer_slopes import linearised_at
-from swashplate.filtering.sensor_suite import BIASED, readings
-from swashplate.jax_on_demand import jax, jit, jnp
+from swashplate.filtering.sensor_suite import BIASED
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend
-from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.closed_loop import Step
-from swashplate.simulation.compilation import RUN_RARELY
+from swashplate.simulation.controller import Controller, told_names
 from swashplate.simulation.trim import Trim
 
-_BODY = len(RigidBody._fields)
-_BLOCK, _BLOCK_STEADY = 32, 256
-"""Measured on two cores with 1 MB of cache each: 128 covariances take a third more time than 32."""
+_NOISE = 1
+"""Of a seed: the stream of its sensors' noise, beside that of their biases."""
 
 
 @dataclass(frozen=True)
-class SensedStep:
-    """The controller with its sensors, as `simulate_closed_loop` calls it; equal for equal plans.
-
-    `measured` is the true state row, the specific force at the centre of gravity (`feels`), and the voltage; of many
-    vehicles (`stacks`) a column each.
-    """
-
-    plan: ObserverPlan
-    speeds: int
-    feels: bool = True
-    stacks: bool = True
-
-    @property
-    def depth(self) -> int:
-        """Readings kept until they arrive, in samples."""
-        return max((at.late for at in self.plan.sampling), default=0) + 1
-
-    @property
-    def block(self) -> int:
-        """Vehicles of a batch whose covariances stay in a core's cache."""
-        return _BLOCK if self.plan.sensors and not self.plan.period else _BLOCK_STEADY
-
-    def __call__(
-        self,
-        memory: Float[jax.Array, "memory ..."],
-        time: Float[jax.Array, ""],
-        measured: Float[jax.Array, "measured ..."],
-        reference: Float[jax.Array, " references"],
-        gains: Float[jax.Array, " gains"],
-    ) -> tuple[Any, Any]:
-        plan, M = self.plan, JaxMatrices() if measured.ndim == 1 else StackMatrices(measured.shape[1])
-        inner = carried_size(plan)
-        numbers, feedback = numbers_from(plan, self.speeds, gains)
-        carried, own = carried_from(plan, memory[:inner], M), memory[inner:]
-        voltage = measured[-1]
-        y = measured[: plan.n]
-        if plan.sensors:
-            y, own = self._read(own, measured[:_BODY], measured[-4:-1], numbers, M)
-        wanted = [reference[i] for i in range(reference.shape[0])]
-        column = M.matrix(y, y.shape[0], 1)
-        after, commands = lqg_step(plan, numbers, feedback, carried, column, voltage, wanted, M, self.law(gains))
-        return jnp.concatenate([carried_row(after, M), own]), M.row(commands)
-
-    def law(self, gains: Float[jax.Array, " gains"]) -> Law | None:
-        """The feedback, where it is not the linear-quadratic one."""
-        return None
-
-    def _read(
-        self,
-        own: Float[jax.Array, "own ..."],
-        x: Float[jax.Array, "body ..."],
-        force: Float[jax.Array, "3 ..."],
-        numbers: Numbers,
-        M: JaxMatrices,
-    ) -> tuple[Any, Any]:
-        """Readings that arrive now, and what the sensors carry: biases, seed, count, the last readings."""
-        plan = self.plan
-        nb, channels = len(plan.biases), len(plan.channels)
-        bias, seed, count = own[:nb], own[nb], own[nb + 1]
-        queue = own[nb + 2 :].reshape(self.depth, channels, *own.shape[1:])
-        now = M.row(true_readings(plan, x, force, bias, M.xp))
-        queue = jnp.where(count < 0.5, jnp.broadcast_to(now, queue.shape), jnp.concatenate([now[None], queue[:-1]]))
-
-        drawing = partial(_drawing, channels + nb)
-        each: Any = drawing if own.ndim == 1 else jax.vmap(drawing, out_axes=1)
-        drawn = each(seed.astype(int), count.astype(int))
-        place = [at.late for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
-        arrived = jnp.stack([queue[late, i] for i, late in enumerate(place)])
-        wander = numbers.process[plan.n + 6 : plan.n + 6 + nb]
-        noisy, bias = (
-            values + (jnp.sqrt(variance) * part.T).T
-            for values, variance, part in (
-                (arrived, numbers.measurement, drawn[:channels]),
-                (bias, wander, drawn[channels:]),
-            )
-        )
-        return noisy, jnp.concatenate([bias, jnp.stack([seed, count + 1.0]), queue.reshape(-1, *own.shape[1:])])
-
-
-def _drawing(count: int, seed: Int[jax.Array, ""], sample: Int[jax.Array, ""]) -> Any:
-    """What sensors draw for one sample, shape (count,)."""
-    return jax.random.normal(jax.random.fold_in(jax.random.key(seed), sample), (count,))
-
-
-@jit(static_argnums=0, compiler_options=RUN_RARELY)
-def _drawn_compiled(count: int, seed: Int[jax.Array, ""], samples: Int[jax.Array, " samples"]) -> Any:
-    each: Any = jax.vmap(partial(_drawing, count), in_axes=(None, 0))
-    return each(seed, samples)
-
-
-class Readable(Protocol):
-    """A row of a backend's numbers."""
-
-    def __getitem__(self, place: int, /) -> Any: ...
-
-
-def true_readings(plan: ObserverPlan, x: Readable, force: Readable, bias: Readable, xp: Backend) -> list[Any]:
-    """All channels of a true state row, without noise; x (states, ...), force (3, ...) and bias (biases, ...) are rows
-    of the backend's numbers."""
-    body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])
-    named = {name: bias[i] for i, name in enumerate(plan.biases)}
-    return [v for sensor in plan.sensors for v in readings(sensor, body, felt, named, xp).values()]
-
-
-@dataclass(frozen=True)
-class Lqg:
+class Lqg(Controller):
     """A linear-quadratic controller.
 
     Attributes:
@@ -188,31 +67,37 @@ class Lqg:
         return {n: d / self.plan.rate for n, d in zip(self.vehicle.input_names, self.plan.delays, strict=True)}
 
     @property
-    def step(self) -> Step:
-        return self.sensed
-
-    @property
-    def sensed(self) -> SensedStep:
-        """The step with its sensors."""
-        return SensedStep(self.plan, len(self.feedback.speeds))
-
-    @property
     def drawn(self) -> int:
         """How many numbers its sensors draw for a sample: noise of the channels, steps of the biases."""
         return len(self.plan.channels) + len(self.plan.biases)
 
-    def draws(self, samples: int) -> Array:
-        """What its sensors draw in flight, shape (samples, drawn)."""
-        return np.asarray(_drawn_compiled(self.drawn, self.seed, jnp.arange(samples)))
+    def draws(self, samples: int, seed: int | None = None) -> Array:
+        own = self.seed if seed is None else seed
+        return np.random.default_rng([own, _NOISE]).standard_normal((samples, self.drawn))
 
-    @property
-    def gains(self) -> Array:
-        return numbers_row(self.numbers, self.feedback)
+    def graph(self, law: LawOnEstimates | None = None) -> Any:
+        """Its step, what an aircraft runs, as a CasADi function (`graph.step_graph`)."""
+        return step_graph(self.plan, self.numbers, self.feedback, self.inner_memory.size, law)
 
-    @property
-    def memory(self) -> Array:
+    def law(self, vehicle: Vehicle) -> LawGraph:
+        return self.law_with(vehicle)
+
+    def law_with(self, vehicle: Vehicle, law: LawOnEstimates | None = None) -> LawGraph:
+        """Its law with another feedback on the estimates; with its sensors, where it has any."""
+        step, inner = self.graph(law), self.inner_memory.size
+        if not self.plan.sensors:
+            measured = (*self.vehicle.state_names, "voltage")
+            return LawGraph(step, measured, told_names(vehicle, 0), inner, 0)
+        measured = (*RigidBody._fields, *FELT, "voltage", *draw_names(self.drawn))
+        sensed = sensed_graph(self.plan, self.numbers, step, inner)
+        return LawGraph(sensed, measured, told_names(vehicle, self.drawn), sensed.size1_in(0), self.drawn)
+
+    def memory_of_law(self, seed: int | None = None) -> Array:
         """At the start: estimates at the trim; the simulated sensors' biases are drawn with the seed."""
-        return np.concatenate([self.inner_memory, self._sensor_memory(self.seed)])
+        return np.concatenate([self.inner_memory, self._sensor_memory(self.seed if seed is None else seed)])
+
+    def with_seed(self, seed: int) -> Lqg:
+        return replace(self, seed=seed)
 
     @property
     def inner_memory(self) -> Array:
@@ -250,13 +135,7 @@ class Lqg:
             return np.zeros(0)
         random = np.random.default_rng(seed)
         bias = np.array([BIASED[name][0] for name in plan.biases]) * random.standard_normal(len(plan.biases))
-        depth = self.sensed.depth
-        return np.concatenate([bias, [float(seed), 0.0], np.zeros(depth * len(plan.channels))])
-
-    def memories(self, seeds: Iterable[int]) -> Array:
-        """Starts with other noise and biases each, shape (memory, number of seeds)."""
-        inner = self.inner_memory
-        return np.stack([np.concatenate([inner, self._sensor_memory(int(seed))]) for seed in seeds], axis=1)
+        return np.concatenate([bias, [0.0], np.zeros(readings_kept(plan) * len(plan.channels))])
 
     def starting_at(self, trim: Trim, *, seed: int | None = None) -> Lqg:
         """The same at another start, with other noise.

@@ -10,17 +10,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
-from jaxtyping import Float
-
-from swashplate.arrays import Array
-from swashplate.control.lqg.law import LAW_MEMORY, Feedback, lqr_law
+from swashplate.control.lqg.law import Feedback, lqr_law
 from swashplate.filtering import constant_gain, observer
-from swashplate.filtering.matrix_operations import JaxMatrices, Matrices
+from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
-from swashplate.jax_on_demand import jax, jnp
 
-Law = Callable[[list[Any], list[Any], list[Any], Any, list[Any]], tuple[list[Any], list[Any]]]
+LawOnEstimates = Callable[[list[Any], list[Any], list[Any], Any, list[Any]], tuple[list[Any], list[Any]]]
 """(memory, states, late commands, voltage, reference) to (memory, commands), as `lqr_law`."""
 
 
@@ -54,7 +49,7 @@ def lqg_step(
     voltage: Any,
     reference: list[Any],
     M: Matrices,
-    law: Law | None = None,
+    law: LawOnEstimates | None = None,
 ) -> tuple[Carried, list[Any]]:
     """One step of the controller.
 
@@ -105,59 +100,9 @@ def lqg_step(
     return Carried(estimate, given, counts, kept), commands
 
 
-# ---- rows --------------------------------------------------------------------------------------------------------
 def sizes(plan: ObserverPlan) -> tuple[int, int, int]:
     """Of what is carried: estimates, rows of their covariance (none with constant gains), counts."""
     if not plan.sensors:
         return 0, 0, 0
     N = len(plan.names)
     return N, 0 if plan.period else N, len(plan.sensors) + (1 if plan.period else 0)
-
-
-def carried_size(plan: ObserverPlan) -> int:
-    N, rows, counts = sizes(plan)
-    return N + rows * rows + (max(plan.delays) + 1) * plan.inputs + counts + LAW_MEMORY
-
-
-def carried_from(plan: ObserverPlan, row: Float[jax.Array, "memory ..."], M: JaxMatrices) -> Carried:
-    """What is carried, from a flat row."""
-    N, rows, counts = sizes(plan)
-    m, depth = plan.inputs, max(plan.delays) + 1
-    covariance, rest = M.matrix(row[N : N + rows * rows], rows, rows), row[N + rows * rows :]
-    given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
-    rest = rest[depth * m :]
-    return Carried(
-        ObserverEstimate(M.matrix(row[:N], N, 1), covariance),
-        given,
-        [rest[i] for i in range(counts)],
-        [rest[counts + i] for i in range(LAW_MEMORY)],
-    )
-
-
-def carried_row(carried: Carried, M: JaxMatrices) -> Any:
-    flat = [value for row in carried.given for value in row] + carried.counts + carried.law
-    return jnp.concatenate([*(M.flat(part) for part in carried.estimate), M.row(flat)])
-
-
-def _shapes(plan: ObserverPlan, speeds: int) -> list[tuple[int, ...]]:
-    n, m, late = plan.n, plan.inputs, sum(plan.delays)
-    N, channels = len(plan.names), len(plan.channels)
-    parameters = len(plan.equations.vehicle.parameter_names) + 2
-    of_feedback = [(speeds,), (speeds, n), (speeds, m), (speeds, m, n + late + 4), (m,), (), (m,), (m,), (), (), (), ()]
-    steady = [(plan.period, N, channels)] if plan.period else []
-    return [(parameters,), (6,), (N,), (channels,), *steady, *of_feedback]
-
-
-def numbers_row(numbers: Numbers, feedback: Feedback) -> Array:
-    parts = [part for part in (*numbers, *feedback) if part is not None]
-    return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
-
-
-def numbers_from(plan: ObserverPlan, speeds: int, row: Float[jax.Array, " numbers"]) -> tuple[Numbers, Feedback]:
-    parts, place = [], 0
-    for shape in _shapes(plan, speeds):
-        size = int(np.prod(shape))
-        parts.append(row[place : place + size].reshape(shape))
-        place += size
-    own = len(parts) - len(Feedback._fields)
-    return Numbers(*parts[:own]), Feedback(*parts[own:])

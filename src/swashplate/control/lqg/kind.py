@@ -10,17 +10,15 @@ import numpy as np
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.judged_loop import Aircraft, JudgedLoop, judged_with_states
 from swashplate.control.analysis.margins import Margins
-from swashplate.control.kinds import FELT, ControllerKind, TracedStep, draw_names
+from swashplate.control.kinds import ControllerKind, TracedStep
 from swashplate.control.lqg.analysis import sensitivity
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.file import lqg_document, lqg_from
 from swashplate.control.lqg.other_model import differences
 from swashplate.control.lqg.steady_loop import observed_loop
-from swashplate.control.lqg.traced import lqg_function, measured_names, sensed_function
 from swashplate.control.lqg.transfer import flown_on
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.trim import Trim
 
 _OBSERVED = (
@@ -73,29 +71,15 @@ class LqgKind(ControllerKind[Lqg]):
         return lqg_from(document, path)
 
     def traced(self, controller: Lqg) -> TracedStep:
-        vehicle = controller.vehicle
+        vehicle, plan = controller.vehicle, controller.plan
         return TracedStep(
-            lqg_function(controller),
+            controller.graph(),
             tuple(controller.inner_memory.tolist()),
             "estimates, their covariance, commands given, counts, integrals and speeds",
-            measured_names(controller),
+            (*(plan.channels if plan.sensors else vehicle.state_names), "voltage"),
             vehicle.input_names,
             f"{vehicle.name}, LQG, designed on: {vehicle.card.title}",
         )
-
-    def flown(self, controller: Lqg) -> TracedStep:
-        traced = self.traced(controller)
-        if not controller.plan.sensors:
-            return traced
-        return replace(
-            traced,
-            function=sensed_function(controller, traced),
-            start=tuple(controller.memory.tolist()),
-            measured=(*RigidBody._fields, *FELT, "voltage", *draw_names(controller.drawn)),
-        )
-
-    def draws(self, controller: Lqg, samples: int) -> Array:
-        return controller.draws(samples)
 
 
 KIND = LqgKind()

@@ -20,11 +20,11 @@ from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.optimal import steady_filter
 from swashplate.control.lqg.weights import typical
 from swashplate.engine.equations import equations_of, parameter_row
+from swashplate.engine.law import REFERENCES
 from swashplate.errors import ControllerError
 from swashplate.filtering import observer
 from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.sampled_observer_model import SampledObserverModel, sampled_observer_model
-from swashplate.simulation.closed_loop import REFERENCES
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.trim import Trim
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.control.laws.ardupilot.mixers import Mixer
-from swashplate.jax_on_demand import jax, jnp
+from swashplate.engine.symbols import jacobian_at
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim import Trim
 
@@ -48,8 +48,8 @@ def mixed(mixer: Mixer, hover: Trim, parameters: Mapping[str, float], *, inputs:
         parameters: of the autopilot, by ArduPilot's names (`known`).
         inputs: names of the vehicle's inputs.
     """
-    at = jnp.asarray(mixer.unmixed(hover.inputs, parameters))
-    columns = np.asarray(jax.jacfwd(lambda commands: mixer.mix(commands, parameters).inputs)(at))
+    at = mixer.unmixed(hover.inputs, parameters)
+    columns = jacobian_at(lambda commands, xp: mixer.mix(commands, parameters, xp).inputs, at)
     return {axis: columns[: len(inputs), place] for place, axis in enumerate(MIXER_AXES)}
 
 

@@ -1,4 +1,4 @@
-"""The physics, observation and reward that the single and the vector environment share: one function, under `vmap`."""
+"""The physics, observation and reward that the single and the vector environment share."""
 
 from __future__ import annotations
 
@@ -11,21 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
+from swashplate.engine.equations import SURROUNDINGS, parameter_row
+from swashplate.engine.fly import FlightPlan, fly
 from swashplate.errors import SwashError
-from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.links.gym.tasks import Task
 from swashplate.models.catalogue import vehicle as find_vehicle
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
-from swashplate.simulation.compilation import QUICK_FLIGHT, enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision, jax_backend, row_rates
-from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.standing import at_rest, standing
 from swashplate.simulation.stepping import LONGEST_STEP
-from swashplate.simulation.trigonometry import vector_backend
 from swashplate.simulation.trim import Trim, trim
 
 OBSERVED = (
@@ -109,8 +106,7 @@ class Flying:
 
     def observe(self, x: Array, k: NDArray[np.int64]) -> NDArray[np.float32]:
         """Observations of states (n, n_states) at steps (n,)."""
-        observed = np.asarray(_observed(x, self.table[k], self._angles))
-        return self._with_inner(observed, x)
+        return self._with_inner(_clipped(_errors(x.T, self.table[k].T, self._angles)).T, x)
 
     def _with_inner(self, body: Array, x: Array) -> NDArray[np.float32]:
         if self.inner:
@@ -122,28 +118,35 @@ class Flying:
         self, x: Array, k: NDArray[np.int64], actions: NDArray[Any], p: Array
     ) -> tuple[Array, NDArray[np.float32], Array, NDArray[np.bool_]]:
         """States, observations, rewards and whether the limits were left, one step later, for n vehicles at once."""
-        numbers = self.parameters if not self.scatter else p[0] if len(x) == 1 else p
-        arrays = _advance(
-            equations_of(self.vehicle),
-            self.substeps,
-            self.free,
-            x,
-            np.asarray(actions, dtype=np.float64),
-            numbers,
-            self.table[np.minimum(k + 1, self.steps)],
-            {
-                "inputs": self.trim.inputs,
-                "reach": self.reach,
-                "limits": np.array(self.vehicle.input_limits).T,
-                "around": np.array([getattr(self.trim.environment, name) for name in SURROUNDINGS]),
-                "angles": self._angles,
-                "scales": np.array(self.task.scales),
-                "edges": np.array([self.task.level_limit, self.task.height_limit, self.task.lean_limit]),
-                "dt": self.dt,
-            },
-        )
-        states, observations, rewards, lost = (np.asarray(part) for part in arrays)
-        return states, self._with_inner(observations, states), rewards, lost
+        action = np.clip(np.asarray(actions, dtype=np.float64).T, -1.0, 1.0)
+        inputs = np.repeat(self.trim.inputs[:, None], len(x), axis=1)
+        inputs[list(self.free)] += self.reach[:, None] * action
+        low, high = np.array(self.vehicle.input_limits).T[:, :, None]
+        around = np.array([[getattr(self.trim.environment, name)] for name in SURROUNDINGS])
+        held = np.concatenate([np.clip(inputs, low, high), np.repeat(around, len(x), axis=1)])
+        numbers = p.T if self.scatter else self.parameters[:, None]
+        step = self.dt / self.substeps
+        rows = np.stack([held, held])
+        plan = FlightPlan(x.T, numbers, rows, step, hold=self.substeps, keep=self.substeps)
+        after = fly(self.vehicle, plan, quaternion=False)[0][-1]
+        target = self.table[np.minimum(k + 1, self.steps)].T
+        with np.errstate(invalid="ignore", over="ignore"):
+            observations, rewards, lost = self._judged(after, action, target)
+        return after.T, self._with_inner(observations.T, after.T), rewards, lost
+
+    def _judged(self, after: Array, action: Array, target: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Observations (12, n), rewards and whether the limits were left (n,) of states (n_states, n)."""
+        errors = _errors(after, target, self._angles)
+        away = target[:3] - after[:3]
+        level, height = np.hypot(away[0], away[1]), np.abs(away[2])
+        speed, lean = np.sqrt(np.sum(errors[3:6] ** 2, axis=0)), np.hypot(errors[6], errors[7])
+        far = np.stack([level, height, speed, lean, errors[8]]) / np.array(self.task.scales)[:, None]
+        leaning = np.maximum(np.abs(after[6]), np.abs(after[7]))
+        edges = np.array([self.task.level_limit, self.task.height_limit, self.task.lean_limit])
+        inside = np.all(np.isfinite(after), axis=0)
+        inside &= np.all(np.stack([level, height, leaning]) < edges[:, None], axis=0)
+        reward = np.exp(-np.sum(far**2, axis=0)) - EFFORT * np.mean(action**2, axis=0)
+        return _clipped(errors), np.where(inside, reward, CRASH), ~inside
 
     @property
     def _angles(self) -> Array:
@@ -199,8 +202,6 @@ def flying(
         SwashError: for numbers that make no sense, a parameter that the vehicle does not have, or one without ground.
         TrimError: where there is no hover.
     """
-    enable_double_precision()
-    enable_compilation_cache()
     chosen = find_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
     if ground:
         chosen = standing(chosen)
@@ -240,54 +241,19 @@ def flying(
     )
 
 
-def _wrapped(angle: Any) -> Any:
-    return jnp.mod(angle + jnp.pi, 2.0 * jnp.pi) - jnp.pi
+def _wrapped(angle: Array) -> Array:
+    return np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
 
 
-def _errors(x: Any, target: Any, angles: Any) -> Any:
-    """`OBSERVED`, not clipped, of one state."""
+def _errors(x: Array, target: Array, angles: Array) -> Array:
+    """`OBSERVED`, not clipped, of states (n_states, n) and targets (9, n): shape (12, n)."""
     attitude = Euler(x[6], x[7], x[8])
-    place = local_to_body(Vector(*(target[i] - x[i] for i in range(3))), attitude, jax_backend())
-    wanted = local_to_body(Vector(*(target[3 + i] for i in range(3))), attitude, jax_backend())
+    place = local_to_body(Vector(*(target[:3] - x[:3])), attitude, ArrayBackend())
+    wanted = local_to_body(Vector(*target[3:6]), attitude, ArrayBackend())
     turned = (angles[0] + target[7] - x[6], angles[1] + target[8] - x[7], _wrapped(target[6] - x[8]))
     speed = (wanted.x - x[3], wanted.y - x[4], wanted.z - x[5])
-    return jnp.stack([*place, *speed, *turned, x[9], x[10], x[11]])
+    return np.stack([*place, *speed, *turned, x[9], x[10], x[11]])
 
 
-def _clipped(errors: Any) -> Any:
-    return jnp.clip(jnp.nan_to_num(errors), -LIMITS, LIMITS)
-
-
-@jit()
-def _observed(x: Any, target: Any, angles: Any) -> Any:
-    return jax.vmap(lambda x, target: _clipped(_errors(x, target, angles)))(x, target)
-
-
-@jit(static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
-def _advance(
-    equations: Equations, substeps: int, free: tuple[int, ...], x: Any, actions: Any, p: Any, target: Any, rest: Any
-) -> Any:
-    alone = x.shape[0] == 1
-    rates = row_rates(equations, padded=alone, xp=vector_backend())
-
-    def one(x: Any, action: Any, p: Any, target: Any) -> Any:
-        action = jnp.clip(action, -1.0, 1.0)
-        inputs = jnp.asarray(rest["inputs"]).at[jnp.array(free)].add(rest["reach"] * action)
-        w = jnp.concatenate([jnp.clip(inputs, *rest["limits"]), rest["around"]])
-
-        after = rk4_steps(lambda x, w: rates(x, w, p), x, lambda *_: w, rest["dt"] / substeps, substeps)
-        errors = _errors(after, target, rest["angles"])
-        away = target[:3] - after[:3]
-        level, height = jnp.hypot(away[0], away[1]), jnp.abs(away[2])
-        speed, lean = jnp.sqrt(jnp.sum(errors[3:6] ** 2)), jnp.hypot(errors[6], errors[7])
-        far = jnp.stack([level, height, speed, lean, errors[8]]) / rest["scales"]
-        leaning = jnp.maximum(jnp.abs(after[6]), jnp.abs(after[7]))
-        inside = jnp.all(jnp.isfinite(after)) & jnp.all(jnp.stack([level, height, leaning]) < rest["edges"])
-        reward = jnp.exp(-jnp.sum(far**2)) - EFFORT * jnp.mean(action**2)
-        return after, _clipped(errors), jnp.where(inside, reward, CRASH), ~inside
-
-    if alone:  # one function of a row: half the time of a batch of one
-        return tuple(part[None] for part in one(x[0], actions[0], p, target[0]))
-    # The vehicles last: every number of a state is then a row of its own, as in `simulation.batch`.
-    after, *rest_of = jax.vmap(one, (1, 1, 1 if p.ndim == 2 else None, 1), (1, 1, 0, 0))(x.T, actions.T, p.T, target.T)
-    return after.T, rest_of[0].T, *rest_of[1:]
+def _clipped(errors: Array) -> Array:
+    return np.clip(np.nan_to_num(errors), -LIMITS[:, None], LIMITS[:, None])

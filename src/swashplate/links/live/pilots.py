@@ -9,7 +9,7 @@ nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, get_args
@@ -21,13 +21,14 @@ from swashplate.arrays import Array
 from swashplate.control.kinds import kind_of
 from swashplate.control.laws.autopilot import Autopilot, autopilot, row_step
 from swashplate.control.laws.state_hold import state_hold, state_hold_step
+from swashplate.engine.law import REFERENCES
 from swashplate.errors import ControllerError
 from swashplate.flights.maneuvers.series import DEFAULT_AMPLITUDE
-from swashplate.jax_on_demand import jnp
 from swashplate.links.live.axes import STICKS, axes_of
 from swashplate.links.live.picture import picture
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
+from swashplate.simulation.closed_loop import flown_delays
+from swashplate.simulation.controller import Controller, Step
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.trim import Trim
 
@@ -39,12 +40,27 @@ LEAN = np.radians(12.0)
 """Roll or pitch that a full stick asks for in the mode "attitude" [rad]."""
 
 
+Decide = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
+
+
+def by_numbers(step: Step) -> Decide:
+    """A controller's step on numbers, as `Pilot.decide`: without the specific force."""
+
+    def decide(memory: Array, told: Array, wanted: Array, gains: Array) -> tuple[Array, Array]:
+        measured = np.concatenate([told[:-4], told[-1:]])
+        after, commands = step(memory, measured, wanted, gains, np)
+        return np.asarray(after), np.asarray(commands)
+
+    return decide
+
+
 @dataclass(frozen=True)
 class Pilot:
     """A control law for the live loop.
 
     Attributes:
-        step: `(memory, time, measured, wanted, gains) -> (memory, inputs)`; `wanted` is the row of `WANTED`.
+        decide: `(memory, told, wanted, gains) -> (memory, inputs)`; `told` is the state row, the specific force and the
+            voltage, `wanted` the row of `WANTED`.
         memory: at the start.
         gains: rows by mode and decoupling.
         amplitude: of maneuvers by axis [unit of the inputs].
@@ -53,9 +69,10 @@ class Pilot:
         rate: of the controller [Hz].
         title: what it is, in words.
         delays: from command to actuator, by input [s]; None for those of a linear model, and none of another.
+        feels: whether it wants the specific force.
     """
 
-    step: Step
+    decide: Decide
     memory: Array
     gains: Mapping[tuple[Mode, bool], Array]
     amplitude: Mapping[str, float]
@@ -66,6 +83,7 @@ class Pilot:
     rate: float = 100.0
     title: str = ""
     delays: Array | None = None
+    feels: bool = False
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -125,7 +143,7 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
             gains[mode, decoupled] = np.array([*head, *travel, *chosen.gains])
     _check_rate(base.rate, base.model)
     return Pilot(
-        coaxial_step,
+        by_numbers(coaxial_step),
         base.memory,
         gains,
         DEFAULT_AMPLITUDE,
@@ -138,14 +156,14 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
     )
 
 
-def coaxial_step(memory: Any, time: Any, measured: Any, wanted: Any, gains: Any) -> tuple[Any, Any]:
+def coaxial_step(memory: Any, measured: Any, wanted: Any, gains: Any, xp: Any) -> tuple[Any, Any]:
     """The CoaX's autopilot, with the motors on the sticks where the mode is raw."""
     lower, upper, raw = gains[0], gains[1], gains[2]
     roll, pitch, yaw, heave = (gains[3 + i] * wanted[6 + i] for i in range(len(STICKS)))
-    reference = jnp.concatenate([wanted[:6], jnp.stack([roll, pitch])])
-    after, commands = row_step(memory, time, measured, reference, gains[_COAX_HEAD:])
-    by_hand = jnp.stack([lower + heave - yaw, upper + heave + yaw, commands[2], commands[3]])
-    return jnp.where(raw > 0.5, memory, after), jnp.where(raw > 0.5, by_hand, commands)
+    reference = xp.concatenate([wanted[:6], xp.stack([roll, pitch])])
+    after, commands = row_step(memory, measured, reference, gains[_COAX_HEAD:], xp)
+    by_hand = xp.stack([lower + heave - yaw, upper + heave + yaw, commands[2], commands[3]])
+    return xp.where(raw > 0.5, memory, after), xp.where(raw > 0.5, by_hand, commands)
 
 
 def _check_rate(rate: float, where: str) -> None:
@@ -154,28 +172,34 @@ def _check_rate(rate: float, where: str) -> None:
 
 
 # ---- a designed controller -------------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class DesignedStep:
-    """A controller's own step, which knows no raw yaw and heave; with the specific force where it `feels`."""
+class DesignedLaw:
+    """A controller's own law, which knows no raw yaw and heave, with what its sensors draw.
 
-    step: Step
-    feels: bool
+    Args:
+        controller: whose. vehicle: that it flies.
+    """
 
-    def __call__(self, memory: Any, time: Any, measured: Any, wanted: Any, gains: Any) -> tuple[Any, Any]:
-        """As `Pilot.step`."""
-        return self.step(memory, time, measured, wanted[: len(REFERENCES)], gains)
+    def __init__(self, controller: Controller, vehicle: Vehicle) -> None:
+        self.law = controller.law(vehicle)
+        self._random = np.random.default_rng()
+
+    def __call__(self, memory: Array, told: Array, wanted: Array, gains: Array) -> tuple[Array, Array]:
+        """As `Pilot.decide`."""
+        everything = np.concatenate([told, self._random.standard_normal(self.law.draws)])
+        after = np.asarray(self.law.function(memory, everything[self.law.places], wanted[: len(REFERENCES)]))[:, 0]
+        return after[: self.law.memory], after[self.law.memory :]
 
 
 def _designed(vehicle: Vehicle, trim: Trim, controller: Controller) -> Pilot:
     """The aircraft is as late as the controller takes it to be, where its own card says nothing."""
-    name = str(getattr(controller, "type", type(controller).__name__))
+    name = controller.type or type(controller).__name__
     _check_rate(controller.rate, name)
     axes = axes_of(vehicle, linearize(vehicle, trim))
-    gains = np.asarray(controller.gains)
+    decide = DesignedLaw(controller, vehicle)
     return Pilot(
-        DesignedStep(controller.step, bool(getattr(controller.step, "feels", False))),
-        np.asarray(controller.memory),
-        {("position", on): gains for on in (True, False)},
+        decide,
+        controller.memory_of_law(),
+        {("position", on): np.zeros(0) for on in (True, False)},
         axes.amplitude,
         excited=axes.excited,
         speed=1.0,
@@ -184,6 +208,7 @@ def _designed(vehicle: Vehicle, trim: Trim, controller: Controller) -> Pilot:
         rate=controller.rate,
         title=f"{name}, as designed",
         delays=flown_delays(vehicle, controller),
+        feels=decide.law.feels,
     )
 
 
@@ -218,7 +243,7 @@ def _state_feedback(vehicle: Vehicle, trim: Trim) -> Pilot:
         for on in (True, False)
     }
     return Pilot(
-        _step_of(m, n),
+        by_numbers(partial(state_feedback_step, inputs=m, states=n)),
         np.zeros(1),
         gains,
         axes.amplitude,
@@ -247,23 +272,17 @@ def _leans(model: LinearModel, feedback: Array) -> tuple[float, float] | None:
 
 _LEAST_KEPT = 0.4
 _SOON = 1.0
-_STEPS: dict[tuple[int, int], Step] = {}
-
-
-def _step_of(inputs: int, states: int) -> Step:
-    """One function per size, so that other gains compile nothing anew."""
-    return _STEPS.setdefault((inputs, states), partial(state_feedback_step, inputs=inputs, states=states))
 
 
 def state_feedback_step(
-    memory: Any, time: Any, measured: Any, wanted: Any, gains: Any, *, inputs: int, states: int
+    memory: Any, measured: Any, wanted: Any, gains: Any, xp: Any, *, inputs: int, states: int
 ) -> tuple[Any, Any]:
     """A state hold whose place follows the aircraft unless a place is held, with the sticks mixed on top."""
     place, mixing = gains[0], gains[3 : 3 + 4 * inputs].reshape(inputs, 4)
-    x, y = jnp.where(place > 0.5, wanted[0], measured[0]), jnp.where(place > 0.5, wanted[1], measured[1])
-    held = jnp.concatenate([jnp.stack([x, y]), wanted[2 : len(REFERENCES)]])
+    x, y = xp.where(place > 0.5, wanted[0], measured[0]), xp.where(place > 0.5, wanted[1], measured[1])
+    held = xp.concatenate([xp.stack([x, y]), wanted[2 : len(REFERENCES)]])
     # The hold works on deviations: what is asked for is taken from what is measured.
-    seen = measured.at[3].add(-wanted[4]).at[4].add(-wanted[5])
-    seen = seen.at[6].add(-gains[1] * wanted[6]).at[7].add(gains[2] * wanted[7])
-    memory, commands = state_hold_step(memory, time, seen, held, gains[3 + 4 * inputs :], inputs=inputs, states=states)
+    asked = xp.stack([wanted[4], wanted[5], 0.0 * wanted[4], gains[1] * wanted[6], -gains[2] * wanted[7]])
+    seen = xp.concatenate([measured[:3], measured[3:8] - asked, measured[8:]])
+    memory, commands = state_hold_step(memory, seen, held, gains[3 + 4 * inputs :], xp, inputs=inputs, states=states)
     return memory, commands + mixing @ wanted[6:10]

@@ -23,7 +23,7 @@ from swashplate.links.live.world import FAN_SECONDS, World
 from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 
 if TYPE_CHECKING:
     from swashplate.links.estimating import Estimating

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
+from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
+from swashplate.engine.fly import FlightPlan, fly
+from swashplate.engine.trace import traced_force
 from swashplate.errors import ControllerError, SwashError
 from swashplate.flights.maneuvers.series import Maneuver
-from swashplate.jax_on_demand import jit, jnp
 from swashplate.links.live.flown import Craft, Moment, Setting
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
@@ -23,15 +23,11 @@ from swashplate.models.doubts import doubts
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.closed_loop import Controller, Step
-from swashplate.simulation.compilation import QUICK_FLIGHT
-from swashplate.simulation.dynamics import enable_double_precision, row_force, row_rates
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.record import check_divergence
-from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.stepping import LONGEST_STEP
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
-from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
 from swashplate.simulation.wind import Gusts, Turbulence
 
 PHYSICS_RATE = 500.0
@@ -43,52 +39,6 @@ _LEAN = np.radians(60.0)
 _HELD_WITHIN = 3.0
 """m from a place that is held, beyond which it is not."""
 """Roll or pitch at which the flight of a linear model ends: its angles are small ones."""
-
-
-@jit(static_argnums=(0, 1, 2), compiler_options=QUICK_FLIGHT)
-def advance(
-    equations: Equations,
-    law: Step,
-    substeps: int,
-    x: Any,
-    y: Any,
-    past: Any,
-    back: Any,
-    memory: Any,
-    wanted: Any,
-    around: Any,
-    added: Any,
-    gains: Any,
-    p: Any,
-    limits: Any,
-    dt: Any,
-) -> tuple[Any, Any, Any, Any]:
-    """One controller step: the law on the state row x, then `substeps` of physics [s each] with its inputs held.
-
-    Args:
-        x: what the law measures. y: the row that the equations move.
-        past: inputs of the last controller steps, the latest last.
-        back: how many steps ago an input was given that acts now, shape (substeps, n_inputs).
-
-    Returns:
-        The row y, `past`, controller memory, and the inputs as the actuators got them (limited, excitation included).
-    """
-    rates = row_rates(equations, padded=True)
-    felt = []
-    if getattr(law, "feels", False):
-        now = jnp.concatenate([past[past.shape[0] - 1 - back[-1], jnp.arange(past.shape[1])], around])
-        felt = [row_force(equations)(y, now, p)]
-    measured = jnp.concatenate([x, *felt, around[-1:]])
-    memory, command = law(memory, 0.0, measured, wanted, gains)
-    inputs = jnp.clip(command + added, limits[0], limits[1])
-    past = jnp.concatenate([past[1:], inputs[None]])
-    # Before the loop: XLA makes no function of one that gathers.
-    sent = past[past.shape[0] - 1 - back, jnp.arange(inputs.size)]
-
-    def acting(i: Any, _: Any) -> Any:
-        return jnp.concatenate([sent[i], around])
-
-    return rk4_steps(lambda y, w: rates(y, w, p), y, acting, dt, substeps), past, memory, inputs
 
 
 class World:
@@ -112,7 +62,6 @@ class World:
         draws: Sequence[Vehicle] = (),
         seed: int = 0,
     ) -> None:
-        enable_double_precision()
         self.vehicle = vehicle
         self._linear = vehicle.traits.linear
         battery = vehicle.card.values().get("voltage_nominal")
@@ -127,8 +76,7 @@ class World:
             self.setting.mode = self.pilot.modes[-1]
         self.rows: list[Array] | None = None
         self.latest = np.empty(0)
-        # A linear model's angles are small ones, and their rates its own.
-        self._equations = equations_of(vehicle if self._linear else tumbling(vehicle))
+        self._force = traced_force(equations_of(vehicle)) if self.pilot.feels else None
         self._p = parameter_row(vehicle, around)
         self._drawn = [parameter_row(one, around) for one in draws]
         self._limits = np.array(vehicle.input_limits).T
@@ -232,25 +180,7 @@ class World:
         flying = [(craft, self._p, self.setting.decoupled != (name == "ghost")) for name, craft in self._crafts.items()]
         flying += [(c, p, self.setting.decoupled) for c, p in zip(self._fan, self._drawn, strict=True) if c is not None]
         for craft, p, decoupled in flying:
-            arrays = advance(
-                self._equations,
-                self.pilot.step,
-                self._substeps,
-                craft.x,
-                craft.x if self._linear else from_euler(craft.x),
-                craft.past,
-                self._back,
-                craft.memory,
-                wanted,
-                around,
-                added,
-                self.pilot.gains[self.setting.mode, decoupled],
-                p,
-                self._limits,
-                1.0 / self._rate,
-            )
-            row, craft.past, craft.memory, craft.inputs = (np.asarray(part) for part in arrays)
-            craft.x = row if self._linear else to_euler(row, craft.x)
+            self._advance(craft, p, self.pilot.gains[self.setting.mode, decoupled], wanted, around, added)
         self._fan = [None if c is None or self._lost(c.x) else c for c in self._fan]
         own = self._crafts["own"]
         self._check(own, before)
@@ -263,6 +193,26 @@ class World:
         if ghost is not None and self._lost(ghost.x):
             self.set_ghost(False)
         self.ticks += 1
+
+    def _advance(self, craft: Craft, p: Array, gains: Array, wanted: Array, around: Array, added: Array) -> None:
+        """One controller step of a copy: the law, then `_substeps` of physics with its inputs held."""
+        columns = np.arange(craft.past.shape[1])
+        acting = craft.past[len(craft.past) - 1 - self._back[-1], columns]
+        told = np.concatenate([craft.x, self._feel(craft.x, acting, around, p), around[-1:]])
+        craft.memory, command = self.pilot.decide(craft.memory, told, wanted, gains)
+        craft.inputs = np.clip(command + added, *self._limits)
+        craft.past = np.concatenate([craft.past[1:], craft.inputs[None]])
+        sent = craft.past[len(craft.past) - 1 - self._back, columns]
+        rows = np.concatenate([sent, np.tile(around, (len(sent), 1))], axis=1)
+        rows = np.concatenate([rows, rows[-1:]])
+        plan = FlightPlan(craft.x[:, None], p[:, None], rows[:, :, None], 1.0 / self._rate, keep=self._substeps)
+        craft.x = fly(self.vehicle, plan, quaternion=not self._linear)[0][-1, :, 0]
+
+    def _feel(self, x: Array, inputs: Array, around: Array, p: Array) -> Array:
+        """The specific force [m/s^2], where the law is told of it."""
+        if self._force is None:
+            return np.zeros(3)
+        return np.asarray(self._force(x, np.concatenate([inputs, around]), p))[:, 0]
 
     def _lost(self, x: Array) -> bool:
         """Whether a ghost has flown to where it shows nothing any more."""

@@ -18,12 +18,12 @@ from swashplate.control.analysis.step_response import cross_ratio, step_metrics
 from swashplate.control.laws.autopilot import Autopilot, autopilot
 from swashplate.control.lqg.analysis import analyse, sensitivity
 from swashplate.control.lqg.design import design
+from swashplate.engine.law import REFERENCES
 from swashplate.errors import SwashError
-from swashplate.export.closed_loop_c import loop_in_c
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.control_check import compose_check
-from swashplate.simulation.closed_loop import REFERENCES, simulate_closed_loop
+from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.wind import INDOOR, Gusts
 
@@ -45,7 +45,7 @@ def place(coax: Vehicle, hover: Trim) -> ControlCheck:
 
 def checked(coax: Vehicle, controller: Autopilot, hover: Trim, gusts: Gusts | None = INDOOR) -> ControlCheck:
     """Flown in C, as `sp.check_controller` does."""
-    return check_controller(coax, controller, hover, gusts=gusts, fly=loop_in_c(coax, controller, hover))
+    return check_controller(coax, controller, hover, gusts=gusts)
 
 
 def integrator(gain: float, *, rate: float = 10.0) -> SampledLoop:
@@ -87,8 +87,7 @@ def test_sensitivity_is_what_a_flight_with_a_wrong_sensor_shows(coax: Vehicle, h
     t = np.arange(12251) / 500.0
     wanted = math.radians(3.0) * np.sin(1.0 * t)
     law = autopilot(coax, hover)
-    fly = loop_in_c(coax, law, hover)
-    flight = simulate_closed_loop(coax, law, duration=24.5, reference={"psi": wanted}, start=hover, rate=500.0, fly=fly)
+    flight = simulate_closed_loop(coax, law, duration=24.5, reference={"psi": wanted}, start=hover, rate=500.0)
     last = t > 24.5 - 2.0 * np.pi
     answer = 2.0 * np.mean(flight.values("psi")[last] * np.exp(-1j * t[last])) * 1j
     assert abs(answer) / math.radians(3.0) == pytest.approx(abs(complementary[1]), rel=0.02)
@@ -198,7 +197,7 @@ def test_a_conventional_helicopter_under_its_state_hold(place: ControlCheck) -> 
 @pytest.mark.proof
 def test_a_linear_quadratic_controller_that_is_fed_the_states(coax: Vehicle, hover: Trim) -> None:
     states = design(coax, sensors=())
-    fed = check_controller(coax, states, hover, duration=5.0, fly=loop_in_c(coax, states, hover))
+    fed = check_controller(coax, states, hover, duration=5.0)
     assert fed.problems == ()
     assert fed.notes == ()
     assert fed.slowest.real < -0.01  # memory that nothing writes is no mode
@@ -207,7 +206,7 @@ def test_a_linear_quadratic_controller_that_is_fed_the_states(coax: Vehicle, hov
 
 def test_a_linear_quadratic_controller_with_an_observer(coax: Vehicle, hover: Trim) -> None:
     told = design(coax, sensors=suite("imu@100,mocap@100+10ms"))
-    seen = check_controller(coax, told, hover, duration=5.0, fly=loop_in_c(coax, told, hover))
+    seen = check_controller(coax, told, hover, duration=5.0)
     assert seen.problems == ()
     assert "observer" in seen.notes[0]
     assert seen.margins is not None
@@ -258,7 +257,7 @@ def test_gusts_move_what_a_controller_holds_by_their_square(coax: Vehicle, hover
     held, problems, notes = ("psi", "z", "x", "y"), list[str](), list[str]()
     still = Aircraft(coax, hover, {})
     law = autopilot(coax, hover)
-    less = fly_gusts(still, law, weak, held, 20.0, problems, notes, fly=loop_in_c(coax, law, hover))
+    less = fly_gusts(still, law, weak, held, 20.0, problems, notes)
     assert less is not None
     assert less.place / found.place == pytest.approx(0.01, rel=0.2)
     assert fly_gusts(still, autopilot(coax, hover), None, held, 20.0, problems, notes) is None

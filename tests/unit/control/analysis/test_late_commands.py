@@ -23,7 +23,6 @@ from swashplate.control.lqg.design import design
 from swashplate.control.lqg.steady_loop import Watched, crossovers
 from swashplate.control.lqg.weights import crossover_limits, total_delays
 from swashplate.errors import ControllerError
-from swashplate.export.closed_loop_c import loop_in_c
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.delays import input_delays
 from swashplate.models.vehicle import Vehicle
@@ -63,7 +62,7 @@ def aware(late: Vehicle) -> Lqg:
 
 @pytest.fixture(scope="module")
 def judged(late: Vehicle, aware: Lqg, hover: Trim) -> ControlCheck:
-    return check_controller(late, aware, hover, duration=8.0, fly=loop_in_c(late, aware, hover))
+    return check_controller(late, aware, hover, duration=8.0)
 
 
 # ---- what is known -------------------------------------------------------------------------------------------------
@@ -106,12 +105,11 @@ def test_late_loops_are_what_late_flights_do(coax: Vehicle) -> None:
     controller = autopilot(coax, hover)
     nudged = hover.__class__(**{**vars(hover), "state": hover.state + 0.02 * (np.arange(len(hover.state)) == 9)})
     for wait, stands in ((0.03, True), (0.036, False)):
-        fly = loop_in_c(coax, controller, hover)
         slope = loop_modes(coax, controller, hover, delays={"servo_roll": wait, "servo_pitch": wait})
         assert bool(slope[0].real < 0.0) is stands
         flight = simulate_closed_loop(
             coax, controller, duration=12.0, start=nudged, rate=500.0,
-            delays={"servo_roll": wait, "servo_pitch": wait}, fly=fly,
+            delays={"servo_roll": wait, "servo_pitch": wait},
         )  # fmt: skip
         rate = np.abs(flight.values("p"))
         grew = rate[flight.time("p") > 9.0].max() > rate[flight.time("p") < 3.0].max()
@@ -119,29 +117,19 @@ def test_late_loops_are_what_late_flights_do(coax: Vehicle) -> None:
 
 
 def test_nothing_acts_before_it_can(late: Vehicle, hover: Trim) -> None:
-    """In C; that this is XLA's flight is asked below."""
     controller = autopilot(late, hover)
-    fly = loop_in_c(late, controller, hover)
-    flown = simulate_closed_loop(
-        late, controller, duration=0.5, reference={"psi": 0.3}, start=hover, rate=500.0, fly=fly
-    )
+    flown = simulate_closed_loop(late, controller, duration=0.5, reference={"psi": 0.3}, start=hover, rate=500.0)
     for name, wait in input_delays(late).items():
         moved = flown.time(name)[np.abs(flown.values(name) - hover.commands()[name]) > 1e-6]
         assert moved.size == 0 or moved[0] >= wait - 1e-9
         assert name.startswith("servo") or moved[0] < wait + 0.02
 
 
-@pytest.mark.proof
 def test_many_flights_are_as_late_as_one(late: Vehicle, hover: Trim) -> None:
     controller = autopilot(late, hover)
-    one, in_c = (
-        simulate_closed_loop(late, controller, duration=0.5, reference={"psi": 0.3}, start=hover, rate=500.0, fly=fly)
-        for fly in (None, loop_in_c(late, controller, hover))
-    )
+    one = simulate_closed_loop(late, controller, duration=0.5, reference={"psi": 0.3}, start=hover, rate=500.0)
     many = simulate_closed_loops(late, controller, duration=0.5, size=2, reference={"psi": 0.3}, start=hover)
     np.testing.assert_allclose(many["psi"][:, 0], one.values("psi")[:-1:5], atol=1e-11)
-    for name in (*late.state_names, *late.input_names):
-        np.testing.assert_allclose(in_c.values(name), one.values(name), rtol=1e-9, atol=1e-11, err_msg=name)
     for name, wait in input_delays(late).items():
         place = late.input_names.index(name)
         moved = np.flatnonzero(np.abs(many.rows[:, place, 0] - hover.inputs[place]) > 1e-6)
@@ -191,7 +179,7 @@ def test_a_design_that_knows_no_delay_is_refused_and_its_flights_are_lost(
 ) -> None:
     """The same design on an aircraft without delays has no problems: `test_control_check`."""
     blind = design(coax, sensors=suite(SENSORS))
-    found = check_controller(late, blind, hover, duration=5.0, fly=loop_in_c(late, blind, hover))
+    found = check_controller(late, blind, hover, duration=5.0)
     assert found.margins is None
     assert found.slowest.real > 1.0
     assert any("growing mode" in words for words in found.problems)
@@ -241,7 +229,7 @@ def test_from_a_fits_file_to_an_aircraft_that_flies_in_short(late: Vehicle, tmp_
     assert abs(drawn["tau_f_upper"] - 1.6) > 0.05
     aircraft = fit.model.with_values(drawn)
     rest = sp.trim(aircraft, voltage=12.22)
-    flown = check_controller(aircraft, made, rest, duration=8.0, fly=loop_in_c(aircraft, made, rest))
+    flown = check_controller(aircraft, made, rest, duration=8.0)
     assert flown.problems == ()
     assert flown.in_gusts is not None
     assert flown.in_gusts.place < 0.25

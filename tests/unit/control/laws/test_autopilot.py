@@ -24,17 +24,10 @@ from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation import closed_loop
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.trim import Trim, trim
 
 RATE = 500.0
-
-
-@pytest.fixture(autouse=True)
-def one_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Flights of every length here are compiled once: samples too many are cut off."""
-    monkeypatch.setattr(closed_loop, "shared_length", lambda n: 16384)
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from swashplate.control.lqg.design import Holding
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.controller import Controller
 
 _FLIGHTS = 256
 """Of a task, where the file does not say: some seconds of work, so that starting it costs little."""

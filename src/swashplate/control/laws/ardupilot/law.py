@@ -13,17 +13,16 @@ from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.control.laws.ardupilot.filters import low_pass, notch, one_pole, reached_by
 from swashplate.control.laws.ardupilot.mixers import FRAMES, Mixer, SwashplateMixer
 from swashplate.control.laws.ardupilot.parameters import AXES, DEFAULTS, RATE
-from swashplate.jax_on_demand import jax, jnp
+from swashplate.engine.symbols import ArrayFunctions, Symbols
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.controller import Step, StepController
 from swashplate.simulation.trim import Trim
 
 FlightMode = Literal["stabilize", "alt_hold", "loiter"]
@@ -53,7 +52,7 @@ _TURNING = tuple(np.radians([(40.0, 720.0), (40.0, 720.0), (10.0, 120.0)]).T)
 
 
 @dataclass(frozen=True)
-class ArduPilotLaw:
+class ArduPilotLaw(StepController):
     """A controller for `simulate_closed_loop`.
 
     Attributes:
@@ -124,16 +123,16 @@ _STEPS: dict[tuple[str, int], Step] = {}
 
 
 def ardupilot_step(
-    memory: Float[jax.Array, " memory"],
-    time: Float[jax.Array, ""],
-    measured: Float[jax.Array, " measured"],
-    reference: Float[jax.Array, " references"],
-    gains: Float[jax.Array, " gains"],
+    memory: Symbols,
+    measured: Symbols,
+    reference: Symbols,
+    gains: Symbols,
+    xp: ArrayFunctions,
     *,
     frame: str,
     inputs: int,
 ) -> tuple[Any, Any]:
-    """One step, traced by JAX, as `simulate_closed_loop` calls it."""
+    """One step, as `simulate_closed_loop` calls it."""
     head, rest = len(_HEAD), len(_HEAD) + len(_NAMES)
     dt, height, place = (gains[i] for i in range(head))
     k = {name: gains[head + i] for i, name in enumerate(_NAMES)}
@@ -142,74 +141,76 @@ def ardupilot_step(
     m = {name: memory[where] for name, where in _PLACES.items()}
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     heli = issubclass(FRAMES[frame], SwashplateMixer)
-    after: dict[str, Any] = {"begun": jnp.ones(1)}
-    velocity = _to_north_east_down(body)
+    after: dict[str, Any] = {"begun": xp.ones(1)}
+    velocity = _to_north_east_down(body, xp)
 
-    lean = _horizontal(body, velocity, reference, k, m, after, dt) * place
-    most = jnp.radians(0.01 * k["ANGLE_MAX"])
-    trimmed = jnp.radians(0.01 * k["ATC_HOVR_ROL_TRM"]) if heli else 0.0
-    wanted = jnp.stack([lean[0] + most * reference[6] + trimmed, lean[1] - most * reference[7], reference[3]])
-    throttle = _vertical(body, velocity, reference, k, m, after, dt, height, heli=heli)
-    rates = _attitude(body, wanted, k, m, after, dt)
-    commands = _rates(body, rates, k, m, after, dt, heli=heli)
-    mixed = mixer.mix(jnp.concatenate([commands, throttle]), k)
+    lean = _horizontal(body, velocity, reference, k, m, after, dt, xp) * place
+    most = xp.radians(0.01 * k["ANGLE_MAX"])
+    trimmed = xp.radians(0.01 * k["ATC_HOVR_ROL_TRM"]) if heli else 0.0
+    wanted = xp.stack([lean[0] + most * reference[6] + trimmed, lean[1] - most * reference[7], reference[3]])
+    throttle = _vertical(body, velocity, reference, k, m, after, dt, xp, height, heli=heli)
+    rates = _attitude(body, wanted, k, m, after, dt, xp)
+    commands = _rates(body, rates, k, m, after, dt, xp, heli=heli)
+    mixed = mixer.mix(xp.concatenate([commands, throttle]), k, xp)
     after["cut"] = mixed.cut
-    carried = jnp.concatenate([jnp.atleast_1d(after[name]) for name in _PLACES])
+    carried = xp.concatenate([xp.atleast_1d(after[name]) for name in _PLACES])
     return carried, mixed.inputs[:inputs]
 
 
-def square_root(error: Scalar, p: Scalar, most: Scalar) -> Any:
+def square_root(error: Scalar, p: Scalar, most: Scalar, xp: ArrayFunctions) -> Any:
     """ArduPilot's `sqrt_controller`: proportional near zero, and from there no faster than `most` can brake."""
-    near = most / jnp.maximum(p * p, 1e-12)
-    beyond = jnp.sqrt(2.0 * most * jnp.maximum(jnp.abs(error) - 0.5 * near, 0.5 * near))
-    return jnp.where(jnp.abs(error) > near, jnp.sign(error) * beyond, p * error)
+    near = most / xp.maximum(p * p, 1e-12)
+    beyond = xp.sqrt(2.0 * most * xp.maximum(xp.abs(error) - 0.5 * near, 0.5 * near))
+    return xp.where(xp.greater(xp.abs(error), near), xp.sign(error) * beyond, p * error)
 
 
-def _to_north_east_down(body: RigidBody) -> Any:
-    cf, sf, ct, st, cp, sp = (f(a) for a in (body.phi, body.theta, body.psi) for f in (jnp.cos, jnp.sin))
+def _to_north_east_down(body: RigidBody, xp: ArrayFunctions) -> Any:
+    cf, sf, ct, st, cp, sp = (f(a) for a in (body.phi, body.theta, body.psi) for f in (xp.cos, xp.sin))
     u, v, w = body.u, body.v, body.w
     level, side, down = ct * u + sf * st * v + cf * st * w, cf * v - sf * w, -st * u + sf * ct * v + cf * ct * w
-    return jnp.stack([cp * level - sp * side, sp * level + cp * side, down])
+    return xp.stack([cp * level - sp * side, sp * level + cp * side, down])
 
 
 def _horizontal(
     body: RigidBody,
-    velocity: jax.Array,
-    reference: jax.Array,
+    velocity: Symbols,
+    reference: Symbols,
     k: Mapping[str, Any],
     m: Mapping[str, Any],
     after: dict[str, Any],
     dt: Scalar,
+    xp: ArrayFunctions,
 ) -> Any:
     """Roll and pitch [rad] that the place asks for."""
-    off = jnp.stack([reference[0] - body.x, reference[1] - body.y])
-    far = jnp.sqrt(off @ off + 1e-12)
-    speed = off / far * jnp.minimum(square_root(far, k["PSC_POSXY_P"], _SIDEWAYS), _FASTEST)
-    c, s = jnp.cos(body.psi), jnp.sin(body.psi)
-    speed += jnp.stack([c * reference[4] - s * reference[5], s * reference[4] + c * reference[5]])
+    off = xp.stack([reference[0] - body.x, reference[1] - body.y])
+    far = xp.sqrt(off @ off + 1e-12)
+    speed = off / far * xp.minimum(square_root(far, k["PSC_POSXY_P"], _SIDEWAYS, xp), _FASTEST)
+    c, s = xp.cos(body.psi), xp.sin(body.psi)
+    speed = speed + xp.stack([c * reference[4] - s * reference[5], s * reference[4] + c * reference[5]])
     error = speed - velocity[:2]
-    filtered = one_pole(m["speed_error"], error, k["PSC_VELXY_FLTE"], dt, m["begun"])
-    slope = reached_by(m["speed_slope"], (filtered - m["speed_error"]) / dt, k["PSC_VELXY_FLTD"], dt) * m["begun"]
+    filtered = one_pole(m["speed_error"], error, k["PSC_VELXY_FLTE"], dt, m["begun"], xp)
+    slope = reached_by(m["speed_slope"], (filtered - m["speed_error"]) / dt, k["PSC_VELXY_FLTD"], dt, xp) * m["begun"]
     asked = k["PSC_VELXY_P"] * filtered + m["speed_sum"] + k["PSC_VELXY_D"] * slope
-    size, most = jnp.sqrt(asked @ asked + 1e-12), GRAVITY * jnp.tan(jnp.radians(0.01 * k["ANGLE_MAX"]))
-    asked *= jnp.minimum(1.0, most / size)
-    growing = (size > most) & (filtered @ asked > 0.0)
-    total = m["speed_sum"] + jnp.where(growing, 0.0, k["PSC_VELXY_I"] * dt) * filtered
+    size, most = xp.sqrt(asked @ asked + 1e-12), GRAVITY * xp.tan(xp.radians(0.01 * k["ANGLE_MAX"]))
+    asked = asked * xp.minimum(1.0, most / size)
+    growing = xp.greater(size, most) & xp.greater(filtered @ asked, 0.0)
+    total = m["speed_sum"] + xp.where(growing, 0.0, k["PSC_VELXY_I"] * dt) * filtered
     bound = 0.01 * k["PSC_VELXY_IMAX"]
-    after |= {"speed_error": filtered, "speed_slope": slope, "speed_sum": jnp.clip(total, -bound, bound)}
+    after |= {"speed_error": filtered, "speed_slope": slope, "speed_sum": xp.clip(total, -bound, bound)}
     ahead, right = c * asked[0] + s * asked[1], -s * asked[0] + c * asked[1]
-    pitch = -jnp.arctan(ahead / GRAVITY)
-    return jnp.stack([jnp.arctan(right * jnp.cos(pitch) / GRAVITY), pitch])
+    pitch = -xp.arctan(ahead / GRAVITY)
+    return xp.stack([xp.arctan(right * xp.cos(pitch) / GRAVITY), pitch])
 
 
 def _vertical(
     body: RigidBody,
-    velocity: jax.Array,
-    reference: jax.Array,
+    velocity: Symbols,
+    reference: Symbols,
     k: Mapping[str, Any],
     m: Mapping[str, Any],
     after: dict[str, Any],
     dt: Scalar,
+    xp: ArrayFunctions,
     height: Scalar,
     *,
     heli: bool,
@@ -217,95 +218,102 @@ def _vertical(
     """The throttle, shape (1,): the hover's and what the height asks for."""
     climb, hover = -velocity[2:], k["H_COL_HOVER" if heli else "MOT_THST_HOVER"]
     felt = m["begun"] * (climb - m["climb"]) / dt  # what accelerometers feel, less gravity, since the last step
-    felt, stages = low_pass(m["felt"][None], felt, k["INS_ACCEL_FILTER"], dt)
-    asked = jnp.clip(square_root(body.z - reference[2], k["PSC_POSZ_P"], _LIFT), -_SINK, _CLIMB)
-    error = one_pole(m["climb_error"], asked - climb, k["PSC_VELZ_FLTE"], dt, m["begun"])
+    felt, stages = low_pass(m["felt"].reshape(1, 2), felt, k["INS_ACCEL_FILTER"], dt, xp)
+    asked = xp.clip(square_root(body.z - reference[2], k["PSC_POSZ_P"], _LIFT, xp), -_SINK, _CLIMB)
+    error = one_pole(m["climb_error"], asked - climb, k["PSC_VELZ_FLTE"], dt, m["begun"], xp)
     bound = 0.01 * k["PSC_VELZ_IMAX"]
-    total = jnp.clip(m["climb_sum"] + k["PSC_VELZ_I"] * dt * error, -bound, bound)
-    lift = one_pole(m["lift_error"], k["PSC_VELZ_P"] * error + total - felt, k["PSC_ACCZ_FLTE"], dt, m["begun"])
-    most = jnp.maximum(1e-3 * k["PSC_ACCZ_IMAX"], hover)
-    upper = hover + m["throttle"] >= 1.0
-    lower = hover + m["throttle"] <= 0.0
-    stuck = (upper & (lift > 0.0)) | (lower & (lift < 0.0))
-    lifted = jnp.clip(m["lift_sum"] + jnp.where(stuck, 0.0, 0.1 * k["PSC_ACCZ_I"] * dt) * lift, -most, most)
+    total = xp.clip(m["climb_sum"] + k["PSC_VELZ_I"] * dt * error, -bound, bound)
+    lift = one_pole(m["lift_error"], k["PSC_VELZ_P"] * error + total - felt, k["PSC_ACCZ_FLTE"], dt, m["begun"], xp)
+    most = xp.maximum(1e-3 * k["PSC_ACCZ_IMAX"], hover)
+    upper = xp.less_equal(1.0, hover + m["throttle"])
+    lower = xp.less_equal(hover + m["throttle"], 0.0)
+    stuck = (upper & xp.greater(lift, 0.0)) | (lower & xp.greater(0.0, lift))
+    lifted = xp.clip(m["lift_sum"] + xp.where(stuck, 0.0, 0.1 * k["PSC_ACCZ_I"] * dt) * lift, -most, most)
     thrust = hover + 0.1 * k["PSC_ACCZ_P"] * lift + lifted
-    tilt = 1.0 if heli else 1.0 / jnp.clip(jnp.cos(body.phi) * jnp.cos(body.theta), 0.5, 1.0)
-    throttle = reached_by(m["throttle"], jnp.clip(thrust * tilt, 0.0, 1.0) - hover, k[_THROTTLE], dt)
+    tilt = 1.0 if heli else 1.0 / xp.clip(xp.cos(body.phi) * xp.cos(body.theta), 0.5, 1.0)
+    throttle = reached_by(m["throttle"], xp.clip(thrust * tilt, 0.0, 1.0) - hover, k[_THROTTLE], dt, xp)
     holds = height > 0.5
     after |= {
         "climb": climb,
         "felt": stages[0],
         "climb_error": error,
-        "climb_sum": jnp.where(holds, total, m["climb_sum"]),
+        "climb_sum": xp.where(holds, total, m["climb_sum"]),
         "lift_error": lift,
-        "lift_sum": jnp.where(holds, lifted, m["lift_sum"]),
-        "throttle": jnp.where(holds, throttle, m["throttle"]),
+        "lift_sum": xp.where(holds, lifted, m["lift_sum"]),
+        "throttle": xp.where(holds, throttle, m["throttle"]),
     }
     return hover + after["throttle"]
 
 
 def _attitude(
-    body: RigidBody, wanted: jax.Array, k: Mapping[str, Any], m: Mapping[str, Any], after: dict[str, Any], dt: Scalar
-) -> Any:
-    """Rates [rad/s] asked of the rate controllers, shape (3,)."""
-    now = jnp.stack([body.phi, body.theta, body.psi])
-    target = jnp.where(m["begun"] > 0.5, m["target"], now)
-    largest = jnp.radians(0.01 * jnp.stack([k[f"ATC_ACCEL_{n}_MAX"] for n in "RPY"]))
-    off = wanted - target
-    off = off.at[2].set(jnp.arctan2(jnp.sin(off[2]), jnp.cos(off[2])))
-    turning = square_root(off, 1.0 / jnp.maximum(k["ATC_INPUT_TC"], 0.01), largest)
-    turning = m["turning"] + jnp.clip(turning - m["turning"], -largest * dt, largest * dt)
-    shaped = k["ATC_RATE_FF_ENAB"] > 0.5  # otherwise the demand itself, and no rate of it is fed forward
-    target, turning = jnp.where(shaped, target + turning * dt, target + off), jnp.where(shaped, turning, 0.0)
-    after |= {"target": target, "turning": turning}
-    error = _rotation(now, target)
-    gain = jnp.stack([k[f"ATC_ANG_{axis}_P"] for axis in AXES])
-    rates = square_root(error, gain, jnp.clip(0.5 * largest, _TURNING[0], _TURNING[1]))
-    sf, cf, st, ct = jnp.sin(target[0]), jnp.cos(target[0]), jnp.sin(target[1]), jnp.cos(target[1])
-    p, q, r = turning[0], turning[1], turning[2]
-    return rates + jnp.stack([p - r * st, q * cf + r * sf * ct, r * cf * ct - q * sf])
-
-
-def _rotation(now: jax.Array, target: jax.Array) -> Any:
-    """The rotation in body axes from one attitude to another [rad], from their quaternions."""
-
-    def quaternion(angles: jax.Array) -> Any:
-        (cf, ct, cp), (sf, st, sp) = jnp.cos(0.5 * angles), jnp.sin(0.5 * angles)
-        return (
-            cf * ct * cp + sf * st * sp,
-            jnp.stack([sf * ct * cp - cf * st * sp, cf * st * cp + sf * ct * sp, cf * ct * sp - sf * st * cp]),
-        )
-
-    (a, u), (b, v) = quaternion(now), quaternion(target)
-    real, parts = a * b + u @ v, a * v - b * u - jnp.cross(u, v)
-    size = jnp.sqrt(parts @ parts + 1e-18)
-    return parts / size * 2.0 * jnp.arctan2(size, jnp.abs(real)) * jnp.where(real < 0.0, -1.0, 1.0)
-
-
-def _rates(
     body: RigidBody,
-    asked: jax.Array,
+    wanted: Symbols,
     k: Mapping[str, Any],
     m: Mapping[str, Any],
     after: dict[str, Any],
     dt: Scalar,
+    xp: ArrayFunctions,
+) -> Any:
+    """Rates [rad/s] asked of the rate controllers, shape (3,)."""
+    now = xp.stack([body.phi, body.theta, body.psi])
+    target = xp.where(xp.greater(m["begun"], 0.5), m["target"], now)
+    largest = xp.radians(0.01 * xp.stack([k[f"ATC_ACCEL_{n}_MAX"] for n in "RPY"]))
+    off = wanted - target
+    off = xp.stack([off[0], off[1], xp.arctan2(xp.sin(off[2]), xp.cos(off[2]))])
+    turning = square_root(off, 1.0 / xp.maximum(k["ATC_INPUT_TC"], 0.01), largest, xp)
+    turning = m["turning"] + xp.clip(turning - m["turning"], -largest * dt, largest * dt)
+    shaped = k["ATC_RATE_FF_ENAB"] > 0.5  # otherwise the demand itself, and no rate of it is fed forward
+    target, turning = xp.where(shaped, target + turning * dt, target + off), xp.where(shaped, turning, 0.0)
+    after |= {"target": target, "turning": turning}
+    error = _rotation(now, target, xp)
+    gain = xp.stack([k[f"ATC_ANG_{axis}_P"] for axis in AXES])
+    rates = square_root(error, gain, xp.clip(0.5 * largest, _TURNING[0], _TURNING[1]), xp)
+    sf, cf, st, ct = xp.sin(target[0]), xp.cos(target[0]), xp.sin(target[1]), xp.cos(target[1])
+    p, q, r = turning[0], turning[1], turning[2]
+    return rates + xp.stack([p - r * st, q * cf + r * sf * ct, r * cf * ct - q * sf])
+
+
+def _rotation(now: Symbols, target: Symbols, xp: ArrayFunctions) -> Any:
+    """The rotation in body axes from one attitude to another [rad], from their quaternions."""
+
+    def quaternion(angles: Symbols) -> Any:
+        (cf, ct, cp), (sf, st, sp) = xp.cos(0.5 * angles), xp.sin(0.5 * angles)
+        return (
+            cf * ct * cp + sf * st * sp,
+            xp.stack([sf * ct * cp - cf * st * sp, cf * st * cp + sf * ct * sp, cf * ct * sp - sf * st * cp]),
+        )
+
+    (a, u), (b, v) = quaternion(now), quaternion(target)
+    real, parts = a * b + u @ v, a * v - b * u - xp.cross(u, v)
+    size = xp.sqrt(parts @ parts + 1e-18)
+    return parts / size * 2.0 * xp.arctan2(size, xp.abs(real)) * xp.where(real < 0.0, -1.0, 1.0)
+
+
+def _rates(
+    body: RigidBody,
+    asked: Symbols,
+    k: Mapping[str, Any],
+    m: Mapping[str, Any],
+    after: dict[str, Any],
+    dt: Scalar,
+    xp: ArrayFunctions,
     *,
     heli: bool,
 ) -> Any:
     """Roll, pitch and yaw commands, shape (3,)."""
-    at = {name: jnp.stack([k[f"ATC_RAT_{axis}_{name}"] for axis in AXES]) for name in RATE}
-    gyro = jnp.stack([body.p, body.q, body.r])
-    gyro, after["notch"] = notch(m["notch"], gyro, k, dt)
-    gyro, stages = low_pass(m["gyro"].reshape(3, 2), gyro, k["INS_GYRO_FILTER"], dt)
+    at = {name: xp.stack([k[f"ATC_RAT_{axis}_{name}"] for axis in AXES]) for name in RATE}
+    gyro = xp.stack([body.p, body.q, body.r])
+    gyro, after["notch"] = notch(m["notch"], gyro, k, dt, xp)
+    gyro, stages = low_pass(m["gyro"].reshape(3, 2), gyro, k["INS_GYRO_FILTER"], dt, xp)
     after["gyro"] = stages.ravel()
-    wanted = one_pole(m["wanted"], asked, at["FLTT"], dt, m["begun"])
-    error = one_pole(m["error"], wanted - gyro, at["FLTE"], dt, m["begun"])
-    slope = reached_by(m["slope"], m["begun"] * (error - m["error"]) / dt, at["FLTD"], dt)
+    wanted = one_pole(m["wanted"], asked, at["FLTT"], dt, m["begun"], xp)
+    error = one_pole(m["error"], wanted - gyro, at["FLTE"], dt, m["begun"], xp)
+    slope = reached_by(m["slope"], m["begun"] * (error - m["error"]) / dt, at["FLTD"], dt, xp)
     total = m["sum"]
     if heli:  # roll and pitch near hover: down to ILMI
-        kept = jnp.clip(total, -at["ILMI"], at["ILMI"])
-        total = total - _LEAK * (total - kept) * jnp.array([1.0, 1.0, 0.0])
-    stuck = (m["cut"] > 0.5) & (total * error > 0.0)
-    total = jnp.clip(total + jnp.where(stuck, 0.0, at["I"] * dt) * error, -at["IMAX"], at["IMAX"])
+        kept = xp.clip(total, -at["ILMI"], at["ILMI"])
+        total = total - _LEAK * (total - kept) * np.array([1.0, 1.0, 0.0])
+    stuck = xp.greater(m["cut"], 0.5) & xp.greater(total * error, 0.0)
+    total = xp.clip(total + xp.where(stuck, 0.0, at["I"] * dt) * error, -at["IMAX"], at["IMAX"])
     after |= {"wanted": wanted, "error": error, "slope": slope, "sum": total}
-    return jnp.clip(at["FF"] * wanted + at["P"] * error + total + at["D"] * slope, -1.0, 1.0)
+    return xp.clip(at["FF"] * wanted + at["P"] * error + total + at["D"] * slope, -1.0, 1.0)

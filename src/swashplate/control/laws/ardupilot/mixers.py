@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.jax_on_demand import jax, jnp
+from swashplate.engine.symbols import ArrayFunctions, Symbols
 from swashplate.physics.backend import Scalar
 
 _FULL_STICK = 4500.0
@@ -45,12 +45,12 @@ class SwashplateMixer(NamedTuple):
     turn: float
     engine: float
 
-    def mix(self, wanted: Array | jax.Array, k: Mapping[str, Any]) -> Mixed:
+    def mix(self, wanted: Symbols, k: Mapping[str, Any], xp: ArrayFunctions) -> Mixed:
         """Of roll, pitch, yaw (-1 to 1) and throttle (0 to 1), shape (4,), under parameters by ArduPilot's names."""
-        size = jnp.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + 1e-12)
+        size = xp.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + 1e-12)
         room = k["H_CYC_MAX"] / _FULL_STICK
-        share = jnp.where(size > room, room / size, 1.0)
-        yaw, throttle = jnp.clip(wanted[2], -1.0, 1.0), jnp.clip(wanted[3], 0.0, 1.0)
+        share = xp.where(size > room, room / size, 1.0)
+        yaw, throttle = xp.clip(wanted[2], -1.0, 1.0), xp.clip(wanted[3], 0.0, 1.0)
         inputs = [
             self.least + throttle * (self.most - self.least),
             -self.ahead * share * wanted[1],
@@ -58,9 +58,9 @@ class SwashplateMixer(NamedTuple):
             self.tail + self.turn * yaw,
             self.engine,
         ]
-        cut = jnp.where(share < 1.0, 1.0, 0.0)
-        beyond = jnp.where(jnp.abs(wanted[2]) > 1.0, 1.0, 0.0)
-        return Mixed(jnp.stack([jnp.asarray(v, float) for v in inputs]), jnp.stack([cut, cut, beyond]))
+        cut = xp.where(share < 1.0, 1.0, 0.0)
+        beyond = xp.where(xp.abs(wanted[2]) > 1.0, 1.0, 0.0)
+        return Mixed(xp.stack([v + 0.0 * wanted[0] for v in inputs]), xp.stack([cut, cut, beyond]))
 
     def unmixed(self, inputs: Sequence[float] | Array, k: Mapping[str, float]) -> Array:
         """Roll, pitch, yaw and throttle that give these inputs, shape (4,)."""
@@ -90,31 +90,31 @@ class CoaxialMixer(NamedTuple):
     yaw: float = 0.5
     divided: float = 1.0
 
-    def mix(self, wanted: Array | jax.Array, k: Mapping[str, Any]) -> Mixed:
+    def mix(self, wanted: Symbols, k: Mapping[str, Any], xp: ArrayFunctions) -> Mixed:
         """As `SwashplateMixer.mix`."""
-        largest = jnp.maximum(jnp.abs(wanted[0]), jnp.abs(wanted[1]))
-        kept = jnp.minimum(jnp.abs(wanted[2]), _HALF * k["MOT_YAW_HEADROOM"] / 1000.0)
-        share = jnp.clip((1.0 - kept) / jnp.maximum(largest, 1e-9), 0.0, 1.0)
+        largest = xp.maximum(xp.abs(wanted[0]), xp.abs(wanted[1]))
+        kept = xp.minimum(xp.abs(wanted[2]), _HALF * k["MOT_YAW_HEADROOM"] / 1000.0)
+        share = xp.clip((1.0 - kept) / xp.maximum(largest, 1e-9), 0.0, 1.0)
         allowed = 2.0 * (1.0 - share * largest)
-        yaw = jnp.clip(wanted[2], -allowed, allowed)
-        asked = jnp.clip(wanted[3], 0.0, 1.0)
-        least = jnp.maximum(share * largest, jnp.abs(yaw))  # raised for roll, pitch and yaw, half way to the hover's
-        thrust = jnp.maximum(asked, jnp.minimum(least, _HALF * (asked + k["MOT_THST_HOVER"])))
-        yaw = jnp.clip(yaw, -thrust, thrust)
-        divisor = jnp.clip(jnp.maximum(_HALF * k["MOT_THST_HOVER"], thrust), _LEAST_ACTUATOR, 1.0)
-        flaps = wanted[:2] / jnp.where(self.divided > 0.5, divisor, 1.0)
-        lower, upper = (_actuator(thrust + side * yaw, k) for side in (-self.yaw, self.yaw))
-        inputs = jnp.stack(
+        yaw = xp.clip(wanted[2], -allowed, allowed)
+        asked = xp.clip(wanted[3], 0.0, 1.0)
+        least = xp.maximum(share * largest, xp.abs(yaw))  # raised for roll, pitch and yaw, half way to the hover's
+        thrust = xp.maximum(asked, xp.minimum(least, _HALF * (asked + k["MOT_THST_HOVER"])))
+        yaw = xp.clip(yaw, -thrust, thrust)
+        divisor = xp.clip(xp.maximum(_HALF * k["MOT_THST_HOVER"], thrust), _LEAST_ACTUATOR, 1.0)
+        flaps = wanted[:2] / xp.where(self.divided > 0.5, divisor, 1.0)
+        lower, upper = (_actuator(thrust + side * yaw, k, xp) for side in (-self.yaw, self.yaw))
+        inputs = xp.stack(
             [
-                jnp.maximum(self.lower, lower),
-                jnp.maximum(self.upper, upper),
-                self.roll * jnp.clip(flaps[0], -1.0, 1.0),
-                self.pitch * jnp.clip(flaps[1], -1.0, 1.0),
+                xp.maximum(self.lower, lower),
+                xp.maximum(self.upper, upper),
+                self.roll * xp.clip(flaps[0], -1.0, 1.0),
+                self.pitch * xp.clip(flaps[1], -1.0, 1.0),
             ]
         )
-        scaled = share < 1.0
-        cut = [scaled | (jnp.abs(flaps[0]) > 1.0), scaled | (jnp.abs(flaps[1]) > 1.0), yaw != wanted[2]]
-        return Mixed(inputs, jnp.stack(cut).astype(float))
+        scaled, turned = xp.greater(1.0, share), xp.greater(xp.abs(yaw - wanted[2]), 0.0)
+        cut = [scaled | xp.greater(xp.abs(flap), 1.0) for flap in flaps] + [turned]
+        return Mixed(inputs, xp.stack([xp.where(each, 1.0, 0.0) for each in cut]))
 
     def unmixed(self, inputs: Sequence[float] | Array, k: Mapping[str, float]) -> Array:
         """As `SwashplateMixer.unmixed`."""
@@ -134,12 +134,12 @@ FRAMES: Mapping[str, type[SwashplateMixer] | type[CoaxialMixer]] = {
 """By `Traits.servo_layout`."""
 
 
-def _actuator(thrust: Scalar, k: Mapping[str, Any]) -> Any:
+def _actuator(thrust: Scalar, k: Mapping[str, Any], xp: ArrayFunctions) -> Any:
     """A motor's output, 0 to 1, for a thrust of 0 to 1; the battery is not compensated for (MOT_BAT_VOLT_MAX 0)."""
-    expo = jnp.maximum(k["MOT_THST_EXPO"], 1e-6)
-    inside = jnp.maximum((1.0 - expo) ** 2 + 4.0 * expo * jnp.clip(thrust, 0.0, 1.0), 0.0)
-    curved = ((expo - 1.0) + jnp.sqrt(inside)) / (2.0 * expo)
-    return k["MOT_SPIN_MIN"] + (k["MOT_SPIN_MAX"] - k["MOT_SPIN_MIN"]) * jnp.clip(curved, 0.0, 1.0)
+    expo = xp.maximum(k["MOT_THST_EXPO"], 1e-6)
+    inside = xp.maximum((1.0 - expo) ** 2 + 4.0 * expo * xp.clip(thrust, 0.0, 1.0), 0.0)
+    curved = ((expo - 1.0) + xp.sqrt(inside)) / (2.0 * expo)
+    return k["MOT_SPIN_MIN"] + (k["MOT_SPIN_MAX"] - k["MOT_SPIN_MIN"]) * xp.clip(curved, 0.0, 1.0)
 
 
 def _thrust(command: float, k: Mapping[str, float]) -> float:

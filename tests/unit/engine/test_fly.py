@@ -1,25 +1,25 @@
-"""Many vehicles flown by their own C: the numbers of plain floats, whatever flies beside, and wrong ones are found."""
+"""Flights by compiled C and by the virtual machine: the numbers of plain floats, and wrong ones are found."""
 
 from __future__ import annotations
 
 from itertools import pairwise
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from swashplate.api.simulate_batch import simulate_batch
 from swashplate.arrays import Array
 from swashplate.compiler import compiler
-from swashplate.engine.equations import equations_of, parameter_row, unpack_rows
-from swashplate.errors import ExportError
-from swashplate.export import batch_c, c_lanes
-from swashplate.export.batch_c import fly_in_c
+from swashplate.engine import fly as engine_fly
+from swashplate.engine.card import fly_on_card
+from swashplate.engine.equations import Equations, equations_of, parameter_row, unpack_rows
+from swashplate.engine.fly import FlightPlan, flight_code, fly
+from swashplate.engine.trace import traced_rates
+from swashplate.engine.virtual import fly_virtually
+from swashplate.errors import ExportError, SwashError
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
-from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import trim
 
 pytest.importorskip("casadi", reason="the extra 'model' is not installed")
@@ -50,8 +50,16 @@ def by_floats(made: Vehicle, x0: Array, rows: Array, p: Array, *, held: bool, nu
     x, driving = x0[:, number], rows[:, :, min(number, rows.shape[2] - 1)]
     for before, after in pairwise(driving):
         end = before if held else after
-        x = rk4_step(rates, x, lambda at, a=before, b=end: a + at * (b - a), DT, looped=False)
+        k1 = rates(x, before)
+        k2 = rates(x + DT / 2 * k1, (before + end) / 2)
+        k3 = rates(x + DT / 2 * k2, (before + end) / 2)
+        k4 = rates(x + DT * k3, end)
+        x = x + DT / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     return x
+
+
+def plan_of(x0: Array, rows: Array, p: Array, *, keep: int, held: bool = True) -> FlightPlan:
+    return FlightPlan(x0, p, rows, DT, keep=keep, held=held)
 
 
 def apart(found: Array, exact: Array) -> float:
@@ -66,7 +74,10 @@ def test_it_flies_as_plain_floats_do(name: str, options: dict[str, Any], held: b
     """Every lane of a block that is not full: to 1e-11."""
     made = vehicle(name, **options)
     x0, rows, p = tables(made, 19, 8)
-    found = fly_in_c(equations_of(made), x0, rows, p, DT, keep=4, held=held)
+    plan = plan_of(x0, rows, p, keep=4, held=held)
+    found, _ = fly(made, plan)
+    virtual, _ = fly_virtually(made, plan, "double", quaternion=False)
+    np.testing.assert_allclose(virtual, found, rtol=1e-11, atol=1e-11)
     assert found.shape == (3, *x0.shape)
     np.testing.assert_array_equal(found[0], x0)
     for number in (0, 15, 18):
@@ -79,18 +90,17 @@ def test_it_flies_as_plain_floats_do(name: str, options: dict[str, Any], held: b
 def test_neighbours_do_not_matter(name: str) -> None:
     """To the last bit: other lanes, other blocks, cards and inputs of their own or shared, one that is lost beside."""
     made = vehicle(name)
-    x0, rows, p = tables(made, batch_c._PART + 21, 6, alike=True)
+    x0, rows, p = tables(made, engine_fly._PART + 21, 6, alike=True)
     lost = x0.copy()
     lost[made.index("p"), 3] = np.nan
-    equations = equations_of(made)
-    all_of_them = fly_in_c(equations, x0, rows, p, DT, keep=6, held=True)[-1]
-    beside = fly_in_c(equations, lost, rows, p, DT, keep=6, held=True)[-1]
+    all_of_them = fly(made, plan_of(x0, rows, p, keep=6))[0][-1]
+    beside = fly(made, plan_of(lost, rows, p, keep=6))[0][-1]
     assert not np.isfinite(beside[:, 3]).all()
     others = np.arange(x0.shape[1]) != 3
     np.testing.assert_array_equal(beside[:, others], all_of_them[:, others])
     few = [2, 40, -1]
     own = (np.repeat(table, len(few), axis=-1) for table in (rows, p))
-    np.testing.assert_array_equal(fly_in_c(equations, x0[:, few], *own, DT, keep=6, held=True)[-1], all_of_them[:, few])
+    np.testing.assert_array_equal(fly(made, plan_of(x0[:, few], *own, keep=6))[0][-1], all_of_them[:, few])
 
 
 @pytest.mark.parametrize(
@@ -106,42 +116,62 @@ def test_a_wrong_number_is_found(monkeypatch: pytest.MonkeyPatch, name: str, rig
     made = vehicle(name)
     x0, rows, p = tables(made, 3, 8)
     x0[made.index("phi")] += 1.0
-    source = c_lanes.lane_code(equations_of(made), "double")
+    source = flight_code(equations_of(made), None, precision="double", lanes=16)
     assert source.count(right) > 0
 
     def flown(text: str) -> Array:
-        batch_c._compiled.cache_clear()
-        monkeypatch.setattr(batch_c, "lane_code", lambda *_: text)
-        return fly_in_c(equations_of(made), x0, rows, p, DT, keep=8, held=True)[-1]
+        engine_fly._open_program.cache_clear()
+        monkeypatch.setattr(engine_fly, "flight_code", lambda *_, **__: text)
+        return fly(made, plan_of(x0, rows, p, keep=8))[0][-1]
 
     exact = np.stack([by_floats(made, x0, rows, p, held=True, number=i) for i in range(3)], axis=1)
     assert apart(flown(source), exact) < 1e-11
     assert apart(flown(source.replace(right, wrong)), exact) > 1e-11
-    batch_c._compiled.cache_clear()
+    engine_fly._open_program.cache_clear()
 
 
-def test_without_a_compiler_jax_flies_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    said: list[str] = []
+def test_without_a_compiler_the_virtual_machine_flies(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = vehicle("crazyflie")
+    x0, rows, p = tables(made, 3, 40)
+    plan = plan_of(x0, rows, p, keep=2)
+    quick, _ = fly(made, plan)
+    monkeypatch.setattr(engine_fly, "can_compile", lambda: False)
+    slow, _ = fly(made, plan)
+    np.testing.assert_allclose(quick, slow, rtol=1e-11, atol=1e-11)
 
-    def refused(*_: object, **__: object) -> None:
-        raise ExportError("there is no C compiler here (cc, gcc or clang).")
 
-    small = vehicle("crazyflie")  # what XLA compiles soonest
-    masses = {"mass": small.card.values()["mass"] * np.array([1.0, 1.02, 1.1])}
-    hover = trim(small).commands()
-    inputs = {**hover, "motor_1": hover["motor_1"] + np.linspace(0.0, 0.01, 201)}
-    quick = simulate_batch(small, inputs, parameters=masses, notice=said.append)
-    assert not said
-    monkeypatch.setattr(batch_c, "loaded", refused)
-    batch_c._compiled.cache_clear()
-    slow = simulate_batch(small, inputs, parameters=masses, notice=said.append)
-    assert said == [
-        "The vehicles' C cannot be used here, JAX flies them five times slower: "
-        "there is no C compiler here (cc, gcc or clang)."
-    ]
-    np.testing.assert_allclose(quick.states, slow.states, rtol=1e-11, atol=1e-11)
-    with pytest.raises(ExportError):
-        simulate_batch(small, inputs, parameters=masses, engine="c")
+@pytest.mark.parametrize("name", ["coax", "raptor50"])
+def test_a_vehicle_that_tumbles_is_flown_with_a_quaternion(name: str) -> None:
+    """Through the vertical, where Euler angles have no rates: the pitch that is shown turns back at 90 degrees."""
+    made = vehicle(name)
+    hover = trim(made)
+    rows = np.tile(np.array([*hover.inputs, 0.0, 0.0, 0.0, hover.environment.voltage])[:, None], (201, 1, 1))
+    x0 = np.repeat(hover.state[:, None], 2, axis=1)
+    x0[made.index("theta"), 1], x0[made.index("q"), 1] = 1.2, 9.0
+    plan = plan_of(x0, rows, parameter_row(made, hover.environment)[:, None], keep=1)
+    found, _ = fly(made, plan)
+    virtual, _ = fly_virtually(made, plan, "double", quaternion=True)
+    theta, psi = found[:, made.index("theta")], found[:, made.index("psi")]
+    assert np.max(np.abs(theta[:, 0])) < 0.1
+    assert np.max(np.abs(theta[:, 1])) > 1.4
+    assert np.all(np.isfinite(found))
+    assert np.all(np.abs(theta) <= np.pi / 2 + 1e-9)
+    assert np.max(np.abs(np.diff(psi, axis=0))) < 3.2, "turns are counted on"
+    np.testing.assert_allclose(found[..., 1], virtual[..., 1], rtol=1e-9, atol=1e-9)
+
+
+def test_the_card_flies_the_same_graph() -> None:
+    pytest.importorskip("jax", reason="the extra 'cuda' is not installed")
+    made = vehicle("raptor50")
+    x0, rows, p = tables(made, 5, 12)
+    plan = plan_of(x0, rows, p, keep=4)
+    found, _ = fly(made, plan)
+    np.testing.assert_allclose(fly_on_card(made, plan, precision="double"), found, rtol=1e-11, atol=1e-11)
+    single = fly_on_card(made, plan, precision="single")
+    assert single.dtype == np.float32
+    assert 1e-9 < apart(single, found) < 1e-3
+    with pytest.raises(SwashError, match="held inputs only"):
+        fly_on_card(made, plan_of(x0, rows, p, keep=4, held=False))
 
 
 def test_equations_that_casadi_cannot_trace_are_told_of() -> None:
@@ -152,7 +182,7 @@ def test_equations_that_casadi_cannot_trace_are_told_of() -> None:
             return ()
 
         def rates(self, x: Any, *_: object) -> list[float]:
-            return [jnp.tanh(x[0])]
+            return [x[0].imaginary_part()]
 
     with pytest.raises(ExportError, match="strange: CasADi cannot trace the equations"):
-        c_lanes.lane_code(type("E", (), {"vehicle": Strange()})(), "double")
+        traced_rates(Equations("strange", Strange()))

@@ -13,12 +13,10 @@ from functools import partial
 from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
-from jaxtyping import Float
 
 from swashplate.arrays import Array
-from swashplate.jax_on_demand import jax, jnp
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend, FloatBackend, JaxBackend, Scalar
+from swashplate.physics.backend import Backend, FloatBackend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector
 from swashplate.physics.quaternion import Quaternion, euler_of, quaternion_of, quaternion_rates
@@ -141,49 +139,3 @@ def euler_rows(rows: Array, before: Array) -> Array:
         before = to_euler(row, before)
         made.append(before)
     return np.array(made)
-
-
-# ---- in closed loops -----------------------------------------------------------------------------------------------
-
-
-class CarriedAttitude(NamedTuple):
-    """How a compiled loop carries a vehicle whose controller is told roll, pitch and yaw.
-
-    Attributes:
-        vehicle: whose equations are flown.
-        start: its state row or columns at the start.
-        shown: what `see` needs of the sample before; nothing, or roll, pitch and yaw.
-        see: from a row or columns of states and `shown` to those of the vehicle with Euler angles, and `shown` of now.
-    """
-
-    vehicle: Vehicle
-    start: Array
-    shown: Array
-    see: Callable[[Any, Any], tuple[Any, Any]]
-
-
-def with_angles(vehicle: Vehicle, start: Array) -> CarriedAttitude:
-    """Euler angles, as they are: for flights that stay clear of the vertical."""
-    return CarriedAttitude(vehicle, start, np.zeros((0, *start.shape[1:])), _as_it_is)
-
-
-def with_quaternion(vehicle: Vehicle, start: Array) -> CarriedAttitude:
-    """A quaternion, for flights that do not; `start` is a row of the vehicle, or equal columns (n_states, n)."""
-    row = from_euler(start if start.ndim == 1 else start[:, 0])
-    begin = row if start.ndim == 1 else np.repeat(row[:, None], start.shape[1], axis=1)
-    return CarriedAttitude(tumbling(vehicle), begin, start[_PHI:_P], _as_euler)
-
-
-def _as_it_is(x: Float[jax.Array, "rows ..."], shown: Float[jax.Array, "rows ..."]) -> tuple[Any, Any]:
-    return x, shown
-
-
-def _as_euler(x: Float[jax.Array, "rows ..."], shown: Float[jax.Array, "rows ..."]) -> tuple[Any, Any]:
-    euler = euler_of(Quaternion(*(x[_PHI + k] for k in range(4))), JaxBackend())
-    turn = 2.0 * jnp.pi
-    roll, yaw = (
-        angle + turn * jnp.round((before - angle) / turn)
-        for angle, before in ((euler.phi, shown[0]), (euler.psi, shown[2]))
-    )
-    angles = jnp.stack([roll, euler.theta, yaw])
-    return jnp.concatenate([x[:_PHI], angles, x[_PHI + 4 :]]), angles

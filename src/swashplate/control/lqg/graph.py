@@ -1,0 +1,117 @@
+"""The step of an LQG controller with its observer as a graph: the same step whatever runs it, traced by CasADi.
+
+The equations of the vehicle and their exact Jacobians become straight-line code, the covariance's algebra small loops
+over fixed sizes; nothing is allocated, and of the C library only sin, cos, sqrt and atan2 are called.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from swashplate.control.lqg.controller_step import Carried, LawOnEstimates, lqg_step, sizes
+from swashplate.control.lqg.law import LAW_MEMORY, Feedback
+from swashplate.engine.law import REFERENCES
+from swashplate.engine.roots import require_casadi
+from swashplate.filtering.matrix_operations import CasadiMatrices
+from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
+from swashplate.filtering.sensor_suite import readings
+from swashplate.physics.backend import Backend, CasadiBackend
+from swashplate.physics.frames import Vector
+from swashplate.physics.rigid_body import RigidBody
+
+_BODY = len(RigidBody._fields)
+
+
+class Readable(Protocol):
+    """A row of a backend's numbers."""
+
+    def __getitem__(self, place: int, /) -> Any: ...
+
+
+def true_readings(plan: ObserverPlan, x: Readable, force: Readable, bias: Readable, xp: Backend) -> list[Any]:
+    """All channels of a true state row, without noise; x (states, ...), force (3, ...) and bias (biases, ...) are rows
+    of the backend's numbers."""
+    body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])
+    named = {name: bias[i] for i, name in enumerate(plan.biases)}
+    return [v for sensor in plan.sensors for v in readings(sensor, body, felt, named, xp).values()]
+
+
+def readings_kept(plan: ObserverPlan) -> int:
+    """Readings that simulated sensors keep until they arrive, in samples."""
+    return max((at.late for at in plan.sampling), default=0) + 1
+
+
+def step_graph(
+    plan: ObserverPlan, numbers: Numbers, feedback: Feedback, memory: int, law: LawOnEstimates | None = None
+) -> Any:
+    """`(memory, measured, reference) -> (memory, command)` as one CasADi function; `measured` ends in the voltage.
+
+    Args:
+        plan, numbers, feedback: the controller.
+        memory: how many numbers it carries.
+        law: another feedback on the estimates than the linear-quadratic one.
+    """
+    casadi = require_casadi()
+    N, rows, sensors = sizes(plan)
+    m, depth = plan.inputs, max(plan.delays) + 1
+    read = len(plan.channels) if plan.sensors else plan.n
+    carried = casadi.MX.sym("memory", memory)
+    measured, reference = casadi.MX.sym("measured", read + 1), casadi.MX.sym("reference", len(REFERENCES))
+    rest = carried[N + rows * rows :]
+    given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
+    counts = [rest[depth * m + i] for i in range(sensors)]
+    kept = [rest[depth * m + sensors + i] for i in range(LAW_MEMORY)]
+    estimate = ObserverEstimate(carried[:N], casadi.reshape(carried[N : N + rows * rows], rows, rows))
+    gains = [casadi.DM(np.asarray(each)) for each in feedback.gains]
+    if plan.period:  # columns of readings that are not due vanish from the code
+        numbers = numbers._replace(steady=[casadi.sparsify(casadi.DM(np.asarray(each))) for each in numbers.steady])
+    after, commands = lqg_step(
+        plan,
+        numbers,
+        feedback._replace(gains=gains),
+        Carried(estimate, given, counts, kept),
+        measured[:read],
+        measured[read],
+        [reference[i] for i in range(len(REFERENCES))],
+        CasadiMatrices(),
+        law,
+    )
+    flat = [value for row in after.given for value in row] + after.counts + after.law
+    covariance = [casadi.reshape(casadi.densify(after.estimate.covariance), rows * rows, 1)] if rows else []
+    mean = [after.estimate.mean] if N else []
+    result = casadi.vertcat(*mean, *covariance, *flat, *commands)
+    return casadi.Function("swash_traced", [carried, measured, reference], [result])
+
+
+def sensed_graph(plan: ObserverPlan, numbers: Numbers, step: Any, memory: int) -> Any:
+    """The step of `step_graph` behind simulated sensors.
+
+    Its memory has the sensors' behind it: biases, a count of samples, the last readings; `measured` is the body's state
+    row, the specific force, the voltage and the draws.
+    """
+    casadi = require_casadi()
+    nb, channels, depth = len(plan.biases), len(plan.channels), readings_kept(plan)
+    drawn = channels + nb
+    sizes_of = {"own": nb + 1 + depth * channels, "x": _BODY, "felt": 3, "drawn": drawn}
+    own, x, felt, noise = (casadi.SX.sym(name, size) for name, size in sizes_of.items())
+    bias, count = own[:nb], own[nb]
+    now = casadi.vertcat(*true_readings(plan, x, felt, bias, CasadiBackend()))
+    stored = casadi.vertcat(now, own[nb + 1 : nb + 1 + (depth - 1) * channels])
+    queue = casadi.if_else(count < 0.5, casadi.repmat(now, depth, 1), stored)
+    place = [at.late for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
+    wander = np.asarray(numbers.process)[plan.n + 6 : plan.n + 6 + nb]
+    noisy = [
+        queue[late * channels + i] + np.sqrt(variance) * noise[i]
+        for i, (late, variance) in enumerate(zip(place, np.asarray(numbers.measurement), strict=True))
+    ]
+    wandered = [bias[i] + np.sqrt(wander[i]) * noise[channels + i] for i in range(nb)]
+    after = casadi.vertcat(*wandered, count + 1.0, queue)
+    sensing = casadi.Function("swash_sensed", [own, x, felt, noise], [casadi.vertcat(*noisy), casadi.densify(after)])
+    carried, reference = casadi.MX.sym("memory", memory + own.shape[0]), casadi.MX.sym("reference", len(REFERENCES))
+    measured = casadi.MX.sym("measured", _BODY + 3 + 1 + drawn)
+    y, kept = sensing(carried[memory:], measured[:_BODY], measured[_BODY : _BODY + 3], measured[_BODY + 4 :])
+    stepped = step(carried[:memory], casadi.vertcat(y, measured[_BODY + 3]), reference)
+    result = casadi.vertcat(stepped[:memory], kept, stepped[memory:])
+    return casadi.Function("swash_traced", [carried, measured, reference], [result])
