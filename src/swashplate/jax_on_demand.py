@@ -16,7 +16,6 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 _SETTINGS: dict[str, object] = {}
-_WAITING: list[Callable[[], object]] = []
 _LOCK = RLock()
 
 
@@ -33,14 +32,6 @@ def option(name: str) -> Any:
     if "jax" not in sys.modules:
         return _SETTINGS.get(name, os.environ.get(name.upper()))
     return _catch_up().config.values[name]
-
-
-def when_loaded(register: Callable[[], object]) -> None:
-    """Call it once JAX is there: at once, or when it is loaded from here."""
-    with _LOCK:
-        _WAITING.append(register)
-    if "jax" in sys.modules:
-        _catch_up()
 
 
 class _OnDemand(ModuleType):
@@ -60,8 +51,6 @@ def _catch_up() -> Any:
     with _LOCK:
         while _SETTINGS:
             loaded.config.update(*_SETTINGS.popitem())
-        while _WAITING:
-            _WAITING.pop()()
     return loaded
 
 

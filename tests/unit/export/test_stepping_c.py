@@ -85,5 +85,6 @@ def test_a_compiler_that_fails_is_told_of_and_the_link_flies_on(monkeypatch: pyt
     linked = sp.link_ardupilot(sp.vehicle("coax"), port=0, idle_exit=0.1, notice=said.append)
     assert linked.exchanges == 0
     assert said == [
-        "The vehicle's C cannot be used here, a slower virtual machine steps instead: cc refused the exported sources: no math.h"
+        "The vehicle's C cannot be used here, a slower virtual machine steps instead: "
+        "cc refused the exported sources: no math.h"
     ]
