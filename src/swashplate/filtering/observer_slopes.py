@@ -9,12 +9,13 @@ import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
+from swashplate.engine.slopes import slopes_at, slopes_graph
+from swashplate.errors import ExportError
 from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.physics.backend import Backend
 from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.dynamics import enable_double_precision
 
 OfObserver = Callable[[ObserverPlan, Numbers, Sequence[Any], Sequence[Any], Backend], list[Any]]
@@ -24,17 +25,18 @@ OfObserver = Callable[[ObserverPlan, Numbers, Sequence[Any], Sequence[Any], Back
 def linearised_at(of: OfObserver, plan: ObserverPlan, numbers: Numbers, e: Array, w: Array) -> tuple[Array, Array]:
     """Value (m,) and slopes by what is estimated (m, N) at estimates (N,) under a driving row.
 
-    By numbers that carry their slopes, which compiles nothing, or by XLA where the equations cannot take these.
+    From the graph, or by XLA where CasADi cannot trace the equations.
     """
     plain = Numbers(*(None if part is None else np.asarray(part).tolist() for part in numbers))
     try:
-        values, slopes = slopes_of(lambda e, w: of(plan, plain, e, w, DUAL), e, w)
-    except CANNOT:
+        graph = slopes_graph(lambda e, w, _, xp: of(plan, plain, e, w, xp), (len(e), len(w), 0), where="the observer")
+    except ExportError:
         enable_double_precision()
         made = Numbers(*(None if part is None else jnp.asarray(part) for part in numbers))
         value, by_e = _compiled(of, plan, made, jnp.asarray(e), jnp.asarray(w))
         return np.asarray(value), np.asarray(by_e)
-    return values, slopes[:, : len(e)]
+    values, by_e, _ = slopes_at(graph, e, w, np.zeros(0))
+    return values, by_e
 
 
 @jit(static_argnums=(0, 1), compiler_options=RUN_RARELY)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,8 @@ from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row, unpack_rows
-from swashplate.errors import SwashError
+from swashplate.engine.slopes import slopes_at, slopes_graph
+from swashplate.errors import ExportError, SwashError
 from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.conventional.derivative_table import COLUMNS, CONTROLS, MOTIONS, DerivativeTable
 from swashplate.models.conventional.helicopter import CONTRIBUTORS, loads
@@ -19,7 +20,6 @@ from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.dynamics import enable_double_precision, jax_backend
 from swashplate.simulation.trim import Trim
 
@@ -64,13 +64,20 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
 
 
 def _exact_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tuple[Array, Array]:
-    """By numbers that carry their slopes, which compiles nothing, or by XLA where the equations cannot take these."""
+    """From the graph, or by XLA where CasADi cannot trace the equations (sums over arrays)."""
     try:
-        _, slopes = slopes_of(partial(_acting, equations, p=p.tolist(), xp=DUAL), x, w)
-    except CANNOT:
+        _, by_x, by_w = slopes_at(_graph(equations, len(x), len(w), len(p)), x, w, p)
+    except ExportError:
         by_x, by_w = _compiled_slopes(equations, x, w, p)
-        return np.asarray(by_x), np.asarray(by_w)
-    return slopes[:, : len(x)], slopes[:, len(x) :]
+    return np.asarray(by_x), np.asarray(by_w)
+
+
+@lru_cache(maxsize=16)
+def _graph(equations: Equations, states: int, driving: int, numbers: int) -> Any:
+    def acting(x: Rows, w: Rows, p: Rows, xp: Backend) -> list[Any]:
+        return _acting(equations, x, w, p=p, xp=xp)
+
+    return slopes_graph(acting, (states, driving, numbers), where=equations.vehicle.name)
 
 
 @jit(static_argnums=0, compiler_options=RUN_RARELY)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -10,14 +10,15 @@ import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
+from swashplate.engine import slopes
 from swashplate.engine.equations import Equations, unpack_rows
+from swashplate.errors import ExportError
 from swashplate.jax_on_demand import jax, jit, jnp, option, set_option
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import JaxBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import RUN_RARELY, compile_small_loops_whole
-from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.trigonometry import vector_backend
 
 Rates = Callable[[Any, Any, Any, Environment], Any]
@@ -96,19 +97,13 @@ def row_force(equations: Equations, *, xp: JaxBackend | None = None) -> RowRates
 def rates_and_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
     """The rates of a state row, and their slopes by it and by what drives it; rows as in `row_rates`.
 
-    By numbers that carry their slopes, which compiles nothing, or by XLA where the equations cannot take these.
+    From the graph, or by XLA where CasADi cannot trace the equations (sums over arrays).
     """
-
-    def rates(x: Sequence[Any], w: Sequence[Any]) -> list[Any]:
-        u, parameters, environment = unpack_rows(equations, w, p.tolist())
-        return equations.vehicle.rates(x, u, parameters, environment, DUAL)
-
     try:
-        values, slopes = slopes_of(rates, x, w)
-    except CANNOT:
+        return slopes.rates_and_slopes(equations, x, w, p)
+    except ExportError:
         values, by_x, by_w = _compiled_slopes(equations, x, w, p)
         return np.asarray(values), np.asarray(by_x), np.asarray(by_w)
-    return values, slopes[:, : len(x)], slopes[:, len(x) :]
 
 
 @jit(static_argnums=0, compiler_options=RUN_RARELY)

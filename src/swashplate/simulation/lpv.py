@@ -15,10 +15,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
@@ -26,19 +25,16 @@ from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, p
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
-from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.catalogue import from_card
 from swashplate.models.linear.matrices_file import state_space_of_matrices
 from swashplate.models.linear.stitching import stitch_points
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
-from swashplate.simulation.compilation import QUICK_FLIGHT
-from swashplate.simulation.dynamics import enable_double_precision, row_rates
+from swashplate.simulation.dynamics import rates_and_slopes
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.reduction import PAPER_INPUTS, PAPER_STATES, paper_model
-from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import Trim
 
@@ -101,7 +97,6 @@ def simulate_lpv(
         FlightError: where an input is missing.
         SwashError: for another vehicle, scheme or initial state, or without the table it needs.
     """
-    enable_double_precision()
     names = ("a1", "b1")
     if not set(PAPER_STATES) | set(names) <= set(vehicle.state_names) or len(vehicle.state_names) != 14:
         raise SwashError(
@@ -122,8 +117,7 @@ def simulate_lpv(
         disc = np.array([start.states()[name] for name in names])
         row = np.array([getattr(surroundings, name) for name in SURROUNDINGS], dtype=np.float64)
         p = parameter_row(vehicle, surroundings)
-        padded = np.concatenate([u, np.repeat(u[-1:], -len(u) % _CHUNK, axis=0)])
-        states = _printed(equations_of(vehicle), (x0, u0), (began, disc), padded, row, p, 1.0 / rate)[: len(u)]
+        states = _printed(equations_of(vehicle), (x0, u0), (began, disc), u, row, p, 1.0 / rate)
     elif scheme in ("trim-term", "stitched"):
         if over is None:
             raise SwashError(f"scheme '{scheme}' needs a schedule.", hint="Pass over=schedule(vehicle, speeds).")
@@ -138,8 +132,7 @@ def simulate_lpv(
                 environment=surroundings,
             ).array(PAPER_STATES)
         else:
-            tables = tuple(map(jnp.asarray, (over.speeds, over.x, over.u, over.A, over.B)))
-            states = _scheduled(tables, began, u, 1.0 / rate)
+            states = _scheduled(over, began, u, 1.0 / rate)
     else:
         raise SwashError(f"scheme is '{scheme}', expected 'as-printed', 'trim-term' or 'stitched'.")
     time = np.arange(len(u)) / rate
@@ -149,74 +142,45 @@ def simulate_lpv(
     return Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate_lpv", scheme=scheme, rate=rate)
 
 
-_CHUNK = 50
-"""Steps per inner loop: XLA makes one function of a loop that touches little (`compile_small_loops_whole`)."""
-
-
-def _product(A: Float[jax.Array, "rows inner"], x: Float[jax.Array, ...]) -> Any:
-    """A @ x for a small matrix and a vector or matrix: a loop with a matrix product in it would not be one function."""
-    return jnp.sum(A[:, :, None] * x[None], axis=1) if x.ndim == 2 else jnp.sum(A * x, axis=1)
-
-
-def _linear_step(
-    A: Float[jax.Array, "states states"],
-    c: Float[jax.Array, " states"],
-    x: Float[jax.Array, " states"],
-    dt: Float[jax.Array, ""],
-) -> Any:
+def _linear_step(A: Array, c: Array, x: Array, dt: float) -> Array:
     """One Runge-Kutta step of dx/dt = A x + c: the Taylor series to fourth order."""
-    k = _product(A, x) + c
-    total, term = x + dt * k, k
+    term = A @ x + c
+    total = x + dt * term
     for order in (2.0, 3.0, 4.0):
-        term = dt * _product(A, term) / order
+        term = dt * (A @ term) / order
         total = total + dt * term
     return total
 
 
-@jit(static_argnums=0, compiler_options=QUICK_FLIGHT)
 def _printed(
     equations: Equations,
-    trimmed: tuple[Float[jax.Array, " states"], Float[jax.Array, " inputs"]],
-    begin: tuple[Float[jax.Array, " states"], Float[jax.Array, " disc"]],
-    u: Float[jax.Array, "samples inputs"],
-    row: Float[jax.Array, " surroundings"],
-    p: Float[jax.Array, " parameters"],
-    dt: Float[jax.Array, ""],
-) -> Any:
+    trimmed: tuple[Array, Array],
+    begin: tuple[Array, Array],
+    u: Array,
+    row: Array,
+    p: Array,
+    dt: float,
+) -> Array:
     vehicle = equations.vehicle
     x0, u0 = trimmed
-    rates = row_rates(equations, padded=False)
-    names = vehicle.state_names
-    ten = (*PAPER_STATES, "a1", "b1")
-    order = [10 + PAPER_INPUTS.index(name) for name in vehicle.input_names]
-
-    def moving(z: Float[jax.Array, " unknowns"]) -> Any:
-        """Rates of the eight states and the disc, from these ten and the controls."""
-        zero = jnp.zeros(())
-        # Stacks and slices only: XLA makes no function of a loop that gathers or scatters.
-        state = jnp.stack([z[ten.index(name)] if name in ten else zero for name in names])
-        moved = rates(state, jnp.concatenate([jnp.stack([z[i] for i in order]), row]), p)
-        return jnp.stack([moved[names.index(name)] for name in ten])
-
-    def step(carry: tuple[Any, Any], command: Float[jax.Array, " inputs"]) -> tuple[Any, Any]:
-        x, disc = carry
-        z = jnp.concatenate([x, disc, command])
-        # Sixteen directions side by side fill the processor's vectors; the last two are nothing.
-        value, slopes = jax.vmap(lambda along: jax.jvp(moving, (z,), (along,)), out_axes=(None, 0))(jnp.eye(16)[:, :14])
-        J = slopes[:14].T
+    ten = [vehicle.index(name) for name in (*PAPER_STATES, "a1", "b1")]
+    order = [PAPER_INPUTS.index(name) for name in vehicle.input_names]
+    back = [vehicle.input_names.index(name) for name in PAPER_INPUTS]
+    x, disc = (np.array(part, dtype=np.float64) for part in begin)
+    states = []
+    for command in u:
+        states.append(x)
+        state = np.zeros(len(vehicle.state_names))
+        state[ten] = np.concatenate([x, disc])
+        rates, by_x, by_w = rates_and_slopes(equations, state, np.concatenate([command[order], row]), p)
+        value, J = rates[ten], np.concatenate([by_x[np.ix_(ten, ten)], by_w[ten][:, back]], axis=1)
         # The disc's equations are linear in the disc: one Newton step is its steady tilt at this state.
-        a, b, c, d = J[8, 8], J[8, 9], J[9, 8], J[9, 9]
-        inverse = jnp.stack([jnp.stack([d, -b]), jnp.stack([-c, a])]) / (a * d - b * c)
-        follow = -_product(inverse, jnp.concatenate([J[8:, :8], J[8:, 10:]], axis=1))
-        A = J[:8, :8] + _product(J[:8, 8:10], follow[:, :8])
-        B = J[:8, 10:] + _product(J[:8, 8:10], follow[:, 8:])
-        after = _linear_step(A, _product(B, command - u0) - _product(A, x0), x, dt)
-        return (after, disc - _product(inverse, value[8:])), x
-
-    start: Any = tuple(map(jnp.asarray, begin))
-    chunks = jnp.asarray(u).reshape(-1, _CHUNK, u.shape[1])
-    _, states = jax.lax.scan(lambda carry, commands: jax.lax.scan(step, carry, commands), start, chunks)
-    return states.reshape(-1, len(PAPER_STATES))
+        inverse = np.linalg.inv(J[8:, 8:10])
+        follow = -inverse @ np.concatenate([J[8:, :8], J[8:, 10:]], axis=1)
+        A = J[:8, :8] + J[:8, 8:10] @ follow[:, :8]
+        B = J[:8, 10:] + J[:8, 8:10] @ follow[:, 8:]
+        x, disc = _linear_step(A, B @ (command - u0) - A @ x0, x, dt), disc - inverse @ value[8:]
+    return np.array(states)
 
 
 def _stitched(over: Schedule) -> Vehicle:
@@ -239,26 +203,21 @@ def _stitched(over: Schedule) -> Vehicle:
     return from_card(stitch_points(points, names=[point.title for point in points]))
 
 
-@jit()
-def _scheduled(
-    tables: tuple[Float[jax.Array, "speeds ..."], ...],
-    x0: Float[jax.Array, " states"],
-    u: Float[jax.Array, "samples inputs"],
-    dt: Float[jax.Array, ""],
-) -> Any:
-    speeds = tables[0]
+def _scheduled(over: Schedule, x0: Array, u: Array, dt: float) -> Array:
+    speeds, tables = over.speeds, (over.x, over.u, over.A, over.B)
 
-    def between(speed: Float[jax.Array, ""]) -> tuple[Any, ...]:
-        i = jnp.clip(jnp.searchsorted(speeds, speed) - 1, 0, speeds.size - 2)
-        f = jnp.clip((speed - speeds[i]) / (speeds[i + 1] - speeds[i]), 0.0, 1.0)
-        return tuple(table[i] + f * (table[i + 1] - table[i]) for table in tables[1:])
+    def rates(x: Array, command: Array) -> Array:
+        i = int(np.clip(np.searchsorted(speeds, x[_U]) - 1, 0, speeds.size - 2))
+        f = float(np.clip((x[_U] - speeds[i]) / (speeds[i + 1] - speeds[i]), 0.0, 1.0))
+        xt, ut, A, B = (table[i] + f * (table[i + 1] - table[i]) for table in tables)
+        return np.asarray(A @ (x - xt) + B @ (command - ut))
 
-    def rates(x: Float[jax.Array, " states"], command: Float[jax.Array, " inputs"]) -> Any:
-        xt, ut, A, B = between(x[_U])
-        return A @ (x - xt) + B @ (command - ut)
-
-    def step(x: Float[jax.Array, " states"], command: Float[jax.Array, " inputs"]) -> tuple[Any, Any]:
-        return rk4_step(rates, x, lambda _: command, dt, looped=False), x
-
-    _, states = jax.lax.scan(step, jnp.asarray(x0), jnp.asarray(u))
-    return states
+    x, states = x0, []
+    for command in u:
+        states.append(x)
+        k1 = rates(x, command)
+        k2 = rates(x + dt / 2 * k1, command)
+        k3 = rates(x + dt / 2 * k2, command)
+        k4 = rates(x + dt * k3, command)
+        x = x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return np.array(states)
