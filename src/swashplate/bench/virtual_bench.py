@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,20 +17,17 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.bench.record import LOADS, BenchRecord
 from swashplate.bench.refusals import COMMANDS
+from swashplate.engine.roots import require_casadi
 from swashplate.errors import BenchError
-from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.coax import CoaxInputs, CoaxParameters, CoaxState, Drive, loads
 from swashplate.models.coax_rotors import InflowOptions
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Backend, CasadiBackend
 from swashplate.physics.environment import Environment
-from swashplate.physics.frames import Vector
 from swashplate.physics.ground_effect import thrust_gain
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar
-from swashplate.simulation.compilation import QUICK_FLIGHT, enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision, jax_backend
-from swashplate.simulation.runge_kutta import rk4_step
 
 DRIVING = (
     "motor_lower",
@@ -47,7 +45,6 @@ DRIVING = (
 """What drives the bench, in the order of a compiled row."""
 
 _STATES = ("alpha_lower", "beta_lower", "eta_bar", "zeta_bar", "omega_lower", "omega_upper")
-_PADDING = 2048  # samples: records of like lengths share compiled code
 
 
 @dataclass(frozen=True)
@@ -147,20 +144,20 @@ def points(
 
 @dataclass(frozen=True)
 class _Held:
-    """What compiled code depends on."""
+    """How the vehicle is held."""
 
     mixing: str
     dt: float
 
 
-def _acting(plan: _Held, x: Any, w: Any, p: Any) -> Any:
+def _acting(plan: _Held, x: Sequence[Any], w: Sequence[Any], p: Sequence[Any], xp: Backend) -> Any:
     """Loads and rates of the moving parts of the held vehicle."""
     drive = dict(zip(DRIVING, w, strict=True))
     parameters, density = CoaxParameters(*p[:-2]), p[-1]
     body = RigidBody(*(0.0,) * 6, drive["phi"], drive["theta"], *(0.0,) * 4)
     held = StabilizerBar(drive["phi"] + drive["bar_alpha"], drive["theta"] + drive["bar_beta"])
     is_free = p[-2] > 0.5
-    bar = StabilizerBar(jnp.where(is_free, x[2], held.eta), jnp.where(is_free, x[3], held.zeta))
+    bar = StabilizerBar(xp.where(is_free, x[2], held.eta), xp.where(is_free, x[3], held.zeta))
     state = CoaxState(body, TipPathPlane(x[0], x[1]), bar, Drive(x[4], x[5]))
     inputs = CoaxInputs(*(drive[name] for name in COMMANDS))
     air = Environment(
@@ -170,40 +167,45 @@ def _acting(plan: _Held, x: Any, w: Any, p: Any) -> Any:
         gravity=0.0,
         voltage=drive["voltage"],
     )
-    return loads(state, inputs, parameters, air, jax_backend(), mixing=plan.mixing)
+    return loads(state, inputs, parameters, air, xp, mixing=plan.mixing)
 
 
-def _flat(force: Vector, moment: Vector) -> Any:
-    return jnp.stack([*force, *moment])
-
-
-@jit(static_argnums=0, compiler_options=QUICK_FLIGHT)
-def _run(plan: _Held, start: Any, driving: Any, parameters: Any) -> tuple[Any, Any]:
-    """States (records, n, 6) and loads (records, n, 6) for driving rows (records, n, 11).
+@lru_cache(maxsize=8)
+def _graphs(plan: _Held) -> tuple[Any, Any]:
+    """A step of Runge and Kutta's classical method from row to next row, and the loads: CasADi functions.
 
     Commands are held between samples, attitudes go straight to the next.
     """
-    glides = jnp.array([name in ("phi", "theta") for name in DRIVING], dtype=driving.dtype)
+    casadi, xp = require_casadi(), CasadiBackend()
+    x, w, then = (casadi.SX.sym(name, n) for name, n in (("x", len(_STATES)), ("w", len(DRIVING)), ("t", len(DRIVING))))
+    p, dt = casadi.SX.sym("p", len(CoaxParameters._fields) + 2), plan.dt
 
-    def record(x0: Any, rows: Any, p: Any) -> tuple[Any, Any]:
-        def rates(x: Any, w: Any) -> Any:
-            acting = _acting(plan, x, w, p)
-            return jnp.stack([jnp.asarray(rate) for part in (acting.lower, acting.bar, acting.drive) for rate in part])
+    def entries(column: Any) -> list[Any]:
+        return [column[i] for i in range(column.shape[0])]
 
-        def sample(x: Any, now_and_next: Any) -> tuple[Any, Any]:
-            now, then = now_and_next
-            glide = glides * (then - now)
-            return rk4_step(rates, x, lambda share: now + share * glide, plan.dt, looped=True), x
+    acting = _acting(plan, entries(x), entries(w), entries(p), xp)
+    moved = [rate for part in (acting.lower, acting.bar, acting.drive) for rate in part]
+    rates = casadi.Function("rates", [x, w, p], [casadi.vertcat(*moved)])
+    loads_of = casadi.Function("loads", [x, w, p], [casadi.vertcat(*acting.force, *acting.moment)])
+    glides = casadi.DM([float(name in ("phi", "theta")) for name in DRIVING])
+    end = w + glides * (then - w)
+    middle = (w + end) / 2
+    k1 = rates(x, w, p)
+    k2 = rates(x + dt / 2 * k1, middle, p)
+    k3 = rates(x + dt / 2 * k2, middle, p)
+    k4 = rates(x + dt * k3, end, p)
+    after = x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return casadi.Function("step", [x, w, then, p], [after], {"cse": True}), loads_of
 
-        _, states = jax.lax.scan(sample, x0, (rows, jnp.concatenate([rows[1:], rows[-1:]])))
 
-        def measured(x: Any, w: Any) -> Any:
-            acting = _acting(plan, x, w, p)
-            return _flat(acting.force, acting.moment)
-
-        return states, jax.vmap(measured)(states, rows)
-
-    return jax.vmap(record)(start, driving, parameters)
+def _run(plan: _Held, start: Array, rows: Array, p: Array) -> tuple[Array, Array]:
+    """States (n, 6) and loads (n, 6) of a record for its driving rows (n, 11)."""
+    step, loads_of = _graphs(plan)
+    n = len(rows)
+    numbers = np.repeat(p[:, None], n, axis=1)
+    after = step.mapaccum("record", n - 1)(start, rows[:-1].T, rows[1:].T, numbers[:, 1:]).full()
+    states = np.concatenate([start[:, None], after], axis=1)
+    return states.T, loads_of.map(n)(states, rows.T, numbers).full().T
 
 
 def virtual_bench(
@@ -227,22 +229,20 @@ def virtual_bench(
             channel="rotor",
             hint='Give the card with rotor = "paper": the bench finds k_thrust and k_torque.',
         )
-    enable_double_precision()
-    enable_compilation_cache()
     setup = setup or Setup()
     rngs = [np.random.default_rng([seed, number]) for number in range(len(schedules))]
     rows = [_driving_rows(vehicle, schedule) for schedule in schedules]
     reached = [
         _motors(vehicle, schedule, row, setup, rng) for schedule, row, rng in zip(schedules, rows, rngs, strict=True)
     ]
-    longest = -(-max(len(row) for row in rows) // _PADDING) * _PADDING
-    padded = np.stack([np.r_[row, np.repeat(row[-1:], longest - len(row), axis=0)] for row in reached])
-    parameters = np.stack([_parameter_row(vehicle, schedule, setup) for schedule in schedules])
     plan = _Held(str(vehicle.card.options.get("mixing", "rotation")), 1.0 / schedules[0].rate)
-    states, acting = _run(plan, _start(vehicle, padded[:, 0]), jnp.asarray(padded), jnp.asarray(parameters))
+    runs = [
+        _run(plan, _start(vehicle, row[:1])[0], row, _parameter_row(vehicle, schedule, setup))
+        for schedule, row in zip(schedules, reached, strict=True)
+    ]
     return tuple(
-        _observe(schedule, row, np.asarray(x)[: len(row)], np.asarray(load)[: len(row)], setup, rng)
-        for schedule, row, x, load, rng in zip(schedules, rows, states, acting, rngs, strict=True)
+        _observe(schedule, row, x, load, setup, rng)
+        for schedule, row, (x, load), rng in zip(schedules, rows, runs, rngs, strict=True)
     )
 
 
