@@ -35,6 +35,7 @@ from swashplate.links.live.messages import LONGEST, SCHEMA, MessageError, parse
 from swashplate.links.live.session import LiveSession
 from swashplate.links.web import connections, libraries, serving
 from swashplate.links.web.guard import Guard
+from swashplate.own_python import own_python
 
 VALID: list[dict[str, Any]] = [
     {"type": "stick", "roll": 0, "pitch": 0.5, "yaw": -1, "heave": 1.0, "number": 3},
@@ -248,18 +249,19 @@ def test_recording_pausing_and_what_cannot_be_done(running: Running) -> None:
 def test_what_a_recording_is_identified_with(tmp_path: Path) -> None:
     raptor, coax = sp.vehicle("raptor50"), sp.vehicle("coax")
     first, second = commands(raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")
-    assert first[3] == "identify"
+    assert first[:3] == own_python("swashplate.__main__")[:3]
+    assert first[4] == "identify"
     cheap = ["--flight", str(tmp_path / "f.nc"), "--free", "rotor", "--method", "output-error", "--rate", "50"]
     assert first[-8:] == cheap
     (windowed, _) = commands(
         raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out", window=(12.5, 32.5)
     )
     assert f"{tmp_path / 'f.nc'}@12.5-32.5" in windowed
-    assert second[3:5] == ["respond", str(tmp_path / "f.nc")]
+    assert second[4:6] == ["respond", str(tmp_path / "f.nc")]
     assert "throttle" not in " ".join(second)
     assert len(commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")) == 2
     (only,) = commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out", how="responses")
-    assert only[3] == "respond"
+    assert only[4] == "respond"
 
 
 @pytest.mark.parametrize(
