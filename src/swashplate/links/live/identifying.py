@@ -126,7 +126,6 @@ class Identifying:
             return
         self._job, self._begun = Job(recording, "running"), time.monotonic()
         card = self._folder / f"card-{recording}.toml"
-        vehicle.save(card)
         flight, out = self._folder / f"recording-{recording}.nc", self.out(recording)
         self._stopped = False
         ways = commands(vehicle, flight, card=card, out=out, how=how, window=window)

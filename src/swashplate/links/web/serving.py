@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import logging
+import signal
 import socket
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import uvicorn
@@ -91,6 +93,23 @@ def configured(app: ASGIApp, *, frame: int = 0) -> uvicorn.Config:
     return made
 
 
+class _Server(uvicorn.Server):
+    """A server that a closed terminal ends as an interrupt does: with its pages closed, and without a traceback."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        with super().capture_signals():
+            own = threading.current_thread() is threading.main_thread() and hasattr(signal, "SIGHUP")
+            if not own or signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # as `nohup` asks for
+                yield
+                return
+            before = signal.signal(signal.SIGHUP, self.handle_exit)
+            try:
+                yield
+            finally:
+                signal.signal(signal.SIGHUP, before)
+
+
 def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0, first: bool = True) -> None:
     """Serve until interrupted; an interrupt is the ordinary end.
 
@@ -102,4 +121,4 @@ def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0, first: bool
     if first:
         come_first()  # the interpreter's lock must not be held by a thread that waits for a processor
     with contextlib.suppress(KeyboardInterrupt):
-        uvicorn.Server(config).run(sockets=[listening])
+        _Server(config).run(sockets=[listening])
