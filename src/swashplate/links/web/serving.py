@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import uvicorn
+from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.types import ASGIApp
@@ -63,6 +64,21 @@ def address_of(listening: socket.socket) -> str:
     return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
 
 
+class _Number(Convertor[int]):
+    """A whole number of an address. Starlette's own falls over one of more than 4,300 digits."""
+
+    regex = "[0-9]{1,18}"
+
+    def convert(self, value: str) -> int:
+        return int(value)
+
+    def to_string(self, value: int) -> str:
+        return str(value)
+
+
+register_url_convertor("number", _Number())
+
+
 def page(path: Path) -> Callable[[Request], Response]:
     """Answers with an HTML page that may load only what this server has."""
 
@@ -89,7 +105,8 @@ def configured(app: ASGIApp, *, frame: int = 0) -> uvicorn.Config:
         ws_max_size=frame,
         timeout_graceful_shutdown=2,
     )
-    logging.getLogger("uvicorn.error").addFilter(OneLine())
+    for log in ("uvicorn.error", "asyncio"):
+        logging.getLogger(log).addFilter(OneLine())
     return made
 
 
