@@ -65,6 +65,21 @@ def test_from_a_dry_run_to_a_report(file: Path, tmp_path: Path, monkeypatch: pyt
     assert (tmp_path / "t.csv").read_text().splitlines()[1].endswith(",a.nc,good,2.5,2.5,2.5,2.5,2.5")
 
 
+def test_a_refused_result_is_said_by_every_look_and_the_exit_code(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert swash("campaign", "run", file, "-o", out).code == 0
+    one, other = sorted((out / "results").iterdir())
+    other.write_bytes(one.read_bytes())
+    for words in (("status", out), ("status", out, "--json"), ("report", out, "-o", tmp_path / "r.html")):
+        outcome = swash("campaign", *words)
+        assert outcome.code == 2, words
+        assert "are refused: " in outcome.err
+        assert "it is the result of another task" in outcome.err
+    assert "are refused: " in (tmp_path / "r.html").read_text()
+    assert swash("campaign", "resume", out).code == 0
+    assert swash("campaign", "status", out).code == 0
+
+
 def test_tasks_that_were_given_up_are_the_exit_code(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -129,6 +129,7 @@ def report(
     written = sp.report(study, path=out) if out.suffix == ".html" else study.save(out)
     if not quiet:
         typer.echo(f"Written: {written}")
+    _end_if_refused(study)
 
 
 @app.command("replay", short_help="Compute one row of a campaign again.")
@@ -171,7 +172,14 @@ def _show(study: Campaign, *, json: bool, quiet: bool, judged: bool = True) -> N
         typer.echo(as_json(study.to_document()))
     elif not quiet:
         typer.echo(repr(study))
+    _end_if_refused(study)
     if judged and study.failed:
         end_with(
             [f"{len(study.failed)} of {len(study.names)} tasks were given up: swash campaign status {study.folder}"]
         )
+
+
+def _end_if_refused(study: Campaign) -> None:
+    from swashplate.cli.flying import end_with
+
+    end_with(list(study.refused.values())[:3])

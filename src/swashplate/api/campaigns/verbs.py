@@ -167,9 +167,11 @@ def _chosen(scheduler: DaskScheduler | str | None, workers: int | None) -> Calla
 
 def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int], TaskEngine], *, say: Say) -> None:
     """Do every task of a plan that the store does not have."""
+    names = {task.name for task in made.tasks}
+    if refused := store.forget_refused(sorted(names & store.done())):
+        say(f"{len(refused)} results are refused, and their tasks done again")
     done, failed = store.done(), store.failed()
     left: Sequence[CampaignTask] = [t for t in made.tasks if t.name not in done and t.name not in failed]
-    names = {task.name for task in made.tasks}
     standing = CampaignStanding(total=len(made.tasks), done=len(names & done), failed=len(names & set(failed)))
     if not left:
         return
