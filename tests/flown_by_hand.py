@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from swashplate.links.live.axes import STICKS
+from swashplate.links.live.recording import LiveRecording, Saved
 from swashplate.links.live.world import World
 
 X, Y, Z, U, V, PHI, PSI = 0, 1, 2, 3, 4, 6, 8
@@ -20,13 +23,30 @@ def fly(world: World, seconds: float, **sticks: float) -> np.ndarray:
     return world.moment().crafts["own"][0]
 
 
+def flown_rows(world: World, seconds: float, **sticks: float) -> list[np.ndarray]:
+    """What a recording gets of some seconds with the sticks held: states, inputs and surroundings of every period."""
+    rows = []
+    for _ in range(round(seconds / world.period)):
+        fly(world, world.period, **sticks)
+        rows.append(world.latest)
+    return rows
+
+
+def recorded(world: World, rows: list[np.ndarray], folder: Path) -> Saved:
+    """Rows as a recording on disk."""
+    going = LiveRecording(world.vehicle, period=world.period, folder=folder)
+    for row in rows:
+        going.add(row)
+    assert not going.trouble
+    return going.finish()
+
+
 def fresh(world: World, mode: str, *, ghost: bool = False) -> World:
     """The same world in hover, in calm air, with free sticks."""
     world.setting.decoupled, world.setting.gusts, world.setting.wind = True, 0.0, (0.0, 0.0, 0.0)
     world.set_ghost(ghost)
     world.set_mode(mode)  # type: ignore[arg-type]
     world.setting.sticks = dict.fromkeys(STICKS, 0.0)
-    world.rows = None
     world.reset()
     return world
 

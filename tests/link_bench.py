@@ -14,7 +14,7 @@ from swashplate.export.stepping_c import CompiledEngine
 from swashplate.links.ardupilot.session import ArduPilotSession
 from swashplate.links.estimating import Estimating
 from swashplate.links.notices import Notices
-from swashplate.links.plant import Plant, Surroundings, unflown
+from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.recorder import Recorder
 from swashplate.links.sensing import Sensing
 from swashplate.links.servos import servo_mapping
@@ -22,6 +22,7 @@ from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
+from swashplate.simulation.record import unflown
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
@@ -87,7 +88,7 @@ def bench(
     said: list[str] = []
     recorder = None
     if record is not None:
-        recorder = Recorder(record, like=unflown(made, record_rate=record_rate), say=said.append)
+        recorder = Recorder(record, like=unflown(made, details={"link": True, "rate": record_rate}), say=said.append)
     plant = Plant(
         made,
         servo_mapping(name, made),

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from swashplate.api.bench import evaluate_bench, simulate_bench
     from swashplate.api.campaigns.plan import plan_campaign
     from swashplate.api.campaigns.results import campaign_results
+    from swashplate.api.campaigns.scheduler import DaskScheduler
     from swashplate.api.campaigns.verbs import campaign, replay_campaign, resume_campaign
     from swashplate.api.check_autopilot import check_autopilot
     from swashplate.api.check_controller import check_controller
@@ -124,6 +125,7 @@ __all__ = [
     "CHOICES",
     "QUIET",
     "Card",
+    "DaskScheduler",
     "Earth",
     "Environment",
     "Flight",

@@ -7,6 +7,9 @@ import os
 import sys
 from typing import NoReturn
 
+if __name__ == "__main__" and not sys.flags.safe_path:
+    del sys.path[0]  # `python -m` puts the folder that it works in there: what lies in it must not be imported
+
 from swashplate.threads import ONE_THREAD
 
 

@@ -20,6 +20,7 @@ from swashplate.extras import EXTRA_OF, missing
 _LIGHT: Mapping[str, str] = {
     "CHOICES": "swashplate.models.coax_choices:CHOICES",
     "Card": "swashplate.models.card:Card",
+    "DaskScheduler": "swashplate.api.campaigns.scheduler:DaskScheduler",
     "Earth": "swashplate.physics.earth:Earth",
     "Environment": "swashplate.physics.environment:Environment",
     "Flight": "swashplate.flights.flight:Flight",

@@ -65,6 +65,21 @@ def test_from_a_dry_run_to_a_report(file: Path, tmp_path: Path, monkeypatch: pyt
     assert (tmp_path / "t.csv").read_text().splitlines()[1].endswith(",a.nc,good,2.5,2.5,2.5,2.5,2.5")
 
 
+def test_a_refused_result_is_said_by_every_look_and_the_exit_code(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert swash("campaign", "run", file, "-o", out).code == 0
+    one, other = sorted((out / "results").iterdir())
+    other.write_bytes(one.read_bytes())
+    for words in (("status", out), ("status", out, "--json"), ("report", out, "-o", tmp_path / "r.html")):
+        outcome = swash("campaign", *words)
+        assert outcome.code == 2, words
+        assert "are refused: " in outcome.err
+        assert "it is the result of another task" in outcome.err
+    assert "are refused: " in (tmp_path / "r.html").read_text()
+    assert swash("campaign", "resume", out).code == 0
+    assert swash("campaign", "status", out).code == 0
+
+
 def test_tasks_that_were_given_up_are_the_exit_code(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -98,7 +113,7 @@ def test_progress_of_a_pipe_has_the_time_left(
 def test_what_cannot_be_is_refused(file: Path, tmp_path: Path) -> None:
     for words, said in (
         (("run", file), "--out: is missing. Say where results are kept"),
-        (("run", file, "-o", tmp_path / "o", "--engine", "ray"), "--engine: is 'ray', expected dask or processes"),
+        (("run", file, "-o", tmp_path / "o", "--insecure"), "--scheduler: is missing. Files for TLS and --insecure"),
         (("run", tmp_path / "no.toml", "-o", tmp_path / "o"), "no.toml: there is no such file"),
         (("status", tmp_path), "holds no campaign. Begin one"),
         (("resume", tmp_path / "none"), "holds no campaign"),
@@ -106,3 +121,21 @@ def test_what_cannot_be_is_refused(file: Path, tmp_path: Path) -> None:
     ):
         assert said in one_message(swash("campaign", *words))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fleet.toml", "logs"]
+
+
+def test_an_open_scheduler_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    Flight({"log": stream(np.arange(4) * 0.1, {"p": np.zeros(4)}, {})}).save(tmp_path / "logs" / "a.nc")
+    file = tmp_path / "fleet.toml"
+    file.write_text(FLEET)
+    out, open_to_all = tmp_path / "o", ("--scheduler", "tcp://127.0.0.1:9")
+    (tmp_path / "begun").mkdir()
+    for words in (("run", file, "-o", out), ("resume", tmp_path / "begun")):
+        told = one_message(swash("campaign", *words, *open_to_all))
+        assert "speaks without TLS: every user of its machine" in told
+        assert told.endswith("If everybody who reaches it may do that: --insecure.")
+        assert "--tls-cert: is missing" in one_message(
+            swash("campaign", *words, "--scheduler", "tls://127.0.0.1:9", "--tls-ca-file", file)
+        )
+    assert not out.exists()
+    assert not any((tmp_path / "begun").iterdir())

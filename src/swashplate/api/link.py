@@ -17,7 +17,7 @@ from swashplate.errors import ControllerError, SwashError
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, written_gains
 from swashplate.links.ardupilot.parameters import Parameters, parameter_file, parameters
 from swashplate.links.notices import Notices
-from swashplate.links.plant import Plant, Surroundings, unflown
+from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.recorder import Recorder, recover
 from swashplate.links.sensing import Sensing
 from swashplate.links.servos import ServoMapping, packaged, servo_mapping
@@ -26,7 +26,7 @@ from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.record import monitored
+from swashplate.simulation.record import monitored, unflown
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
 from swashplate.simulation.stepping import MakeEngine, SteppingEngine, VirtualEngine
@@ -287,7 +287,7 @@ def _plant(asked: _Asked, suffix: Literal["", "_px4"], notice: Say) -> tuple[Pla
         recover(file, notice)
         recorder = Recorder(
             file,
-            like=unflown(aircraft, record_rate=asked.rate),
+            like=unflown(aircraft, details={"link": True, "rate": asked.rate}),
             say=notice,
             judge=partial(monitored, vehicle=aircraft),
         )

@@ -31,6 +31,7 @@ def live(
     open_page: bool = False,
     say: Callable[[str], None] = _silent,
     ready: Callable[[str], None] = print,
+    tell: Callable[[str], None] = print,
 ) -> None:
     """Fly a model in the browser by gamepad, keyboard or touch, until it is interrupted.
 
@@ -49,11 +50,14 @@ def live(
         open_page: open it in the browser.
         say: told what is being done.
         ready: told the page's address when it can be opened.
+        tell: told where recordings are: one that begins, one that an earlier session has left, one that is saved
+            because this one ends.
 
     Raises:
         SwashError: where the address is taken, or the controller is for another vehicle.
     """
     from swashplate.links.live import server
+    from swashplate.links.live.recording import recover
     from swashplate.links.live.session import LiveSession
     from swashplate.links.web import serving
     from swashplate.links.web.libraries import check_page
@@ -66,7 +70,10 @@ def live(
     with serving.listen(host, port, allow_remote=allow_remote) as listening:
         say("preparing (compiling takes longest the first time)")
         flown = vehicle.with_values(truth) if truth else vehicle
-        session = LiveSession(flown, controller=chosen, folder=place, estimate=estimate, model=vehicle, draws=draws)
+        recover(place, tell)
+        session = LiveSession(
+            flown, controller=chosen, folder=place, estimate=estimate, model=vehicle, draws=draws, tell=tell
+        )
         session.clock.start()
         try:
             announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,7 @@ from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
     from swashplate.api.campaigns.results import Campaign
+    from swashplate.api.campaigns.scheduler import DaskScheduler
 
 app = typer.Typer(
     help="Compute many flights, fits or logs from a TOML file, on every core of one machine or of several, "
@@ -26,12 +27,16 @@ Workers = Annotated[
 Scheduler = Annotated[
     str | None,
     typer.Option(
-        "--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler, tcp://host:8786, whose workers are used."
+        "--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler, tls://host:8786, whose workers are used."
     ),
 ]
-Engine = Annotated[
-    str | None,
-    typer.Option("--engine", help="dask or processes (without any library); by default Dask where it is installed."),
+_PEM = "PEM file for --scheduler; by default as Dask's configuration says."
+Ca = Annotated[Path | None, typer.Option("--tls-ca-file", help=f"Certificate that has signed all others: {_PEM}")]
+Certificate = Annotated[Path | None, typer.Option("--tls-cert", help=f"Certificate of this client: {_PEM}")]
+Key = Annotated[Path | None, typer.Option("--tls-key", help=f"Key of that certificate: {_PEM}")]
+Insecure = Annotated[
+    bool,
+    typer.Option("--insecure", help="Take a scheduler without TLS: whoever reaches its port can run commands as you."),
 ]
 
 
@@ -41,13 +46,16 @@ def run(
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    tls_ca_file: Ca = None,
+    tls_cert: Certificate = None,
+    tls_key: Key = None,
+    insecure: Insecure = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only print cost and size: two tasks are computed.")
     ] = False,
     accept_changes: Annotated[
         bool, typer.Option("--accept-changes", help="Continue although the file or the program has changed.")
     ] = False,
-    engine: Engine = None,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -58,6 +66,7 @@ def run(
     import swashplate as sp
     from swashplate.cli.console import as_json, progress
 
+    named = _scheduler(scheduler, tls_ca_file, tls_cert, tls_key, insecure)
     with progress(quiet=quiet or json, every=_EVERY) as line:
         if dry_run:
             line.say("doing the first task twice")
@@ -67,8 +76,8 @@ def run(
         if out is None:
             sp.plan_campaign(file)  # what is wrong in what was typed comes first
             raise SwashError("is missing.", channel="--out", hint="Say where results are kept: -o FOLDER.")
-        study = sp.campaign(file, out, workers=workers, scheduler=scheduler, engine=_engine(engine),
-                            accept_changes=accept_changes, say=line.say)  # fmt: skip
+        study = sp.campaign(file, out, workers=workers, scheduler=named, accept_changes=accept_changes,
+                            say=line.say)  # fmt: skip
     _show(study, json=json, quiet=quiet)
 
 
@@ -77,8 +86,11 @@ def resume(
     folder: Store,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    tls_ca_file: Ca = None,
+    tls_cert: Certificate = None,
+    tls_key: Key = None,
+    insecure: Insecure = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try failed tasks again.")] = False,
-    engine: Engine = None,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -86,9 +98,9 @@ def resume(
     import swashplate as sp
     from swashplate.cli.console import progress
 
+    named = _scheduler(scheduler, tls_ca_file, tls_cert, tls_key, insecure)
     with progress(quiet=quiet or json, every=_EVERY) as line:
-        study = sp.resume_campaign(folder, workers=workers, scheduler=scheduler, engine=_engine(engine),
-                                   retry_failed=retry_failed, say=line.say)  # fmt: skip
+        study = sp.resume_campaign(folder, workers=workers, scheduler=named, retry_failed=retry_failed, say=line.say)
     _show(study, json=json, quiet=quiet)
 
 
@@ -117,6 +129,7 @@ def report(
     written = sp.report(study, path=out) if out.suffix == ".html" else study.save(out)
     if not quiet:
         typer.echo(f"Written: {written}")
+    _end_if_refused(study)
 
 
 @app.command("replay", short_help="Compute one row of a campaign again.")
@@ -139,12 +152,16 @@ def replay(
 _EVERY = 10.0  # s between two lines of progress in a pipe
 
 
-def _engine(name: str | None) -> Literal["dask", "processes"] | None:
-    if name is None:
+def _scheduler(
+    address: str | None, ca: Path | None, certificate: Path | None, key: Path | None, insecure: bool
+) -> DaskScheduler | None:
+    import swashplate as sp
+
+    if address is None:
+        if ca or certificate or key or insecure:
+            raise SwashError("is missing.", channel="--scheduler", hint="Files for TLS and --insecure belong to one.")
         return None
-    if name in ("dask", "processes"):
-        return "dask" if name == "dask" else "processes"
-    raise SwashError(f"is '{name}', expected dask or processes.", channel="--engine")
+    return sp.DaskScheduler(address, ca=ca, certificate=certificate, key=key, insecure=insecure)
 
 
 def _show(study: Campaign, *, json: bool, quiet: bool, judged: bool = True) -> None:
@@ -155,7 +172,14 @@ def _show(study: Campaign, *, json: bool, quiet: bool, judged: bool = True) -> N
         typer.echo(as_json(study.to_document()))
     elif not quiet:
         typer.echo(repr(study))
+    _end_if_refused(study)
     if judged and study.failed:
         end_with(
             [f"{len(study.failed)} of {len(study.names)} tasks were given up: swash campaign status {study.folder}"]
         )
+
+
+def _end_if_refused(study: Campaign) -> None:
+    from swashplate.cli.flying import end_with
+
+    end_with(list(study.refused.values())[:3])

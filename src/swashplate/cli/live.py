@@ -70,6 +70,7 @@ def live(
             open_page=open_page,
             say=line.say,
             ready=lambda address: told(address, quiet=quiet),
+            tell=lambda words: typer.echo(words, err=True),
         )
 
 

@@ -7,7 +7,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import FlightError
+from swashplate.own_python import own_python
 from swashplate.threads import ONE_THREAD
 
 _LAST = {"foreign", "failed", "refused"}
@@ -115,11 +115,10 @@ class _Process:
     def _started(self, path: Path) -> subprocess.Popen[bytes]:
         if self._running is None or self._running.poll() is not None:
             self._close()
-            code = f"import sys; sys.path[:] = {sys.path!r}; from swashplate.flights.hdf5_process import main; main()"
             environment = {**os.environ, **ONE_THREAD}
             try:
                 self._running = subprocess.Popen(
-                    [sys.executable, "-c", code],
+                    own_python("swashplate.flights.hdf5_process"),
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.DEVNULL,

@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import DivergenceError
-from swashplate.flights.flight import Flight
 from swashplate.links.recorder import Recorder
 from swashplate.links.servos import ServoMapping
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.record import simulated_flight
 from swashplate.simulation.standing import at_rest
 from swashplate.simulation.stepping import MakeEngine, Motion, Stepping, at_standstill
 
@@ -42,12 +39,6 @@ class Surroundings:
 
     environment: Environment
     sag: float = 0.0
-
-
-def unflown(vehicle: Vehicle, *, record_rate: float) -> Flight:
-    """A link's flight before its first sample: true states, inputs, wind and voltage; what a `Recorder` begins with."""
-    states, rows = (np.zeros((0, n)) for n in (len(vehicle.state_names), len(vehicle.input_names) + len(SURROUNDINGS)))
-    return simulated_flight(vehicle, np.zeros(0), states, rows, details={"link": True, "rate": record_rate})
 
 
 class Plant:

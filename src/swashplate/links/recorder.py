@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from swashplate.atomic import added_when_complete
-from swashplate.errors import FlightError, LinkError, WriteError
+from swashplate.errors import FlightError, LinkError, SwashError, WriteError
 from swashplate.flights import growing
 from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight
@@ -82,20 +82,35 @@ def recover(file: Path, say: Say) -> tuple[Path, ...]:
 
     Recordings of programs that are alive are left alone. One that cannot be read stays where it is, and is told.
     """
-    saved = []
+    grown = []
     for left in sorted(file.parent.glob(f"{_escaped(file.stem)}*{SUFFIX}")):
-        target = left.with_suffix(file.suffix)
-        if target.stem != file.stem and not target.stem.removeprefix(f"{file.stem}-").isdecimal():
-            continue
+        if left.stem == file.stem or left.stem.removeprefix(f"{file.stem}-").isdecimal():
+            grown.append(left)
+    return salvage(grown, lambda left, flight: save(flight, left.with_suffix(file.suffix)), say)
+
+
+def salvage(
+    grown: Iterable[Path], keep: Callable[[Path, Flight], Path], say: Say, *, shortest: float = 0.0
+) -> tuple[Path, ...]:
+    """Save flights of growing files whose programs were killed, and remove these files; returns the files written.
+
+    Args:
+        grown: the growing files; one whose program is alive is left alone, one that cannot be saved stays, and is told.
+        keep: saves a flight; returns the file.
+        say: told of each.
+        shortest: seconds; of less nothing is kept.
+    """
+    saved = []
+    for left in grown:
         with Abandoned(left) as abandoned:
             if not abandoned.free:
                 continue
             try:
-                flight = _read(left)
-                if flight is not None:
-                    saved.append(save(flight, target))
+                flight = read_grown(left)
+                if flight is not None and flight.duration >= shortest:
+                    saved.append(keep(left, flight))
                     say(f"an earlier recording was cut off; its {flight.duration:.1f} s are saved: {saved[-1]}.")
-            except FlightError as error:
+            except SwashError as error:
                 say(f"an earlier recording was cut off and stays as it is: {error}")
                 continue
             left.unlink()
@@ -106,8 +121,8 @@ def _escaped(stem: str) -> str:
     return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in stem)
 
 
-def _read(file: Path) -> Flight | None:
-    """What was recorded; None for less than a flight."""
+def read_grown(file: Path) -> Flight | None:
+    """What is in a growing file; None for less than a flight."""
     if file.stat().st_size == 0:
         return None  # killed before its first line
     flight = growing.load(file)
@@ -167,7 +182,7 @@ class Recorder:
 
     def _save(self, target: Path, flown: Growing) -> None:
         try:
-            flight = _read(flown.path)
+            flight = read_grown(flown.path)
             if flight is not None:
                 judged = self._judge(flight)
                 self._saved.append(save(judged, target))

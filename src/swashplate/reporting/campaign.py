@@ -71,6 +71,7 @@ def compose_campaign(
     tables: Sequence[tuple[str, tuple[str, ...], tuple[tuple[str, ...], ...]]],
     curves: Sequence[tuple[str, str, str, tuple[tuple[float, float, float, float], ...]]],
     failed: Sequence[FailedTask],
+    refused: Sequence[str] = (),
 ) -> Report:
     """The report's structure.
 
@@ -80,7 +81,7 @@ def compose_campaign(
         worst: rows, the worst first. worst_by: by what, with its unit. folder: of the campaign.
         tables: of its kind: caption, headings, cells.
         curves: lines over a choice: what, along what, the line's name, and x, y and y's interval of its points.
-        failed: tasks that were given up.
+        failed: tasks that were given up. refused: results that are not what was computed, each in words.
     """
     count = max((len(shape.values) for shape in shapes), default=0)
     lost = sum(task.count for task in failed)
@@ -101,7 +102,7 @@ def compose_campaign(
         sections.append(Section("failed", "What failed", (_failed(failed, folder),)))
     return Report(
         title=title,
-        banners=(*banners, *(("caution", words) for words in careful)),
+        banners=(*banners, *(("bad", words) for words in refused), *(("caution", words) for words in careful)),
         summary=(("Standing", standing, "plain"), (f"{rows.capitalize()}s", f"{count:,}", "plain"), *summary),
         picture=None,
         sections=tuple(sections),

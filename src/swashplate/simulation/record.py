@@ -45,6 +45,12 @@ def simulated_flight(
     return monitored(flown, vehicle)
 
 
+def unflown(vehicle: Vehicle, *, details: Mapping[str, Any]) -> Flight:
+    """A simulated flight before its first sample: true states, inputs, wind and voltage; what recordings begin with."""
+    states, rows = (np.zeros((0, n)) for n in (len(vehicle.state_names), len(vehicle.input_names) + len(SURROUNDINGS)))
+    return simulated_flight(vehicle, np.zeros(0), states, rows, details=details)
+
+
 def monitored(flight: Flight, vehicle: Vehicle) -> Flight:
     """A flight that says in its notes where it leaves what the vehicle's numbers and equations hold for."""
     said = tuple(words for words in envelope(vehicle, flight) if words not in flight.provenance.notes)

@@ -20,9 +20,8 @@ from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import LinkError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.growing import Growing
-from swashplate.links.plant import unflown
 from swashplate.links.recorder import Recorder, begin, numbered, recover
-from swashplate.simulation.record import simulated_flight
+from swashplate.simulation.record import simulated_flight, unflown
 
 IDLE = [1500, 1500, 1500, 1500, 1300, 1300]
 NONE = Flight({"uniform": stream(np.zeros(0), {"p": np.zeros(0), "q": np.zeros(0)})})
@@ -47,7 +46,9 @@ def coax() -> Bench:
 def test_every_start_of_the_autopilot_is_a_flight_of_its_own(coax: Bench, tmp_path: Path) -> None:
     said: list[str] = []
     plant = coax.plant
-    kept = Recorder(tmp_path / "f.nc", like=unflown(plant.vehicle, record_rate=400.0), say=said.append)
+    kept = Recorder(
+        tmp_path / "f.nc", like=unflown(plant.vehicle, details={"link": True, "rate": 400.0}), say=said.append
+    )
     plant._recorder, plant._spacing = kept, 1.0 / 400.0
     rows: list[list[float]] = []
     try:

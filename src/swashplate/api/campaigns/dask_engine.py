@@ -1,4 +1,4 @@
-"""An engine of Dask distributed: a cluster of its own on this machine, or a scheduler that somebody runs elsewhere."""
+"""An engine of Dask distributed: the workers of a scheduler that somebody runs elsewhere."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
-from urllib.parse import urlsplit
 
 from swashplate.api.campaigns import program
-from swashplate.api.campaigns.engine import DEATHS, TaskOutcome, Work
+from swashplate.api.campaigns.engine import TaskOutcome, Work
 from swashplate.api.campaigns.pool import in_words
+from swashplate.api.campaigns.scheduler import DaskScheduler
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
 from swashplate.errors import CampaignError
 from swashplate.extras import library
 
 _CONNECT = 15.0  # s until a scheduler that does not answer is not there
 _COUNTED = 2.0  # s that a number of workers is believed
-_STARTS = 3
 _BRIEF = 10.0  # s from a worker's joining in which one that works here does not go
 _GONE = 20.0  # s without a scheduler until it is gone
 
@@ -30,58 +29,45 @@ class DaskEngine:
 
     Args:
         work: what is done with a task.
-        workers: how many on this machine, where there is no address.
-        scheduler: address of one that runs ("tcp://host:8786"); its workers are whoever joins it.
-        least: wait for so many of its workers.
+        scheduler: of which workers; they are whoever joins it.
+        least: wait for so many of them.
 
     Raises:
         MissingLibraryError: Dask is not installed.
-        CampaignError: no scheduler there, no worker, or one that is another program.
+        CampaignError: no scheduler there, one without TLS that was not asked for, no worker, or one that is another
+            program.
     """
 
-    def __init__(self, work: Work, *, workers: int, scheduler: str | None = None, least: int = 1) -> None:
+    def __init__(self, work: Work, *, scheduler: DaskScheduler, least: int = 1) -> None:
         distributed = library("distributed", what="a campaign past one machine")
-        library("dask", what="a campaign past one machine").config.set(
-            {
-                "distributed.scheduler.allowed-failures": DEATHS,
-                "distributed.comm.timeouts.connect": f"{_CONNECT} s",
-                "distributed.nanny.pre-spawn-environ": program.worker_environment(),
-                "distributed.worker.memory.terminate": False,
-                "distributed.worker.memory.pause": False,
-                "distributed.worker.memory.spill": False,
-                "distributed.worker.memory.target": False,
-            }
-        )
-        for name in ("distributed", "distributed.nanny", "distributed.core", "distributed.scheduler"):
+        library("dask").config.set({"distributed.comm.timeouts.connect": f"{_CONNECT} s"})
+        for name in ("distributed", "distributed.core", "distributed.scheduler"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # what it says of dead workers, we say ourselves
-        self._work, self._address, self._tries = work, scheduler or "", 0
+        security = scheduler.security()
+        self._work, self._address, self._tries = work, scheduler.address, 0
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._tasks: dict[Any, CampaignTask] = {}
-        self._cluster: Any = None
         self._client: Any = None
         self.turned_away: dict[str, str] = {}
         self._joined: dict[str, float] = {}
         self._lost_for, self._counted, self._count = 0.0, float("-inf"), 1
         self._killed = distributed.scheduler.KilledWorker
         try:
-            if scheduler is not None:
-                _knock(scheduler)
-            if scheduler is None:
-                self._cluster = _own_cluster(distributed.LocalCluster, workers)
-            self._client = distributed.Client(self._cluster or scheduler, timeout=_CONNECT, set_as_default=False)
-            self._client.wait_for_workers(workers if scheduler is None else least, timeout=4 * _CONNECT)
+            _knock(*scheduler.place)
+            self._client = distributed.Client(
+                scheduler.address, security=security, timeout=_CONNECT, set_as_default=False
+            )
+            self._client.wait_for_workers(least, timeout=4 * _CONNECT)
         except (OSError, TimeoutError, RuntimeError) as error:
             self.close()
             raise CampaignError(
                 f"no worker answers: {in_words(error).removesuffix('.')}.",
-                where=scheduler or "the cluster of this machine",
-                hint="Start it with `dask scheduler`, workers with `dask worker ADDRESS --nthreads 1`."
-                if scheduler
-                else "What is done is kept: run the same command again, or with --engine processes.",
+                where=self._address,
+                hint="Start it with `dask scheduler`, workers with `dask worker ADDRESS --nthreads 1`; with TLS, all "
+                "three need certificates that the same one has signed.",
             ) from None
-        if scheduler is not None:
-            self._check_workers()
-            self._client.subscribe_topic("all", self._heard)
+        self._check_workers()
+        self._client.subscribe_topic("all", self._heard)
 
     @property
     def workers(self) -> int:
@@ -93,17 +79,12 @@ class DaskEngine:
 
     @property
     def words(self) -> str:
-        place = f"of the scheduler {self._address}" if self._address else "of Dask on this machine"
+        place = f"of the scheduler {self._address}"
         told = f" ({len(self.turned_away)} came and went)" if self.turned_away else ""
         count = self.workers
         if not count:
             return f"no worker {place}{told}, it waits for one"
         return f"{count} worker{'s' if count > 1 else ''} {place}{told}"
-
-    @property
-    def processes(self) -> list[int]:
-        """Numbers of the workers' processes."""
-        return list(self._client.run(_number).values())
 
     def _heard(self, event: tuple[float, Any]) -> None:
         """What the scheduler says of a worker that joined late: one that cannot read a task closes without a word."""
@@ -197,7 +178,7 @@ class DaskEngine:
         if self._lost_for > _GONE or self._client.status in ("closed", "closing"):
             raise CampaignError(
                 "the scheduler is gone.",
-                where=self._address or "the cluster of this machine",
+                where=self._address,
                 hint="What is done is kept: start it again, and run `swash campaign resume`.",
             )
 
@@ -207,25 +188,14 @@ class DaskEngine:
                 for future in self._tasks:
                     future.release()
                 self._client.close(timeout=5.0)
-        if self._cluster is not None:
-            with suppress(Exception):
-                self._cluster.close(timeout=5.0)
 
 
-def _knock(address: str) -> None:
-    """That something listens at an address: a client of Dask that cannot connect is never quite closed.
+def _knock(host: str, port: int) -> None:
+    """That something listens there: a client of Dask that cannot connect is never quite closed.
 
     Raises:
-        CampaignError: where it is no address.
         OSError: where nobody answers.
     """
-    try:
-        place = urlsplit(address)
-        host, port = place.hostname, place.port
-    except ValueError:  # a port that is no number
-        host = port = None
-    if not host or not port or place.scheme not in ("tcp", "tls", "ws", "wss"):
-        raise CampaignError("is no address of a scheduler.", where=address, hint="Example: tcp://host:8786")
     until = time.monotonic() + _CONNECT
     while True:  # it may have been started a moment ago
         try:
@@ -237,34 +207,9 @@ def _knock(address: str) -> None:
             time.sleep(0.1)
 
 
-def _own_cluster(make: Any, workers: int) -> Any:
-    """A cluster of this machine. One whose worker is killed while it starts is started again."""
-    for attempt in range(_STARTS):
-        try:
-            return make(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                memory_limit=None,
-                dashboard_address=None,
-                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},  # not 8787: others run too
-                silence_logs=logging.CRITICAL,
-            )
-        except RuntimeError:
-            if attempt == _STARTS - 1:
-                raise
-    return None
-
-
 def _program() -> dict[str, str]:
     """On a worker or a scheduler: what program it is."""
     return program.program()
-
-
-def _number() -> int:
-    import os
-
-    return os.getpid()
 
 
 def _done(work: Work, task: CampaignTask) -> tuple[Columns | None, str, bool]:

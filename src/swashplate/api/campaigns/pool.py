@@ -17,6 +17,7 @@ from multiprocessing.context import SpawnProcess
 from swashplate.api.campaigns import program
 from swashplate.api.campaigns.engine import TaskOutcome, Work
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
+from swashplate.own_python import SAFE_PATH
 
 
 @dataclass
@@ -52,11 +53,6 @@ class ProcessPool:
     @property
     def turned_away(self) -> dict[str, str]:
         return {}  # they are this program's own
-
-    @property
-    def processes(self) -> list[int]:
-        """Their numbers."""
-        return [lane.process.pid or 0 for lane in self._lanes]
 
     def submit(self, task: CampaignTask) -> None:
         self._waiting.append(task)
@@ -98,7 +94,7 @@ class ProcessPool:
     def _lane(self) -> _Lane:
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(theirs, self._work), name="worker", daemon=True)
-        with _environment(program.worker_environment()):
+        with _environment({**program.worker_environment(), **SAFE_PATH}):
             process.start()
         theirs.close()
         return _Lane(process, ours)

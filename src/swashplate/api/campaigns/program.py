@@ -24,6 +24,8 @@ _OURS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=100
 _ONE_THREAD = "--xla_cpu_multi_thread_eigen=false"
 _FIRST_PROCESSES = 0xEFFFFFFC
 """Number of the namespace of processes that Linux starts with (`PROC_PID_INIT_INO`); containers have others."""
+_LOCK = "\0swashplate-core-"
+"""What the names of locks begin with; the zero byte keeps them off the disk (abstract sockets of Linux)."""
 _held: list[tuple[int, socket.socket | None]] = []
 """The core that this process has pinned itself to, and its lock."""
 
@@ -139,7 +141,7 @@ def _free(cores: list[int]) -> Iterator[tuple[int, socket.socket]]:
     for core in cores:
         lock = socket.socket(socket.AF_UNIX)
         try:
-            lock.bind(f"\0swashplate-core-{core}")
+            lock.bind(f"{_LOCK}{core}")
         except OSError:
             lock.close()
             continue

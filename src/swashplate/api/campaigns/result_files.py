@@ -1,9 +1,17 @@
-"""A table as the bytes of one file: Parquet, and NumPy's own archive where the library for Parquet is not installed."""
+"""A table as the bytes of one file: Parquet, and NumPy's own archive where the library for Parquet is not installed.
+
+The file of a task's result names its task, and has the SHA-256 of that name and the table: a file that was copied under
+another task's name, or whose numbers were changed, is refused. This is against accidents and edits, not against
+somebody who also computes the hash anew.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import io
+import json
 import zipfile
+from collections.abc import Mapping
 from importlib.util import find_spec
 
 import numpy as np
@@ -14,6 +22,7 @@ from swashplate.errors import CampaignError
 from swashplate.extras import library
 
 PARQUET, NUMPY = ".parquet", ".npz"
+_TASK, _DIGEST = "swashplate.task", "swashplate.sha256"
 ENDINGS = (PARQUET, NUMPY)
 """Of files that hold a result."""
 LARGEST = 2 << 30
@@ -25,7 +34,7 @@ def usual_ending() -> str:
     return PARQUET if find_spec("pyarrow") else NUMPY
 
 
-def packed(columns: Columns, *, ending: str) -> bytes:
+def packed(columns: Columns, *, ending: str, task: str = "") -> bytes:
     """The file of a table.
 
     The same bytes for the same table and version of the library. In Parquet no value is compressed or replaced by an
@@ -35,6 +44,7 @@ def packed(columns: Columns, *, ending: str) -> bytes:
     Args:
         columns: numbers or texts, all of the same length.
         ending: one of `ENDINGS`.
+        task: whose result it is; "" for a table that is none's.
 
     Raises:
         CampaignError: columns that are neither numbers nor texts, or not of one length.
@@ -46,28 +56,32 @@ def packed(columns: Columns, *, ending: str) -> bytes:
         shapes = ", ".join(f"{column} {values.shape}" for column, values in columns.items())
         raise CampaignError(f"columns of one length are expected, found {shapes}.")
     columns = {name: _characters(values) if values.dtype.kind == "U" else values for name, values in columns.items()}
-    stream = io.BytesIO()
+    stream, mark = io.BytesIO(), _mark(columns, task) if task else {}
     if ending == NUMPY:
         np.savez(stream, **columns)  # pyrefly: ignore[bad-argument-type]
+        with zipfile.ZipFile(stream, "a") as archive:
+            archive.comment = json.dumps(mark).encode()
         return stream.getvalue()
     parquet = library("pyarrow.parquet", what="a table in Parquet")
-    table = library("pyarrow", what="a table in Parquet").table(columns)
+    table = library("pyarrow", what="a table in Parquet").table(columns).replace_schema_metadata(mark)
     parquet.write_table(table, stream, compression="none", use_dictionary=False, write_page_checksum=True)
     return stream.getvalue()
 
 
-def unpacked(content: bytes, *, ending: str) -> Columns:
-    """The table of a file; `packed` is the way back.
+def unpacked(content: bytes, *, ending: str, task: str = "") -> Columns:
+    """The table of a file; `packed` is the way back, with the arguments.
 
     Raises:
-        ValueError: a file that claims more than `LARGEST`; and whatever the libraries raise on damaged bytes.
+        ValueError: a file that claims more than `LARGEST`; one that is not, or no longer, the result of `task`; and
+            whatever the libraries raise on damaged bytes.
         MissingLibraryError: for Parquet without the extra `scale`.
     """
     if ending == NUMPY:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             _check(sum(entry.file_size for entry in archive.infolist()))
+            comment = archive.comment
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return {key: arrays[key] for key in arrays.files}
+            return _checked({key: arrays[key] for key in arrays.files}, json.loads(comment or b"{}"), task)
     parquet = library("pyarrow.parquet", what="a table in Parquet")
     with parquet.ParquetFile(io.BytesIO(content), page_checksum_verification=True) as file:
         _check(8 * file.metadata.num_rows * file.metadata.num_columns)
@@ -77,6 +91,29 @@ def unpacked(content: bytes, *, ending: str) -> Columns:
         values.validate(full=True)
         column = values.to_numpy()
         columns[name] = np.asarray(column, dtype=np.str_) if column.dtype == np.object_ else np.array(column)
+    kept = table.schema.metadata or {}
+    return _checked(columns, {name.decode(): value.decode() for name, value in kept.items()}, task)
+
+
+def _mark(columns: Columns, task: str) -> dict[str, str]:
+    """What a file says of itself: its task, and the SHA-256 of its task's name and its columns."""
+    digest = hashlib.sha256(task.encode())
+    for name, values in columns.items():
+        text = values.dtype.kind == "U"
+        kind = "text" if text else values.dtype.newbyteorder("<").str
+        digest.update(json.dumps([name, kind, len(values)]).encode())
+        digest.update(json.dumps(values.tolist()).encode() if text else values.astype(kind, copy=False).tobytes())
+    return {_TASK: task, _DIGEST: digest.hexdigest()}
+
+
+def _checked(columns: Columns, said: Mapping[str, str], task: str) -> Columns:
+    if task:
+        if _TASK not in said or _DIGEST not in said:
+            raise ValueError("it does not say whose result it is")
+        if said[_TASK] != task:
+            raise ValueError(f"it is the result of another task, {said[_TASK][:16]}")
+        if _mark(columns, task)[_DIGEST] != said[_DIGEST]:
+            raise ValueError("its values are not those that were computed")
     return columns
 
 

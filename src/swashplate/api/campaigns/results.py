@@ -36,7 +36,7 @@ class Campaign(Shown):
     Attributes:
         folder: its store.
         of, document: its kind, and what its file says.
-        names: of its tasks, in the order of their rows. done: those that are here.
+        names: of its tasks, in the order of their rows. rows: numbers of each task's. done: those whose result is here.
         failed: tasks that were given up, by name.
         at_work: who computes it now, in words; "" for nobody.
         turned_away: workers that joined and soon went, by address, in words.
@@ -46,6 +46,7 @@ class Campaign(Shown):
     of: str
     document: Mapping[str, Any]
     names: tuple[str, ...]
+    rows: tuple[range, ...] = field(repr=False)
     done: frozenset[str]
     failed: Mapping[str, Mapping[str, Any]] = field(repr=False)
     at_work: str = ""
@@ -53,23 +54,36 @@ class Campaign(Shown):
 
     @property
     def complete(self) -> bool:
-        """Whether every task is done."""
-        return len(self.done) == len(self.names)
+        """Whether every task is done, and its result is what was computed."""
+        return len(self.done) == len(self.names) and not self.refused
 
-    @cached_property
+    @property
     def table(self) -> Columns:
-        """All rows that are here, by column, in the order of their numbers.
+        """All rows that are here, by column, in the order of their numbers; those of `refused` are in no figure.
 
         Raises:
-            CampaignError: a result that cannot be read, or columns that differ.
+            CampaignError: columns that differ.
         """
-        store, parts = CampaignStore(self.folder), []
-        for name in self.names:
+        return self._read[0]
+
+    @property
+    def refused(self) -> Mapping[str, str]:
+        """Tasks whose result is not what was computed (damaged, another task's, changed), and why: name by words."""
+        return self._read[1]
+
+    @cached_property
+    def _read(self) -> tuple[Columns, dict[str, str]]:
+        store, parts, refused = CampaignStore(self.folder), [], {}
+        for name, rows in zip(self.names, self.rows, strict=True):
             if name in self.done:
-                parts.append(store.columns(name))
+                try:
+                    parts.append(store.columns(name))
+                except CampaignError as error:
+                    refused[name] = f"rows {rows[0]} to {rows[-1]} are refused: {error}"
+                    continue
                 if parts[-1].keys() != parts[0].keys():
                     raise CampaignError("has other columns than the first task.", where=self.folder, channel=name)
-        return {c: np.concatenate([part[c] for part in parts]) for c in parts[0]} if parts else {}
+        return ({c: np.concatenate([part[c] for part in parts]) for c in parts[0]} if parts else {}), refused
 
     @cached_property
     def findings(self) -> CampaignFindings:
@@ -106,12 +120,14 @@ class Campaign(Shown):
     def standing(self) -> str:
         """How far it is, in words."""
         told = f"{len(self.done)} of {len(self.names)} tasks done"
+        if self.refused:
+            told += f", the results of {len(self.refused)} refused"
         if self.failed:
             told += f", {len(self.failed)} given up"
         if self.turned_away:
             address, words = next(iter(self.turned_away.items()))
             told += f", {len(self.turned_away)} workers came and went (the first, {address}, {words})"
-        left = len(self.names) - len(self.done) - len(self.failed)
+        left = len(self.names) - len(self.done) - len(self.failed) + len(self.refused)
         if left and not self.at_work:
             told += f"; `swash campaign resume {self.folder}` goes on"
         return told + (f"; at work: {self.at_work}" if self.at_work else "")
@@ -124,6 +140,7 @@ class Campaign(Shown):
             "tasks": len(self.names),
             "done": len(self.done),
             "rows": len(self.table.get("number", ())),
+            "refused": dict(self.refused),
             "failed": {name: dict(told) for name, told in self.failed.items()},
             "summary": {label: words for label, words, _ in self.findings.summary},
             "careful": list(self.findings.careful),
@@ -155,6 +172,7 @@ class Campaign(Shown):
             folder=str(self.folder),
             tables=findings.tables,
             curves=findings.curves,
+            refused=tuple(self.refused.values()),
             failed=[FailedTask(told["first"], told["count"], told["seed"], told["of"], tuple(told["tries"]))
                     for told in self.failed.values()],
         )  # fmt: skip
@@ -182,7 +200,11 @@ class Campaign(Shown):
         return atomic.write_text(place, "\n".join(lines) + "\n")
 
     def __repr__(self) -> str:
-        told = [f"{self.of}: {self.standing}", *(f"Careful: {words}" for words in self.findings.careful)]
+        told = [
+            f"{self.of}: {self.standing}",
+            *self.refused.values(),
+            *(f"Careful: {words}" for words in self.findings.careful),
+        ]
         told += [f"{label}: {words}" for label, words, _ in self.findings.summary]
         if self.table and self.findings.shown:
             head = ("", *(f"{100 * share:g} %" for share in QUANTILES), "95 % interval of the last")
@@ -216,7 +238,10 @@ def campaign_results(folder: str | Path) -> Campaign:
     failed = {name: told for name, told in store.failed().items() if name in set(names)}
     done = store.done() & set(names)
     away = store.turned_away()
-    return Campaign(Path(folder), plan.of, plan.document, names, done, failed, at_work=store.owner, turned_away=away)
+    rows = tuple(range(t.portion.first, t.portion.first + t.portion.count) for t in plan.tasks)
+    return Campaign(
+        Path(folder), plan.of, plan.document, names, rows, done, failed, at_work=store.owner, turned_away=away
+    )
 
 
 def _cell(value: Any) -> str:

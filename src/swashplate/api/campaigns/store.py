@@ -8,7 +8,7 @@ import json
 import os
 import platform
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,7 +25,7 @@ from swashplate.files import read_bytes
 FILE, PLAN, LOCK = "campaign.toml", "plan.json", "lock"
 RESULTS, FAILED, INPUTS = "results", "failed", "inputs"
 TURNED_AWAY = "turned-away.json"
-_SCHEMA = 1
+_SCHEMA = 2
 
 
 class _Plan(msgspec.Struct):
@@ -143,7 +143,7 @@ class CampaignStore:
             return
         ending = usual_ending()
         try:
-            content = packed(columns, ending=ending)
+            content = packed(columns, ending=ending, task=task.name)
         except CampaignError as error:
             raise CampaignError(error.problem, where=f"task {task.name}", channel=error.channel) from None
         atomic.write_bytes(self.folder / RESULTS / f"{task.name}{ending}", content)
@@ -169,19 +169,45 @@ class CampaignStore:
         """The result of a task.
 
         Raises:
-            CampaignError: a file that is none.
+            CampaignError: a file that cannot be read, that is no result, another task's, or whose values were changed.
             MissingLibraryError: a result in Parquet, without the extra `scale`.
         """
+        return self._unpacked(*self._content(name), name)
+
+    def forget_refused(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Remove results that are not what was computed, so that their tasks are done again; returns these names.
+
+        Raises:
+            CampaignError: a file that cannot be read: it may be whole.
+        """
+        refused = []
+        for name in names:
+            path, content = self._content(name)
+            try:
+                self._unpacked(path, content, name)
+            except CampaignError:
+                path.unlink(missing_ok=True)
+                refused.append(name)
+        return tuple(refused)
+
+    def _content(self, name: str) -> tuple[Path, bytes]:
         path = self._result(name) or self.folder / RESULTS / f"{name}{usual_ending()}"
         try:
-            return unpacked(read_bytes(path, most=LARGEST), ending=path.suffix)
+            return path, read_bytes(path, most=LARGEST)
+        except OSError as error:
+            raise CampaignError(f"cannot be read: {error.strerror}.", where=path, hint="Check the disk.") from None
+
+    @staticmethod
+    def _unpacked(path: Path, content: bytes, name: str) -> Columns:
+        try:
+            return unpacked(content, ending=path.suffix, task=name)
         except MissingLibraryError:
             raise
         except Exception as error:  # whatever the libraries raise on damaged bytes is the file's fault
             raise CampaignError(
-                f"is no result of a task: {error or type(error).__name__}.",
+                f"is no result of its task: {error or type(error).__name__}.",
                 where=path,
-                hint="Remove it and run `swash campaign resume`: the task is done again.",
+                hint="`swash campaign resume` does the task again.",
             ) from None
 
     # ---- lock ------------------------------------------------------------------------------------------------------

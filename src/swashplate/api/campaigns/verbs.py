@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from swashplate.api.campaigns import worker
 from swashplate.api.campaigns.engine import CampaignStanding, TaskEngine, Work, carry_out
@@ -15,12 +14,11 @@ from swashplate.api.campaigns.plan import CampaignPlan, changes, cores, duration
 from swashplate.api.campaigns.pool import ProcessPool
 from swashplate.api.campaigns.program import differences, program
 from swashplate.api.campaigns.results import Campaign, campaign_results
+from swashplate.api.campaigns.scheduler import DaskScheduler
 from swashplate.api.campaigns.store import FAILED, CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
 from swashplate.api.saying import Say, silent
 from swashplate.errors import CampaignError, WriteError
-
-EngineName = Literal["dask", "processes"]
 
 
 def campaign(
@@ -28,8 +26,7 @@ def campaign(
     folder: str | Path,
     *,
     workers: int | None = None,
-    scheduler: str | None = None,
-    engine: EngineName | None = None,
+    scheduler: DaskScheduler | str | None = None,
     accept_changes: bool = False,
     say: Say = silent,
 ) -> Campaign:
@@ -42,18 +39,19 @@ def campaign(
         file: the campaign's TOML file.
         folder: its store; it is made, or holds what is done already.
         workers: processes on this machine, one core each; as many as it has cores where None.
-        scheduler: address of a Dask scheduler whose workers are taken instead.
-        engine: "dask" or "processes" (no library needed, the same results); None: Dask where it is installed.
+        scheduler: of Dask, whose workers are taken instead; an address alone is one with TLS, whose files Dask's
+            configuration names.
         accept_changes: go on with a file, or a program, that is not what the store was begun with: tasks whose inputs
             are the same are kept, results of others are left out of the table.
         say: told how far it is.
 
     Raises:
         CampaignError: a file that is none; one that has changed, with what has; a store that another client holds; no
-            scheduler, or a worker that is another program; nothing that can be done.
+            scheduler, one without TLS that was not asked for, or a worker that is another program; nothing that can be
+            done.
         WriteError: a store that cannot be written to.
     """
-    made = plan_campaign(file)
+    made, make = plan_campaign(file), _chosen(scheduler, workers)
     store = CampaignStore(folder)
     with store.held():
         if store.exists:
@@ -70,7 +68,7 @@ def campaign(
         if changed:
             say("writing the plan")
             store.begin(made.text, made.stored(), made.tasks[0].files if made.tasks else {})
-        _finish(made, store, _chosen(engine, scheduler, workers), say=say)
+        _finish(made, store, make, say=say)
     return campaign_results(folder)
 
 
@@ -78,8 +76,7 @@ def resume_campaign(
     folder: str | Path,
     *,
     workers: int | None = None,
-    scheduler: str | None = None,
-    engine: EngineName | None = None,
+    scheduler: DaskScheduler | str | None = None,
     retry_failed: bool = False,
     say: Say = silent,
 ) -> Campaign:
@@ -87,14 +84,14 @@ def resume_campaign(
 
     Args:
         folder: where it was begun.
-        workers, scheduler, engine, say: as of `campaign`; they may be others than before.
+        workers, scheduler, say: as of `campaign`; they may be others than before.
         retry_failed: try tasks again that were given up.
 
     Raises:
         CampaignError: no campaign there, another client at work, another program than it was begun with.
         WriteError: a store that cannot be written to.
     """
-    store = CampaignStore(folder)
+    store, make = CampaignStore(folder), _chosen(scheduler, workers)
     store.plan()
     with store.held():
         made = planned_in(store)
@@ -102,7 +99,7 @@ def resume_campaign(
         if retry_failed:
             for name in store.failed():
                 (store.folder / FAILED / f"{name}.json").unlink(missing_ok=True)
-        _finish(made, store, _chosen(engine, scheduler, workers), say=say)
+        _finish(made, store, make, say=say)
     return campaign_results(folder)
 
 
@@ -151,32 +148,30 @@ def _check_same_program(made: CampaignPlan, store: CampaignStore) -> None:
         )
 
 
-def _chosen(engine: EngineName | None, scheduler: str | None, workers: int | None) -> Callable[[Work, int], TaskEngine]:
+def _chosen(scheduler: DaskScheduler | str | None, workers: int | None) -> Callable[[Work, int], TaskEngine]:
     """What makes the engine for so many tasks.
 
     Raises:
-        CampaignError: a scheduler for an engine that has none.
+        CampaignError: less than one worker; a scheduler without TLS, or files for TLS that are none.
     """
-    if engine == "processes" and scheduler is not None:
-        raise CampaignError("needs the engine dask.", channel="scheduler")
     if workers is not None and workers < 1:
         raise CampaignError(f"is {workers}, expected one or more.", channel="workers")
-    wanted = workers or cores()
-    if engine == "processes" or (engine is None and scheduler is None and find_spec("distributed") is None):
-        return lambda work, tasks: ProcessPool(work, workers=min(wanted, tasks))
+    if scheduler is None:
+        return lambda work, tasks: ProcessPool(work, workers=min(workers or cores(), tasks))
     from swashplate.api.campaigns.dask_engine import DaskEngine
 
-    least = workers or 1
-    return lambda work, tasks: DaskEngine(
-        work, workers=min(wanted, tasks), scheduler=scheduler, least=least if scheduler else 1
-    )
+    named = DaskScheduler(scheduler) if isinstance(scheduler, str) else scheduler
+    named.security()  # what is wrong with it comes before anything is written
+    return lambda work, _: DaskEngine(work, scheduler=named, least=workers or 1)
 
 
 def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int], TaskEngine], *, say: Say) -> None:
     """Do every task of a plan that the store does not have."""
+    names = {task.name for task in made.tasks}
+    if refused := store.forget_refused(sorted(names & store.done())):
+        say(f"{len(refused)} results are refused, and their tasks done again")
     done, failed = store.done(), store.failed()
     left: Sequence[CampaignTask] = [t for t in made.tasks if t.name not in done and t.name not in failed]
-    names = {task.name for task in made.tasks}
     standing = CampaignStanding(total=len(made.tasks), done=len(names & done), failed=len(names & set(failed)))
     if not left:
         return

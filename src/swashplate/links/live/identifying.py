@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from swashplate import progress_lines
 from swashplate.models.vehicle import Vehicle
+from swashplate.own_python import own_python
 
 How = Literal["model", "responses"]
 Window = tuple[float, float]
@@ -64,16 +64,19 @@ def commands(
     frequency responses are left, which can also be asked for at once. Of a model that says nothing they are all there
     is.
     """
-    python = [sys.executable, "-m", "swashplate"]
-    identify = [*python, "identify", "--vehicle", str(card), "--out", str(out), "--quiet"]
+    identify = ["identify", "--vehicle", str(card), "--out", str(out), "--quiet"]
     inputs = ",".join(name for name in vehicle.input_names if name != "throttle")
     channels = ["--inputs", inputs, "--outputs", "p,q,r,w"]
-    respond = [*python, "respond", str(flight), *channels, "--out", str(out), "--quiet"]
+    respond = _swash("respond", str(flight), *channels, "--out", str(out), "--quiet")
     fitted = vehicle.traits.recording
     if how == "responses" or fitted is None:
         return (respond,)
     part = str(flight) if window is None else f"{flight}@{window[0]:g}-{window[1]:g}"
-    return ([*identify, "--flight", part, *fitted.options], respond)
+    return (_swash(*identify, "--flight", part, *fitted.options), respond)
+
+
+def _swash(*words: str) -> list[str]:
+    return own_python("swashplate.__main__", *words)
 
 
 def busiest(inputs: NDArray[np.float64], *, period: float, seconds: float) -> Window | None:
@@ -123,7 +126,6 @@ class Identifying:
             return
         self._job, self._begun = Job(recording, "running"), time.monotonic()
         card = self._folder / f"card-{recording}.toml"
-        vehicle.save(card)
         flight, out = self._folder / f"recording-{recording}.nc", self.out(recording)
         self._stopped = False
         ways = commands(vehicle, flight, card=card, out=out, how=how, window=window)

@@ -67,7 +67,14 @@ def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
         bad = 0
         while True:
             try:
-                message = parse(await socket_.receive_text())
+                heard = await socket_.receive_text()
+            except RuntimeError:  # an update could not be sent while this was busy: the page is gone
+                return
+            except KeyError:  # bytes instead of text
+                await socket_.close(code=1003, reason="text only")
+                return
+            try:
+                message = parse(heard)
                 if message["type"] == "stick":
                     steering[:] = [socket_]
                 await session.obey(message)
@@ -79,9 +86,6 @@ def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
                 if bad > MOST_BAD:
                     await socket_.close(code=1008, reason="messages that the schema refuses")
                     return
-            except KeyError:  # bytes instead of text
-                await socket_.close(code=1003, reason="text only")
-                return
             except (SwashError, OSError) as error:
                 session.notice = str(error)
 
@@ -91,7 +95,7 @@ def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
 
     routes = [
         Route("/", page(PAGE / "live.html")),
-        Route("/report/{number:int}", report),
+        Route("/report/{number:number}", report),
         WebSocketRoute("/socket", talk),
         Mount("/page", StaticFiles(directory=PAGE)),
     ]

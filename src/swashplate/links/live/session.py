@@ -6,20 +6,19 @@ import asyncio
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
-from swashplate.links.live.identifying import HOWS, How, Identifying, Job, Window, busiest
+from swashplate.links.live.identifying import HOWS, How, Identifying, Job, busiest
 from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
-from swashplate.links.live.recording import save_recording
+from swashplate.links.live.recording import LiveRecording, Saved
 from swashplate.links.live.world import FAN_SECONDS, World
+from swashplate.links.notices import Say
 from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
@@ -35,16 +34,6 @@ _LOOK_EVERY = 50
 """Steps of the controller between looks at what the equations hold for."""
 
 
-@dataclass(frozen=True)
-class Recording:
-    """A recording on disk: its number, length [s], the vehicle that flew it, and its busiest stretch [s]."""
-
-    number: int
-    seconds: float
-    vehicle: Vehicle
-    window: Window | None = None
-
-
 class LiveSession:
     """What `swash live` runs.
 
@@ -55,6 +44,7 @@ class LiveSession:
         estimate: parameters and equations that are estimated in flight (`Estimating`).
         model: what the pilot's law is made for and estimates begin with; the vehicle where None.
         draws: models that a fit cannot tell from it, which fly beside it (`World`).
+        tell: told where recordings are, for whoever does not look at the page.
     """
 
     def __init__(
@@ -66,17 +56,19 @@ class LiveSession:
         estimate: Sequence[str] = (),
         model: Vehicle | None = None,
         draws: Sequence[Vehicle] = (),
+        tell: Say = lambda _: None,
     ) -> None:
         self._draws = tuple(draws)
         self.folder, self._controller = folder, controller
-        self._estimate, self._model = tuple(estimate), model
+        self._estimate, self._model, self._tell = tuple(estimate), model, tell
         self.lock = threading.Lock()
         self.world, self._pose, self.estimating = self._make(vehicle)
         self.version = 1
         self.speed = 1.0
         self.clock = Clock(self._step, period=self.world.period, lock=self.lock)
         self.identifying = Identifying(folder)
-        self.recordings: list[Recording] = []
+        self.recording: LiveRecording | None = None
+        self.recordings: list[Saved] = []
         self.notice = ""
         self._jobs: set[asyncio.Task[None]] = set()
         self._wanted_to_run = True
@@ -103,18 +95,28 @@ class LiveSession:
         world, estimating = self.world, self.estimating
         ticks = world.ticks
         world.step()
-        if estimating is None or world.ticks == ticks:
+        if world.ticks == ticks:
+            return
+        row = world.latest
+        if self.recording is not None:
+            self.recording.add(row)
+        if estimating is None:
             return
         if ticks == 0:
             estimating.pause()
         n, m = len(world.vehicle.state_names), len(world.vehicle.input_names)
-        row = world.latest
         estimating.step(world.period, row[:n], row[n : n + m], float(row[-1]))
 
     # ---- life --------------------------------------------------------------------------------------------------
     def watched(self, count: int) -> None:
         """So many pages are open: time stands still while nobody looks."""
         self.clock.go(self._wanted_to_run and count > 0)
+        going = self.recording
+        if going is not None and not count:
+            self._tell(
+                f"No page is open: time stands still. Recording {going.number} waits with {going.seconds:.1f} s in "
+                f"{going.path}; it is saved when this command ends."
+            )
 
     def let_go(self) -> None:
         """Centre the sticks: whoever held them is gone."""
@@ -122,9 +124,23 @@ class LiveSession:
             self.world.setting.sticks = dict.fromkeys(STICKS, 0.0)
 
     def close(self) -> None:
-        """End the thread and what runs beside it."""
+        """End the thread and what runs beside it, and save what is being recorded."""
         self.clock.close()
         self.identifying.stop()
+        going, self.recording = self.recording, None
+        if going is not None:
+            self._keep(going)
+
+    def _keep(self, going: LiveRecording) -> None:
+        """A recording that nobody stopped; what became of it is told."""
+        try:
+            words = f"Recording {going.number} is saved: {going.finish().path}."
+        except SwashError as error:
+            words = f"Recording {going.number}: {error}"
+        except BaseException:  # a second interrupt while it is written
+            self._tell(f"Recording {going.number} stays in {going.path}: the next `swash live` there saves it.")
+            raise
+        self._tell(words)
 
     # ---- what a page says --------------------------------------------------------------------------------------
     async def obey(self, message: dict[str, Any]) -> None:
@@ -232,23 +248,32 @@ class LiveSession:
             self.clock.go(ran)
 
     async def _record(self, on: bool) -> None:
-        with self.lock:
-            rows, self.world.rows = self.world.rows, [] if on else None
-        if not rows or on:
+        """Begin a recording, or save the one that is going."""
+        if on:
+            if self.recording is None:
+                vehicle, period = self.world.vehicle, self.world.period
+                begun = LiveRecording(vehicle, period=period, folder=self.folder)  # at once: another page may ask too
+                self._tell(f"Recording {begun.number} grows in {begun.path}.")
+                with self.lock:
+                    self.recording = begun
             return
-        vehicle, period = self.world.vehicle, self.world.period
-        number, _ = await asyncio.to_thread(save_recording, vehicle, rows, period=period, folder=self.folder)
-        first, fitted = len(vehicle.state_names), vehicle.traits.recording
-        inputs = np.stack(rows)[:, first : first + len(vehicle.input_names)]
-        longest = None if fitted is None else fitted.longest
-        window = None if longest is None else busiest(inputs, period=period, seconds=longest)
-        self.recordings.append(Recording(number, len(rows) * period, vehicle, window))
+        with self.lock:
+            going, self.recording = self.recording, None
+        if going is None:
+            return
+        saved = await asyncio.to_thread(going.finish)
+        if going.trouble:
+            self.notice = f"{going.trouble} What it has is saved: {saved.path}."
+        self.recordings.append(saved)
 
     def _identify(self, number: int, how: How) -> None:
         chosen = next((recording for recording in self.recordings if recording.number == number), None)
         if chosen is None:
             raise SwashError(f"There is no recording {number}.")
-        task = asyncio.create_task(self.identifying.run(chosen.vehicle, number, how, window=chosen.window))
+        fitted = chosen.vehicle.traits.recording
+        longest = None if fitted is None else fitted.longest
+        window = None if longest is None else busiest(chosen.inputs, period=chosen.period, seconds=longest)
+        task = asyncio.create_task(self.identifying.run(chosen.vehicle, number, how, window=window))
         self._jobs.add(task)
         task.add_done_callback(self._jobs.discard)
 
@@ -291,7 +316,7 @@ class LiveSession:
         """What is flown now, for one update of the page."""
         with self.lock:
             now, setting, left = self.world.moment(), self.world.setting, self.world.maneuver_left
-            recorded = None if self.world.rows is None else len(self.world.rows) * self.world.period
+            going = self.recording
             around, pose, vehicle = self.world.environment(), self._pose, self.world.vehicle
             estimating = self.estimating
             runs = self.clock.runs  # with the time that stands still, where it does
@@ -312,7 +337,7 @@ class LiveSession:
             "target": _short(now.target),
             "stick": now.stick_number,
             "trouble": now.trouble or ("" if failed is None else f"The simulation stopped: {failed}"),
-            "notice": self.notice or self._monitor(),
+            "notice": self.notice or (going.trouble if going is not None else "") or self._monitor(),
             "runs": runs,
             "speed": self.speed,
             "steps": time.steps,
@@ -320,7 +345,7 @@ class LiveSession:
             "skipped": round(time.skipped, 3),
             "busy": round(time.busy, 4),
             "maneuver": round(left, 1),
-            "recording": None if recorded is None else round(recorded, 1),
+            "recording": None if going is None else round(going.seconds, 1),
             "recordings": [[r.number, round(r.seconds, 1)] for r in self.recordings],
             "job": None if job is None else _told(job),
             "frozen": "" if estimating is None else estimating.frozen,

@@ -17,7 +17,6 @@ from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.flown import Craft, Moment, Setting
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
-from swashplate.links.live.recording import LONGEST
 from swashplate.models.delays import input_delays
 from swashplate.models.doubts import doubts
 from swashplate.models.surroundings import environment_of
@@ -74,7 +73,6 @@ class World:
         self.setting = Setting(voltage=float(around.voltage))
         if self.setting.mode not in self.pilot.modes:
             self.setting.mode = self.pilot.modes[-1]
-        self.rows: list[Array] | None = None
         self.latest = np.empty(0)
         self._force = traced_force(equations_of(vehicle)) if self.pilot.feels else None
         self._p = parameter_row(vehicle, around)
@@ -187,8 +185,6 @@ class World:
         if self.trouble:
             return
         self.latest = np.concatenate([before, own.inputs, around])
-        if self.rows is not None and len(self.rows) * self.period < LONGEST:
-            self.rows.append(self.latest)
         ghost = self._crafts.get("ghost")
         if ghost is not None and self._lost(ghost.x):
             self.set_ghost(False)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route
@@ -22,6 +22,7 @@ from swashplate.links.logs.uploads import PIECE
 from swashplate.links.web.guard import Guard
 from swashplate.links.web.libraries import PAGE as SHARED
 from swashplate.links.web.serving import page
+from swashplate.links.web.work import in_thread
 
 PAGE = Path(__file__).parent / "page"
 _LOG = ask.whole(1, 10_000)
@@ -38,9 +39,9 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             path = desk.uploads.add(request.path_params["token"], request.path_params["at"], content)
             if path is None:
                 return ask.told({})
-            opened = await run_in_threadpool(desk.open, path)
+            opened = await in_thread(desk.open, path=path)
             return ask.told({"log": opened.number})
-        except Exception as error:
+        except (Exception, asyncio.CancelledError) as error:
             return ask.refused(error)
 
     def begin(name: str, size: int) -> dict[str, Any]:
@@ -61,11 +62,11 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
         chosen = [(int(log), str(name)) for log, name in wanted]
         return desk.plot_code(chosen, (span[0][0], span[0][1]) if span else None)
 
-    def download(request: Request) -> Response:
+    async def download(request: Request) -> Response:
         name = request.path_params["name"]
         try:
-            path = desk.job.file(name)
-        except Exception as error:
+            path = await in_thread(desk.job.file, name=name)
+        except (Exception, asyncio.CancelledError) as error:
             return ask.refused(error)
         if path is None or not path.is_file():
             return PlainTextResponse("No such file.\n", status_code=404)
@@ -78,7 +79,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
         Mount("/open", StaticFiles(directory=PAGE)),
         Route("/logs", ask.get(desk.as_dict)),
         _post("/upload", begin, name=ask.text(1000), size=ask.whole(0, 1 << 50)),
-        Route("/upload/{token}/{at:int}", piece, methods=["POST"]),
+        Route("/upload/{token}/{at:number}", piece, methods=["POST"]),
         _post("/close", close, log=_LOG),
         _post("/apply", apply, log=_LOG, units=ask.names(200, 60), drop_bad_stamps=ask.switch),
         _post(

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from swashplate.errors import SwashError
 from swashplate.json_text import plain
+from swashplate.links.web.work import in_thread
 
 LONGEST = 64 << 10
 """Bytes of a request that is no piece of a file."""
@@ -63,8 +64,10 @@ def told(result: Any, *, status: int = 200) -> Response:
     return JSONResponse(plain(result), status_code=status)
 
 
-def refused(error: Exception) -> Response:
+def refused(error: BaseException) -> Response:
     """An error in words, without a traceback: those of a user's input as they are, others by their kind."""
+    if isinstance(error, asyncio.CancelledError):
+        return told({"problem": "swash has been ended.", "hint": ""}, status=503)
     if isinstance(error, RequestError):
         return told({"problem": error.problem, "hint": ""}, status=400)
     if isinstance(error, SwashError):
@@ -81,8 +84,8 @@ def post(form: Form, work: Callable[..., Any]) -> Callable[[Request], Any]:
     async def answer(request: Request) -> Response:
         try:
             message = fields(await body(request, longest=LONGEST), form)
-            return told(await run_in_threadpool(work, **message))
-        except Exception as error:  # whatever it is, the page hears it in words
+            return told(await in_thread(work, **message))
+        except (Exception, asyncio.CancelledError) as error:  # whatever it is, the page hears it in words
             return refused(error)
 
     return answer
@@ -93,8 +96,8 @@ def get(work: Callable[[], Any]) -> Callable[[Request], Any]:
 
     async def answer(_: Request) -> Response:
         try:
-            return told(await run_in_threadpool(work))
-        except Exception as error:
+            return told(await in_thread(work))
+        except (Exception, asyncio.CancelledError) as error:
             return refused(error)
 
     return answer

@@ -1,9 +1,10 @@
-"""Connections that never ask for anything, and frames that are no text: both end without a word that frightens."""
+"""Connections that never ask for anything, and requests that fail: both end without words that frighten."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import os
 from typing import ClassVar
 
 import h11
@@ -54,15 +55,27 @@ class Punctual(H11Protocol):
 
 
 class OneLine(logging.Filter):
-    """Of frames that are no UTF-8 the server's log has one line, instead of a traceback for each."""
+    """Of what goes wrong inside a request the server's log has one line, instead of a traceback; debugging has it all.
+
+    Frames that are no UTF-8 are told once. Requests that the end of the server cuts off are what its user asked for.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self._told = False
 
     def filter(self, record: logging.LogRecord) -> bool:
-        if not record.exc_info or not isinstance(record.exc_info[1], UnicodeDecodeError):
+        if "timeout graceful shutdown exceeded" in str(record.msg):
+            return False
+        if not record.exc_info or os.environ.get("SWASHPLATE_DEBUG", "") not in ("", "0"):
             return True
-        told, self._told = self._told, True
-        record.exc_info, record.msg, record.args = None, "A page's message was refused: it is no UTF-8.", ()
-        return not told
+        kind, error, _ = record.exc_info
+        record.exc_info, record.args = None, None
+        if isinstance(error, UnicodeDecodeError):
+            told, self._told = self._told, True
+            record.msg = "A page's message was refused: it is no UTF-8."
+            return not told
+        name = "error" if kind is None else kind.__name__
+        words = f"A request failed inside swash ({name}: {error}). Please report it; SWASHPLATE_DEBUG=1 shows where."
+        record.msg = words
+        return True

@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import logging
+import signal
 import socket
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import uvicorn
+from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.types import ASGIApp
@@ -61,6 +64,21 @@ def address_of(listening: socket.socket) -> str:
     return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
 
 
+class _Number(Convertor[int]):
+    """A whole number of an address. Starlette's own falls over one of more than 4,300 digits."""
+
+    regex = "[0-9]{1,18}"
+
+    def convert(self, value: str) -> int:
+        return int(value)
+
+    def to_string(self, value: int) -> str:
+        return str(value)
+
+
+register_url_convertor("number", _Number())
+
+
 def page(path: Path) -> Callable[[Request], Response]:
     """Answers with an HTML page that may load only what this server has."""
 
@@ -87,8 +105,26 @@ def configured(app: ASGIApp, *, frame: int = 0) -> uvicorn.Config:
         ws_max_size=frame,
         timeout_graceful_shutdown=2,
     )
-    logging.getLogger("uvicorn.error").addFilter(OneLine())
+    for log in ("uvicorn.error", "asyncio"):
+        logging.getLogger(log).addFilter(OneLine())
     return made
+
+
+class _Server(uvicorn.Server):
+    """A server that a closed terminal ends as an interrupt does: with its pages closed, and without a traceback."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        with super().capture_signals():
+            own = threading.current_thread() is threading.main_thread() and hasattr(signal, "SIGHUP")
+            if not own or signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # as `nohup` asks for
+                yield
+                return
+            before = signal.signal(signal.SIGHUP, self.handle_exit)
+            try:
+                yield
+            finally:
+                signal.signal(signal.SIGHUP, before)
 
 
 def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0, first: bool = True) -> None:
@@ -102,4 +138,4 @@ def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0, first: bool
     if first:
         come_first()  # the interpreter's lock must not be held by a thread that waits for a processor
     with contextlib.suppress(KeyboardInterrupt):
-        uvicorn.Server(config).run(sockets=[listening])
+        _Server(config).run(sockets=[listening])

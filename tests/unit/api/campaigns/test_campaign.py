@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 
@@ -20,6 +22,7 @@ from made_campaigns import InProcess
 from swashplate.api.campaigns import verbs, worker
 from swashplate.api.campaigns.result_files import ENDINGS, packed
 from swashplate.api.campaigns.store import CampaignStore
+from swashplate.api.campaigns.tasks import CampaignTask
 from swashplate.errors import CampaignError
 from swashplate.reporting.structure import Figure, Table
 
@@ -140,6 +143,7 @@ def test_a_changed_file_is_refused_with_what_changed(
         ("portions", [[0, 1]], "portions"),
         ("files", {"a": 3}, "files"),
         ("schema", 9, "schema 9"),
+        ("schema", 1, "schema 1, expected 2"),
         ("program", None, "program"),
     ],
 )
@@ -168,16 +172,22 @@ def test_a_damaged_result_is_named(tmp_path: Path) -> None:
     store = CampaignStore(tmp_path)
     store.begin("", {}, {"a": b"content"})
     (tmp_path / "results" / "x.npz").write_bytes(b"half of")
-    with pytest.raises(CampaignError, match=r"x\.npz: is no result of a task: .*resume"):
+    with pytest.raises(CampaignError, match=r"x\.npz: is no result of its task: .*resume"):
         store.columns("x")
+    read, values = 0, {"a": np.arange(4), "b": np.array(["one", "two"] * 2)}
     for ending in ENDINGS:
-        whole = packed({"a": np.arange(4), "b": np.array(["one", "two"] * 2)}, ending=ending)
+        whole = packed(values, ending=ending, task=ending[1:])
         for at in range(0, len(whole), 7):  # libraries raise all kinds of errors for a bit in a header
             content = bytearray(whole)
             content[at] ^= 0xFF
             (tmp_path / "results" / f"{ending[1:]}{ending}").write_bytes(content)
             with contextlib.suppress(CampaignError):
-                assert set(store.columns(ending[1:]))
+                found = store.columns(ending[1:])
+                assert {name: column.tolist() for name, column in found.items()} == {
+                    name: column.tolist() for name, column in values.items()
+                }, "what is read is what was written"
+                read += 1
+    assert read, "bytes that mean nothing may be anything"
     kept = next((tmp_path / "inputs").iterdir())
     assert store.input(kept.name) == b"content"
     kept.write_bytes(b"other")
@@ -269,3 +279,86 @@ def test_a_failure_is_in_the_report_with_its_seed(
     assert all(isinstance(figure, Figure) for figure in page.figures)
     assert sp.resume_campaign(tmp_path, retry_failed=True).failed == {}
     assert [task.portion.first for task in engines[-1].did] == [3]
+
+
+def _store_of_three(place: Path, folder: Path) -> tuple[CampaignStore, tuple[CampaignTask, ...]]:
+    """A campaign of three fits, all done."""
+    (place / "three.toml").write_text(FILE.replace("count = 4", "count = 3"))
+    made = sp.plan_campaign(place / "three.toml")
+    store = CampaignStore(folder)
+    store.begin(made.text, made.stored(), made.tasks[0].files)
+    for k, task in enumerate(made.tasks):
+        own = {"number": np.array([k]), "seed": np.array([task.portion.seed])}
+        store.keep(task, own | {"cost": np.array([1.0 + k]), "usable": np.array([1])})
+    return store, made.tasks
+
+
+def _file(store: CampaignStore, task: CampaignTask) -> Path:
+    return next((store.folder / "results").glob(f"{task.name}.*"))
+
+
+def _copied(store: CampaignStore, tasks: tuple[CampaignTask, ...]) -> None:
+    _file(store, tasks[1]).write_bytes(_file(store, tasks[0]).read_bytes())
+
+
+def _edited(store: CampaignStore, tasks: tuple[CampaignTask, ...]) -> None:
+    """A number by hand, with what the file says of itself left as it was."""
+    path = _file(store, tasks[1])
+    table = pq.read_table(path)
+    better = table.set_column(table.column_names.index("cost"), "cost", pa.array([0.5]))
+    pq.write_table(better, path)
+    assert better.schema.metadata == table.schema.metadata
+
+
+def _foreign(store: CampaignStore, tasks: tuple[CampaignTask, ...]) -> None:
+    path = _file(store, tasks[1])
+    pq.write_table(pq.read_table(path).replace_schema_metadata({}), path)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (_copied, "is the result of another task"),
+        (_edited, "its values are not those"),
+        (_foreign, "does not say whose"),
+    ],
+)
+def test_a_result_that_is_not_what_was_computed_is_in_no_figure_and_done_again(
+    change: Callable[..., None], why: str, place: Path, tmp_path: Path, engines: list[InProcess],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    store, tasks = _store_of_three(place, tmp_path)
+    assert sp.campaign_results(tmp_path).refused == {}
+    assert sp.campaign_results(tmp_path).complete
+    right = _file(store, tasks[1]).read_bytes()
+    change(store, tasks)
+    found = sp.campaign_results(tmp_path)
+    assert list(found.refused) == [tasks[1].name]
+    assert why in found.refused[tasks[1].name]
+    assert found.table["number"].tolist() == [0, 2]
+    assert not found.complete
+    assert "3 of 3 tasks done, the results of 1 refused; `swash campaign resume" in repr(found)
+    assert "rows 1 to 1 are refused: " in repr(found)
+    assert found.to_document()["refused"] == dict(found.refused)
+    assert found.page().banners[0] == ("bad", found.refused[tasks[1].name])
+
+    def work(task: CampaignTask) -> dict[str, np.ndarray]:
+        own = {"number": np.array([task.portion.first]), "seed": np.array([task.portion.seed])}
+        return own | {"cost": np.array([1.0 + task.portion.first]), "usable": np.array([1])}
+
+    monkeypatch.setattr(worker, "work", work)
+    again = sp.resume_campaign(tmp_path)
+    assert [task.portion.first for task in engines[-1].did] == [1]
+    assert again.complete
+    assert _file(store, tasks[1]).read_bytes() == right
+
+
+def test_a_result_that_cannot_be_read_is_not_removed(place: Path, tmp_path: Path, engines: list[InProcess]) -> None:
+    store, tasks = _store_of_three(place, tmp_path)
+    path = _file(store, tasks[1])
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(CampaignError, match="cannot be read"):
+        sp.resume_campaign(tmp_path)
+    assert path.is_dir()
+    assert engines == []

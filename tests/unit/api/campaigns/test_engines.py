@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,15 +15,24 @@ import numpy as np
 import pytest
 
 import made_campaigns
+from dask_cluster import Cluster, cluster
 from swashplate.api.campaigns import program
 from swashplate.api.campaigns.dask_engine import DaskEngine
 from swashplate.api.campaigns.engine import TRIES, CampaignStanding, TaskEngine, carry_out
 from swashplate.api.campaigns.pool import ProcessPool
 from swashplate.api.campaigns.result_files import usual_ending
+from swashplate.api.campaigns.scheduler import DaskScheduler
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
 from swashplate.compiled import can_compile
 from swashplate.errors import CampaignError, WriteError
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """A scheduler with TLS, and one worker."""
+    with cluster(tmp_path_factory.mktemp("tls")) as made:
+        yield made
 
 
 def expected(every: tuple[CampaignTask, ...], folder: Path) -> dict[str, bytes]:
@@ -64,10 +72,10 @@ def test_kills_and_failures_cost_nothing_but_time(tmp_path: Path, monkeypatch: p
 
 
 def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    dask: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     every = made_campaigns.tasks(fail=[4])
-    engine = DaskEngine(made_campaigns.numbers, workers=1)
+    engine = DaskEngine(made_campaigns.numbers, scheduler=dask.named)
     monkeypatch.setattr(engine, "close", lambda: None)
     store, _ = done(every, engine, tmp_path / "dask")
     good = tuple(task for task in every if task.portion.first != 4)
@@ -78,12 +86,12 @@ def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
         engine._heard((at, {"action": action, "worker": address, "expected": False}))
     assert list(engine.turned_away) == ["a"], "one that worked for a minute, and one that was there before, are none"
     assert engine.turned_away["a"].startswith("went 1.5 s after it had joined; swashplate may be missing there")
-    assert engine.words == "1 worker of Dask on this machine (1 came and went)"
+    assert engine.words == f"1 worker of the scheduler {dask.address} (1 came and went)"
     with monkeypatch.context() as scheduler:
         scheduler.setattr(engine._client, "scheduler_info", lambda n_workers: {"workers": {}})
         scheduler.setattr(engine, "_counted", float("-inf"))
         assert engine.workers == 0
-        assert engine.words == "no worker of Dask on this machine (1 came and went), it waits for one"
+        assert engine.words == f"no worker of the scheduler {dask.address} (1 came and went), it waits for one"
     engine._counted = float("-inf")
     store.turn_away(engine.turned_away)
     assert store.turned_away() == engine.turned_away
@@ -152,7 +160,10 @@ def test_workers_share_out_the_cores_and_have_one_thread(tmp_path: Path) -> None
         own = tmp_path / str(number)  # as where a queue gives each job a temporary folder of its own
         own.mkdir()
         environment = {**os.environ, "TMPDIR": str(own)}
-        command = [sys.executable, "-c", BECOMES_A_WORKER]
+        locks = (
+            f"from swashplate.api.campaigns import program; program._LOCK += 'tests-{os.getpid()}-';"  # nobody else's
+        )
+        command = [sys.executable, "-c", locks + BECOMES_A_WORKER]
         started.append(
             subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
         )
@@ -179,31 +190,6 @@ def test_a_worker_in_a_container_is_left_to_the_machine() -> None:
     assert found == f"None {sorted(os.sched_getaffinity(0))} 1\n"
 
 
-@contextmanager
-def cluster(
-    *, threads: int = 1, environment: dict[str, str] | None = None
-) -> Iterator[tuple[str, subprocess.Popen[bytes], subprocess.Popen[bytes]]]:
-    """A scheduler and a worker as processes of their own; the address."""
-    import socket
-
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    scheduler_words = ["dask", "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-    worker_words = ["dask", "worker", f"tcp://127.0.0.1:{port}", "--nthreads", str(threads), "--no-dashboard"]
-    here = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    scheduler = subprocess.Popen([sys.executable, "-m", *scheduler_words], env=here, **quiet)  # type: ignore[call-overload]
-    own = {**here, **(environment or {})}
-    worker = subprocess.Popen([sys.executable, "-m", *worker_words, "--no-nanny"], env=own, **quiet)  # type: ignore[call-overload]
-    try:
-        yield f"tcp://127.0.0.1:{port}", scheduler, worker
-    finally:
-        for process in (worker, scheduler):
-            process.kill()
-            process.wait()
-
-
 def waited_for(engine: TaskEngine) -> None:
     """Half a minute of an engine."""
     for _ in range(150):
@@ -214,12 +200,12 @@ def waited_for(engine: TaskEngine) -> None:
 def test_a_scheduler_by_its_address_and_then_it_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("swashplate.api.campaigns.dask_engine._GONE", 2.0)
     every = made_campaigns.tasks()
-    with cluster() as (address, scheduler, _):
-        store, _ = done(every, DaskEngine(made_campaigns.numbers, workers=1, scheduler=address), tmp_path / "dask")
+    with cluster(tmp_path / "tls") as dask:
+        store, _ = done(every, DaskEngine(made_campaigns.numbers, scheduler=dask.named), tmp_path / "dask")
         assert made_campaigns.bits(store.folder) == expected(every, tmp_path / "here")
-        engine = DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+        engine = DaskEngine(made_campaigns.numbers, scheduler=dask.named)
         engine.submit(made_campaigns.tasks(1, wait=60.0)[0])
-        scheduler.kill()
+        dask.scheduler.kill()
         with pytest.raises(CampaignError, match=r"the scheduler is gone\. What is done is kept"):
             waited_for(engine)
         engine.close()
@@ -228,29 +214,23 @@ def test_a_scheduler_by_its_address_and_then_it_is_gone(tmp_path: Path, monkeypa
 @pytest.mark.proof
 def test_a_campaign_whose_workers_have_all_gone_waits_and_says_so(tmp_path: Path) -> None:
     every, store, told = made_campaigns.tasks(), CampaignStore(tmp_path / "dask"), []
-    came: list[subprocess.Popen[bytes]] = []
     store.begin("", {}, {})
-    with cluster() as (address, _, worker):
-        words = [sys.executable, "-m", "dask", "worker", address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        here = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-        engine = DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+    with cluster(tmp_path / "tls") as dask:
+        engine = DaskEngine(made_campaigns.numbers, scheduler=dask.named)
         standing = CampaignStanding(total=len(every), done=0, failed=0, workers=engine.workers)
-        worker.kill()
+        dask.workers[0].kill()
 
         def tell(standing: CampaignStanding) -> None:
             told.append((standing.workers, engine.words))
-            if not standing.workers and not came:
-                came.append(subprocess.Popen(words, env=here, stderr=subprocess.DEVNULL))
+            if not standing.workers and len(dask.workers) == 1:
+                dask.join("--no-nanny")
 
         try:
             with store.held():
                 carry_out(every, engine, store, standing=standing, tell=tell)
         finally:
             engine.close()
-            for process in came:
-                process.kill()
-                process.wait()
-    assert told[0] == (0, f"no worker of the scheduler {address}, it waits for one")
+    assert told[0] == (0, f"no worker of the scheduler {dask.address}, it waits for one")
     assert told[-1][0] == 1
     assert made_campaigns.bits(store.folder) == expected(every, tmp_path / "here")
 
@@ -259,9 +239,9 @@ def test_a_campaign_whose_workers_have_all_gone_waits_and_says_so(tmp_path: Path
 def test_a_worker_that_joins_late_without_the_package_costs_nothing_but_time(tmp_path: Path) -> None:
     (tmp_path / "swashplate.py").write_text("raise ModuleNotFoundError(\"No module named 'swashplate'\")")
     every = made_campaigns.tasks(150, batch=1, wait=0.1)
-    with cluster() as (address, _, _):
-        engine = DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
-        words = ["dask", "worker", address, "--nthreads", "1", "--no-dashboard"]
+    with cluster(tmp_path / "tls") as dask:
+        engine = DaskEngine(made_campaigns.numbers, scheduler=dask.named)
+        words = ["dask", "worker", dask.address, "--nthreads", "1", "--no-dashboard", *dask.tls]
         bare = {**os.environ, "PYTHONPATH": str(tmp_path)}
         late = subprocess.Popen([sys.executable, "-m", *words], env=bare, stderr=subprocess.DEVNULL)
         try:
@@ -277,8 +257,8 @@ def test_a_worker_that_joins_late_without_the_package_costs_nothing_but_time(tmp
 @pytest.mark.proof
 def test_a_worker_of_another_program_is_refused() -> None:
     other = {"XLA_FLAGS": "--xla_cpu_enable_fast_math=true"}
-    with cluster(environment=other) as (address, _, _), pytest.raises(CampaignError) as refused:
-        DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+    with cluster(None, environment=other) as dask, pytest.raises(CampaignError) as refused:
+        DaskEngine(made_campaigns.numbers, scheduler=dask.named)
     assert "it has another program: XLA flags is --xla_cpu_enable_fast_math=true" in str(refused.value)
 
 
@@ -288,33 +268,15 @@ def test_a_worker_without_a_compiler_that_compiles_is_another_program(there: boo
     if there:  # one without headers
         (tmp_path / "cc").write_text("#!/bin/sh\necho 'fatal error: math.h: No such file or directory' >&2; exit 1\n")
         (tmp_path / "cc").chmod(0o755)
-    with cluster(environment={"PATH": str(tmp_path)}) as (address, _, _), pytest.raises(CampaignError) as refused:
-        DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+    with cluster(None, environment={"PATH": str(tmp_path)}) as dask, pytest.raises(CampaignError) as refused:
+        DaskEngine(made_campaigns.numbers, scheduler=dask.named)
     assert "it has another program: generated code is XLA, expected C by CasADi" in str(refused.value)
 
 
 def test_nobody_at_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("swashplate.api.campaigns.dask_engine._CONNECT", 0.5)
-    began = time.monotonic()
     with pytest.raises(CampaignError, match=r"tcp://127\.0\.0\.1:9: no worker answers: .*dask worker ADDRESS"):
-        DaskEngine(made_campaigns.numbers, workers=1, scheduler="tcp://127.0.0.1:9")
-    assert time.monotonic() - began < 60.0
-    with pytest.raises(CampaignError, match="is no address of a scheduler"):
-        DaskEngine(made_campaigns.numbers, workers=1, scheduler="nonsense://x")
-
-
-def test_workers_here_that_do_not_start_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    starts = []
-
-    def failing(**_: object) -> None:
-        starts.append(1)
-        raise RuntimeError("Nanny failed to start.")
-
-    monkeypatch.setattr("distributed.LocalCluster", failing)
-    said = r"this machine: no worker answers: RuntimeError: Nanny failed to start\. What is done is kept: run the same"
-    with pytest.raises(CampaignError, match=said):
-        DaskEngine(made_campaigns.numbers, workers=1)
-    assert len(starts) == 3
+        DaskEngine(made_campaigns.numbers, scheduler=DaskScheduler("tcp://127.0.0.1:9", insecure=True))
 
 
 def test_time_left_is_counted_from_the_second_task_of_each_worker(monkeypatch: pytest.MonkeyPatch) -> None:

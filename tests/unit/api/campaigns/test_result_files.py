@@ -116,3 +116,26 @@ def test_the_folder_of_results_is_one_table_for_others(tmp_path: Path) -> None:
     table = pd.read_parquet(tmp_path / "results").sort_values("number")
     assert table["number"].tolist() == [0, 1, 2, 3, 4, 5]
     assert table["verdict"].tolist() == ["good", "lost"] * 3
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_result_says_whose_it_is(ending: str) -> None:
+    content = packed(TABLE, ending=ending, task="a" * 64)
+    assert packed(dict(TABLE), ending=ending, task="a" * 64) == content
+    assert list(unpacked(content, ending=ending, task="a" * 64)) == list(TABLE)
+    assert list(unpacked(content, ending=ending)) == list(TABLE)
+    with pytest.raises(ValueError, match="it is the result of another task, aaaa"):
+        unpacked(content, ending=ending, task="b" * 64)
+    with pytest.raises(ValueError, match="it does not say whose result it is"):
+        unpacked(packed(TABLE, ending=ending), ending=ending, task="a" * 64)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("name", list(TABLE))
+def test_any_other_value_has_another_hash(ending: str, name: str) -> None:
+    values = TABLE[name].copy()
+    values[1] = {"b": True, "U": "bad"}.get(values.dtype.kind, 3)
+    one, other = (result_files._mark(table, "a") for table in (TABLE, {**TABLE, name: values}))
+    assert one != other
+    assert result_files._mark(unpacked(packed(TABLE, ending=ending), ending=ending), "a") == one
+    assert result_files._mark({f"{name}2" if n == name else n: v for n, v in TABLE.items()}, "a") != one

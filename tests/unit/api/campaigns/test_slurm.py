@@ -16,12 +16,15 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import distributed
 import pytest
 
 import made_campaigns
 import proof_page
+from dask_cluster import certificates
 from swashplate.api.campaigns.dask_engine import DaskEngine
 from swashplate.api.campaigns.engine import CampaignStanding, carry_out
+from swashplate.api.campaigns.scheduler import DaskScheduler
 from swashplate.api.campaigns.store import CampaignStore
 
 TASKS, CANCELLED = int(os.environ.get("SWASH_TASKS", "600")), int(os.environ.get("SWASH_KILLS", "10"))
@@ -43,6 +46,10 @@ def test_a_campaign_on_slurm_outlives_cancelled_jobs(tmp_path: Path, monkeypatch
     here.begin("", {}, {})
     for task in every:
         here.keep(task, made_campaigns.numbers(replace(task, settings={})))
+    certificate, key = certificates(tmp_path / "tls")
+    files = {f"tls_{role}_{part}": str(file) for role in ("scheduler", "worker", "client")
+             for part, file in (("cert", certificate), ("key", key))}  # fmt: skip
+    security = distributed.Security(tls_ca_file=str(certificate), require_encryption=True, **files)
     chance, over = random.Random(1), threading.Event()
     cancelled: list[str] = []
 
@@ -59,14 +66,15 @@ def test_a_campaign_on_slurm_outlives_cancelled_jobs(tmp_path: Path, monkeypatch
 
     with jobqueue.SLURMCluster(
         cores=1, processes=1, memory="2GB", walltime="00:30:00", interface="lo", job_name=NAME,
-        job_extra_directives=["--mem=0"], log_directory=str(tmp_path / "logs"),
+        job_extra_directives=["--mem=0"], log_directory=str(tmp_path / "logs"), protocol="tls://", security=security,
     ) as cluster:  # fmt: skip
         cluster.adapt(minimum_jobs=2, maximum_jobs=2, interval="2s")
         began = time.monotonic()
         while not asked("squeue", "-h", "-n", NAME, "-t", "R", "-o", "%i").split():
             assert time.monotonic() - began < 120.0, "no job runs"
             time.sleep(0.5)
-        engine = DaskEngine(made_campaigns.numbers, workers=2, scheduler=cluster.scheduler_address)
+        named = DaskScheduler(cluster.scheduler_address, ca=certificate, certificate=certificate, key=key)
+        engine = DaskEngine(made_campaigns.numbers, scheduler=named, least=2)
         threading.Thread(target=cancel, daemon=True).start()
         began = time.monotonic()
         try:

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from flown_by_hand import PHI, Z, fly, fresh, holds_what_is_held, moves_its_way
+from flown_by_hand import PHI, Z, flown_rows, fly, fresh, holds_what_is_held, moves_its_way, recorded
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.links.live.axes import STICKS, axes_of
 from swashplate.links.live.identifying import commands
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
-from swashplate.links.live.recording import save_recording
 from swashplate.links.live.replay import Replay, as_json, replay
 from swashplate.links.live.session import LiveSession
 from swashplate.links.live.world import World, _delays, _steps_back
@@ -110,11 +109,9 @@ def test_delays_that_are_no_whole_controller_steps() -> None:
 @pytest.fixture(scope="module")
 def recording(session: LiveSession, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[np.ndarray]]:
     world = fresh(session.world, "position")
-    world.rows = []
-    fly(world, 4.0, pitch=0.3, heave=0.2)
-    rows, world.rows = world.rows, None
+    rows = flown_rows(world, 4.0, pitch=0.3, heave=0.2)
     folder = tmp_path_factory.mktemp("recorded")
-    assert save_recording(world.vehicle, rows, period=world.period, folder=folder)[0] == 1
+    assert recorded(world, rows, folder).number == 1
     return folder, rows
 
 

@@ -35,6 +35,7 @@ from swashplate.links.live.messages import LONGEST, SCHEMA, MessageError, parse
 from swashplate.links.live.session import LiveSession
 from swashplate.links.web import connections, libraries, serving
 from swashplate.links.web.guard import Guard
+from swashplate.own_python import own_python
 
 VALID: list[dict[str, Any]] = [
     {"type": "stick", "roll": 0, "pitch": 0.5, "yaw": -1, "heave": 1.0, "number": 3},
@@ -248,18 +249,19 @@ def test_recording_pausing_and_what_cannot_be_done(running: Running) -> None:
 def test_what_a_recording_is_identified_with(tmp_path: Path) -> None:
     raptor, coax = sp.vehicle("raptor50"), sp.vehicle("coax")
     first, second = commands(raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")
-    assert first[3] == "identify"
+    assert first[:3] == own_python("swashplate.__main__")[:3]
+    assert first[4] == "identify"
     cheap = ["--flight", str(tmp_path / "f.nc"), "--free", "rotor", "--method", "output-error", "--rate", "50"]
     assert first[-8:] == cheap
     (windowed, _) = commands(
         raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out", window=(12.5, 32.5)
     )
     assert f"{tmp_path / 'f.nc'}@12.5-32.5" in windowed
-    assert second[3:5] == ["respond", str(tmp_path / "f.nc")]
+    assert second[4:6] == ["respond", str(tmp_path / "f.nc")]
     assert "throttle" not in " ".join(second)
     assert len(commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")) == 2
     (only,) = commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out", how="responses")
-    assert only[3] == "respond"
+    assert only[4] == "respond"
 
 
 @pytest.mark.parametrize(
@@ -371,8 +373,56 @@ def test_other_pages_and_other_names_are_refused(running: Running) -> None:
 
 
 def test_only_reports_and_the_page_are_served(running: Running) -> None:
-    for path in ("report/1", "report/-1", "report/x", "page/../server.py", "page/%2e%2e/server.py", "recording-1.nc"):
+    long = "9" * 5000  # more digits than Python makes a number of
+    for path in ("report/1", "report/-1", "report/x", f"report/{long}", "page/../server.py", "page/%2e%2e/server.py",
+                 "recording-1.nc"):  # fmt: skip
         assert httpx.get(running.url + path).status_code == 404
+
+
+def test_a_page_that_goes_while_it_is_answered_is_no_error(tmp_path: Path) -> None:
+    """An update cannot be sent while a message is obeyed: what is asked of the socket after that is not there."""
+    session = LiveSession(sp.vehicle("coax"), controller=None, folder=tmp_path)
+    gone, obeyed, counts = asyncio.Event(), [], []
+    session.watched = counts.append  # type: ignore[method-assign]
+
+    async def obey(message: dict[str, Any]) -> None:
+        await gone.wait()
+        obeyed.append(message)
+
+    session.obey = obey  # type: ignore[method-assign]
+    said = iter([{"type": "websocket.connect"}, {"type": "websocket.receive", "text": '{"type": "step"}'}])
+
+    async def receive() -> Any:
+        return next(said)
+
+    async def send(message: Any) -> None:
+        if message["type"] == "websocket.send":
+            gone.set()
+            raise OSError("the connection is lost")
+
+    headers = [(b"host", b"127.0.0.1:8017"), (b"origin", b"http://127.0.0.1:8017")]
+    scope = {"type": "websocket", "path": "/socket", "headers": headers, "query_string": b"", "subprotocols": []}
+    asyncio.run(asyncio.wait_for(server.live_app(session)(scope, receive, send), 60.0))  # type: ignore[arg-type]
+    assert obeyed == [{"type": "step"}]
+    assert counts == [1, 0]
+    session.close()
+
+
+@pytest.mark.parametrize("debug", ["", "1"])
+def test_what_fails_inside_a_request_is_one_line_unless_one_looks_for_it(
+    debug: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("SWASHPLATE_DEBUG", debug)
+    log = logging.getLogger("swashplate.tests.one-line")
+    log.addFilter(connections.OneLine())
+    try:
+        raise ZeroDivisionError("100 % of it")
+    except ZeroDivisionError:
+        log.exception("Exception in ASGI application\n")
+    log.error("Cancel %s running task(s), timeout graceful shutdown exceeded", 3)
+    assert len(caplog.records) == 1
+    assert ("Traceback" in caplog.text) == bool(debug)
+    assert debug or "A request failed inside swash (ZeroDivisionError: 100 % of it). Please report it" in caplog.text
 
 
 def test_a_name_of_this_machine_serves_others_only_when_asked_to() -> None:

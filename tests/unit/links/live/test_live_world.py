@@ -13,7 +13,7 @@ import pytest
 import scipy.linalg
 
 import swashplate as sp
-from flown_by_hand import U, X, Y, Z, fly, fresh, holds_what_is_held, moves_its_way
+from flown_by_hand import U, X, Y, Z, flown_rows, fly, fresh, holds_what_is_held, moves_its_way, recorded
 from swashplate.control.laws.linear_decoupling import static_decoupling
 from swashplate.control.lqg.design import design
 from swashplate.errors import ControllerError, FlightError
@@ -24,7 +24,6 @@ from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
-from swashplate.links.live.recording import save_recording
 from swashplate.links.live.world import FAN_SECONDS, Setting, World
 from swashplate.links.web.priority import come_first
 from swashplate.models.card import packaged_cards
@@ -224,14 +223,17 @@ def test_a_maneuver_is_added_to_the_inputs_and_ends(coax: World) -> None:
 @pytest.mark.parametrize("world", ["coax", pytest.param("raptor50", marks=pytest.mark.proof)], indirect=True)
 def test_a_recording_is_a_flight(world: World, tmp_path: Path) -> None:
     fresh(world, "position")
-    world.rows = []
-    fly(world, 2.5, pitch=0.3)
-    rows, world.rows = world.rows, None
+    rows = flown_rows(world, 2.5, pitch=0.3)
     (tmp_path / "identified-6").mkdir()  # of an earlier session
     for number in range(1, 6):
         (tmp_path / f"recording-{number}.nc").write_text("mine")
-    number, path = save_recording(world.vehicle, rows, period=world.period, folder=tmp_path)
-    assert (number, path) == (7, tmp_path / "recording-7.nc")
+    saved = recorded(world, rows, tmp_path)
+    path = saved.path
+    assert (saved.number, path) == (7, tmp_path / "recording-7.nc")
+    assert saved.period == pytest.approx(world.period)
+    n = len(world.vehicle.state_names)
+    assert np.array_equal(saved.inputs, np.array(rows)[:, n : n + len(world.vehicle.input_names)])
+    assert sp.load(tmp_path / "card-7.toml").values() == world.vehicle.values()
     truth, log = Flight.load(tmp_path / "recording-7-truth.nc"), Flight.load(path)
     names = (*world.vehicle.state_names, *world.vehicle.input_names)
     assert np.array_equal(truth.array(names), np.array(rows)[:, : len(names)])
@@ -246,11 +248,8 @@ def test_a_recording_is_a_flight(world: World, tmp_path: Path) -> None:
     )
     assert np.max(np.abs(again.array(names) - truth.array(names))) < 1e-9, "its inputs are those that flew it"
     with pytest.raises(FlightError, match=r"0\.5 s, expected at least 2 s"):
-        save_recording(world.vehicle, rows[:50], period=0.01, folder=tmp_path)
-    threads = [
-        threading.Thread(target=save_recording, args=(world.vehicle, rows), kwargs={"period": 0.01, "folder": tmp_path})
-        for _ in range(2)
-    ]
+        recorded(world, rows[:50], tmp_path)
+    threads = [threading.Thread(target=recorded, args=(world, rows, tmp_path)) for _ in range(2)]
     for thread in threads:
         thread.start()
     for thread in threads:
