@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.flights.readers.dataflash import messages
 from swashplate.flights.readers.read import read
+from swashplate.identification.responses.respond import respond
 
 # NOTES.md beside the logs: file, axis, magnitude, band, fades and record as flown, rate of the fast messages.
 FLOWN = [
@@ -116,6 +118,21 @@ def test_the_sweep_is_also_seen_in_the_commands_alone(logs: dict[str, Flight], n
     assert seen.stop == pytest.approx(told.stop, abs=1.0)
     assert seen.low == pytest.approx(told.low, rel=0.2)
     assert seen.high == pytest.approx(told.high, rel=0.1)
+
+
+def test_a_betaflight_chirp_is_told_by_its_own_fields(shared_data: Path) -> None:
+    flight = read(shared_data / "field" / "10-bf-chirp" / "chirp_small.bbl")
+    (told,) = sweeps(flight)
+    assert (told.axis, told.source, told.channel, told.complete) == ("roll rate", "log", "mixer_roll", True)
+    assert (told.start, told.stop) == pytest.approx((8.0, 28.0), abs=0.01)
+    assert (told.low, told.high) == (0.2, 600.0)
+    found = respond(uniform_records([flight], ("mixer_roll", "p"), rate=250.0), inputs=["mixer_roll"], outputs=["p"])
+    # Beyond half the rate the chirp is folded: there it is nobody's reference.
+    assert found.settings["sweeps"] == ["mixer_roll: 8.0 to 23.8 s, 0.2 to 112 Hz, by the log's law"]
+    inside = (found.omega > 2.0 * np.pi * 0.5) & (found.omega < 2.0 * np.pi * 10.0)
+    plant = 2793.0 / ((1j * found.omega + 5.0) * (1j * found.omega + 40.0))
+    ratio = np.abs(found.response[:, 0, 0] / plant)[inside]
+    assert np.ptp(20.0 * np.log10(ratio)) < 1.0
 
 
 def test_a_real_multirotor_sweep_is_seen_in_a_bare_table(shared_data: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,9 @@ from swashplate.arrays import Array
 from swashplate.flights.consistency import consistency
 from swashplate.flights.epoch import note
 from swashplate.flights.flight import Flight
+from swashplate.flights.jumps import OUTLIER, attitudes, jumps
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
-from swashplate.flights.schema import QUATERNION, channel, is_known
+from swashplate.flights.schema import channel, is_known
 from swashplate.shown import Shown
 from swashplate.text_table import TextTable, screen_width
 
@@ -26,16 +27,14 @@ _LARGEST = 1e30  # in the channel's unit: no sensor reaches it, and its square i
 _GAP = 3.0  # usual steps; a step longer than this has lost at least two samples
 _TURN = 31  # steps whose median is the usual one there: half as many slow ones in a row are another rate, no gaps
 _JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
-_OUTLIER = 12.0  # robust standard deviations of the sample-to-sample change
-_NEAR = 25  # changes on each side that are its neighbours
-_UNUSUAL = 4.0  # robust standard deviations of the neighbours; a sweep's own changes reach one
-_ORDINARY = ("rcin_", "rcout_")  # switches and unused outputs hardly ever move
+_ALIKE, _SEVERAL = 0.2, 4  # long steps in a row that differ by less of themselves: another rate, and no gaps
+_SWITCHING = 0.5  # s between a change of mode and the message that this mode alone writes
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
-_Q95_TO_SIGMA = 1.0 / 1.95996  # of a normal distribution: 1 / Phi^-1(0.975)
-_SLIGHT = 1e-3  # of the channel's span; a smaller change is no jump, however still the channel is otherwise
 _COMMANDS = {"motor_lower": (0, 1), "motor_upper": (0, 1), "servo_roll": (-1, 1), "servo_pitch": (-1, 1)}
-"""Channels that may step, and their ranges."""
-_STEPPING = ("mixer_", "stick_", *_ORDINARY)  # commands of autopilots and pilots: they may step too
+"""Ranges of commands."""
+_STILL = ("rcin_", "rcout_", "omega_", "pid_", "sid_", "voltage", "current", "airspeed", "wind_")
+"""Channels that may stand still all flight: switches and unused outputs, governed rotors, terms of gains that are zero,
+sensors that are not there. Set-points may too."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +47,7 @@ class StreamSummary:
         gaps: steps longer than three usual ones there; longest_gap: the longest of them [s] (0 where there is none).
         rates: the slowest and the fastest usual rate [Hz]: autopilots log some messages slowly outside tests. Both are
             `rate` where no step is three times another one.
+        pause: the longest step from one change of mode to another [s], 0 for none: some modes alone write the stream.
     """
 
     name: str
@@ -59,6 +59,7 @@ class StreamSummary:
     gaps: int
     longest_gap: float
     rates: tuple[float, float]
+    pause: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,8 @@ class ChannelSummary:
         low, high, median: over the finite samples.
         missing: samples that are not finite.
         constant: never moves.
-        outliers: sample-to-sample changes beyond 12 robust standard deviations of all of them (4 of their neighbours);
-            for the four channels of a quaternion, those of the rotation between samples; for a command, which may step,
-            only those that the next sample takes back.
+        outliers: sample-to-sample changes that no motion explains (`flights.jumps`); for the channels of an attitude,
+            those of the rotation between samples.
         outside: samples of a command that lie outside its range (motors 0 to 1, servos -1 to 1).
         impossible: samples beyond 1e30, which stand in no other figure.
     """
@@ -187,7 +187,8 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _summarise_stream(name: str, data: xr.Dataset) -> StreamSummary:
+def _summarise_stream(name: str, data: xr.Dataset, switched: Array) -> StreamSummary:
+    """A stream's time base; `switched`: when the mode changed [s]."""
     time = np.asarray(data["time"].values, dtype=np.float64)
     if time.size < 2:
         edge = float(time[0]) if time.size else float("nan")
@@ -204,6 +205,9 @@ def _summarise_stream(name: str, data: xr.Dataset) -> StreamSummary:
         if rates[1] > _GAP * rates[0]:
             usual = by_turns
     long = steps > _GAP * usual
+    long[long] = ~_steady(np.flatnonzero(long), steps[long])
+    pauses = long & _beside(time[:-1], switched) & _beside(time[1:], switched)
+    long &= ~pauses
     return StreamSummary(
         name,
         time.size,
@@ -214,50 +218,38 @@ def _summarise_stream(name: str, data: xr.Dataset) -> StreamSummary:
         gaps=int(long.sum()),
         longest_gap=float(steps[long].max()) if long.any() else 0.0,
         rates=rates,
+        pause=float(steps[pauses].max()) if pauses.any() else 0.0,
     )
 
 
-def _jumps(changes: Array) -> NDArray[np.bool_]:
-    """Changes between samples that are far outside the scatter of all changes (Hampel's identifier on differences).
+def _steady(place: NDArray[np.intp], steps: Array) -> NDArray[np.bool_]:
+    """Which of the long steps are even, one behind the other: a stretch at a slower rate, in which nothing is lost.
 
-    The scatter is the larger of what half and what 95 % of the changes give: a channel that is held between the updates
-    of a slower clock (and moves there by rounding only) is judged by its updates. One that hardly ever moves is not
-    judged, and a change that is slight beside the channel's span is no jump. Nor is one that is usual among its
-    neighbours: a sweep's changes grow with its frequency, all of them.
+    The step that leads into such a stretch or out of it belongs to it, where it is no longer than its own.
     """
-    if not changes.size:
-        return np.zeros(0, dtype=np.bool_)
-    off = np.abs(changes - np.median(changes))
-    sigma = max(_MAD_TO_SIGMA * float(np.median(off)), _Q95_TO_SIGMA * float(np.quantile(off, 0.95)))
-    span = float(np.ptp(np.cumsum(changes)))
-    if not sigma > np.finfo(np.float64).eps * span:
-        return np.zeros(changes.shape, dtype=np.bool_)
-    jumps = np.asarray(off > max(_OUTLIER * sigma, _SLIGHT * span))
-    for i in np.flatnonzero(jumps).tolist():
-        jumps[i] = off[i] > _UNUSUAL * _MAD_TO_SIGMA * np.median(off[max(0, i - _NEAR) : i + _NEAR + 1])
-    return jumps
+    follows = np.diff(place, prepend=-2) == 1
+    starts = np.flatnonzero(~follows | (np.abs(np.diff(steps, prepend=0.0)) > _ALIKE * steps))
+    lengths = np.diff(starts, append=place.size)
+    even = np.repeat(lengths >= _SEVERAL, lengths)
+    seam = follows[1:] & (steps[1:] < (1.0 + _ALIKE) * steps[:-1]) & even[:-1]
+    lead = follows[1:] & (steps[:-1] < (1.0 + _ALIKE) * steps[1:]) & even[1:]
+    even[1:] |= seam
+    even[:-1] |= lead
+    return even
 
 
-def _spikes(changes: Array) -> NDArray[np.bool_]:
-    """Jumps that the next sample takes back: what no flight computer commands."""
-    jumps = _jumps(changes)
-    there = jumps[:-1] & jumps[1:] & (changes[:-1] * changes[1:] < 0.0)
-    return np.append(there, False) | np.insert(there, 0, False)
-
-
-def _attitude_jumps(flight: Flight) -> int:
-    """Jumps of the attitude: outliers in any component of the rotation from sample to sample, blind to sign flips."""
-    quaternion = np.stack([flight.values(name) for name in QUATERNION])
-    quaternion = quaternion[:, np.isfinite(quaternion).all(axis=0)]
-    (w0, x0, y0, z0), (w1, x1, y1, z1) = quaternion[:, :-1], quaternion[:, 1:]
-    sign = np.sign(w0 * w1 + x0 * x1 + y0 * y1 + z0 * z1)
-    # Vector part of conj(q0) * q1, which is half the rotation vector where the step is small.
-    turned = (
-        sign * (w0 * x1 - x0 * w1 - y0 * z1 + z0 * y1),
-        sign * (w0 * y1 - y0 * w1 - z0 * x1 + x0 * z1),
-        sign * (w0 * z1 - z0 * w1 - x0 * y1 + y0 * x1),
+def _beside(time: Array, switched: Array) -> NDArray[np.bool_]:
+    """Which stamps lie beside a change of mode."""
+    if not switched.size:
+        return np.zeros(time.shape, dtype=np.bool_)
+    near = np.searchsorted(switched, time)
+    return (
+        np.minimum(
+            np.abs(time - switched[np.minimum(near, switched.size - 1)]),
+            np.abs(time - switched[np.maximum(near - 1, 0)]),
+        )
+        <= _SWITCHING
     )
-    return int(np.sum(np.any([_jumps(component) for component in turned], axis=0)))
 
 
 def _without_impossible(flight: Flight) -> tuple[Flight, dict[str, int]]:
@@ -276,7 +268,7 @@ def _without_impossible(flight: Flight) -> tuple[Flight, dict[str, int]]:
     return (replace(flight, streams=streams) if counts else flight), counts
 
 
-def _summarise_channel(flight: Flight, name: str, home: str, impossible: int) -> ChannelSummary:
+def _summarise_channel(flight: Flight, name: str, *, outliers: int, impossible: int) -> ChannelSummary:
     values = flight.values(name)
     known = channel(name)
     inside = str(flight[name].attrs.get("units", ""))
@@ -284,17 +276,9 @@ def _summarise_channel(flight: Flight, name: str, home: str, impossible: int) ->
     finite = shown[np.isfinite(shown)]
     low, median, high = (finite.min(), np.median(finite), finite.max()) if finite.size else (np.nan,) * 3
     bounds = _COMMANDS.get(name, (-np.inf, np.inf))
-    if name in QUATERNION and all(other in flight for other in QUATERNION):
-        outliers = _attitude_jumps(flight)
-    else:
-        changes = np.diff(values[np.isfinite(values)])
-        if name.startswith(("phi", "psi")) and inside == "rad":  # a whole turn is no jump
-            changes = np.remainder(changes + np.pi, 2.0 * np.pi) - np.pi
-        steps = name in _COMMANDS or name.startswith(_STEPPING) or name.endswith("_demand")
-        outliers = int(np.sum(_spikes(changes) if steps else _jumps(changes)))
     return ChannelSummary(
         name=name,
-        stream=home,
+        stream=flight.stream_of(name),
         unit=known.shown_unit or inside,
         low=float(low),
         median=float(median),
@@ -323,11 +307,13 @@ def _stream_problems(stream: StreamSummary) -> list[str]:
 
 def _stream_notes(stream: StreamSummary) -> list[str]:
     slow, fast = stream.rates
-    if not fast > _GAP * slow:
-        return []
-    return [
-        f"{stream.name}: recorded at {slow:.3g} Hz and at {fast:.3g} Hz by turns; take a piece of one rate for a fit"
-    ]
+    told = []
+    if fast > _GAP * slow:
+        rates = f"recorded at {slow:.3g} Hz and at {fast:.3g} Hz by turns"
+        told.append(f"{stream.name}: {rates}; take a piece of one rate for a fit")
+    if stream.pause:
+        told.append(f"{stream.name}: written in some modes only; it pauses for up to {stream.pause:.3g} s in others")
+    return told
 
 
 def _channel_problems(summary: ChannelSummary) -> list[str]:
@@ -343,11 +329,10 @@ def _channel_problems(summary: ChannelSummary) -> list[str]:
     return problems
 
 
-def _shared_problems(channels: tuple[ChannelSummary, ...]) -> list[str]:
+def _shared_problems(channels: tuple[ChannelSummary, ...], jumps: Mapping[str, int]) -> list[str]:
     """What several channels may have in common, one line for all of them."""
-    still = [c.name for c in channels if c.constant and not c.name.startswith(_ORDINARY)]
-    jumps = {"attitude" if c.name in QUATERNION else c.name: c.outliers for c in channels if c.outliers}
-    beyond = f"beyond {_OUTLIER:g} robust sigmas (outliers?)"
+    still = [c.name for c in channels if c.constant and not (c.name.startswith(_STILL) or c.name.endswith("_demand"))]
+    beyond = f"beyond {OUTLIER:g} robust sigmas (outliers?)"
     problems = []
     if still:
         move, it = ("moves", "it") if len(still) == 1 else ("move", "them")
@@ -363,16 +348,22 @@ def inspect(flight: Flight) -> Inspection:
 
     Nothing is repaired; conditioning does that.
     """
-    streams = tuple(_summarise_stream(name, data) for name, data in flight.streams.items())
+    switched = np.array([event.time for event in flight.provenance.events if event.kind == "mode"])
+    streams = tuple(_summarise_stream(name, data, np.sort(switched)) for name, data in flight.streams.items())
     flight, impossible = _without_impossible(flight)
+    outliers = jumps(flight)
+    labels = {channel: name for name, group in attitudes(flight).items() for channel in group}
     channels = tuple(
-        _summarise_channel(flight, name, flight.stream_of(name), impossible.get(name, 0)) for name in flight.channels
+        _summarise_channel(
+            flight, name, outliers=outliers.get(labels.get(name, name), 0), impossible=impossible.get(name, 0)
+        )
+        for name in flight.channels
     )
     damage = flight.provenance.damage
     problems = [*damage, *(str(finding) for finding in consistency(flight))]
     problems += [text for stream in streams for text in _stream_problems(stream)]
     problems += [text for summary in channels for text in _channel_problems(summary)]
-    problems += _shared_problems(channels)
+    problems += _shared_problems(channels, outliers)
     return Inspection(
         source=flight.provenance.source,
         simulated=flight.provenance.simulated,

@@ -61,6 +61,39 @@ def test_a_stream_that_is_slower_for_a_while_has_no_gaps_but_two_rates() -> None
     assert (lossy.streams[0].gaps, lossy.streams[0].longest_gap) == (3, pytest.approx(0.7))
 
 
+@pytest.mark.parametrize("slow", [5, 9, 13])
+def test_a_few_slow_samples_at_the_edge_are_another_rate_and_a_lost_one_is_a_gap(slow: int) -> None:
+    steps = np.concatenate([np.full(slow, 0.1), [0.055], np.full(2000, 0.01), [0.1], np.full(slow, 0.101)])
+    steps *= 1.0 + 0.02 * np.random.default_rng(slow).standard_normal(steps.size)
+    assert inspect(_flight(np.cumsum(steps))).streams[0].gaps == 0
+    steps[[900, 1100]] = 0.08, 0.3
+    found = inspect(_flight(np.cumsum(steps))).streams[0]
+    assert (found.gaps, found.longest_gap) == (2, pytest.approx(0.3))
+
+
+def test_a_stream_of_one_mode_pauses_in_the_others_and_any_other_pause_is_a_gap() -> None:
+    time = np.arange(N) / 100.0
+    time[200:] += 7.0
+    other = stream(np.arange(1200) / 100.0, {"x": np.sin(np.arange(1200) / 100.0)})
+    whole = replace(_flight(time), streams={**_flight(time).streams, "other": other})
+    modes = tuple(Event(at, "mode", name) for at, name in ((1.99, "STABILIZE"), (9.0, "SYSTEMID")))
+    told = inspect(replace(whole, provenance=Provenance(events=modes)))
+    assert (told.streams[0].gaps, told.streams[0].pause) == (0, pytest.approx(7.01))
+    assert told.problems == ()
+    assert told.notes[-1] == "log: written in some modes only; it pauses for up to 7.01 s in others"
+    for events in ((), modes[:1], (replace(modes[0], time=4.0), modes[1])):
+        lost = inspect(replace(whole, provenance=Provenance(events=events)))
+        assert (lost.streams[0].gaps, lost.streams[0].pause) == (1, 0.0)
+        assert any("log: 1 gap in the time stamps, the longest 7010 ms" in text for text in lost.problems)
+
+
+def test_what_stands_still_on_purpose_is_no_problem_and_a_dead_sensor_is() -> None:
+    still = ("omega_rotor", "voltage", "pid_d_roll", "p_demand", "rcin_7", "q", "mixer_yaw", "elevator")
+    found = inspect(_flight(**{name: np.full(N, 0.5) for name in still}))
+    assert found.problems == ("q, mixer_yaw, elevator: never move, so nothing can be learnt from them",)
+    assert str(found).count("never moves") == len(still)
+
+
 def test_a_sweep_between_slow_stretches_holds_no_outliers_but_a_glitch_is_one() -> None:
     """RATE in and out of System ID mode: what moves in the fast part only is no jump of the slow one, nor in it."""
     steps = np.concatenate([np.full(600, 0.1), np.full(2500, 0.01), np.full(150, 0.1), np.full(2500, 0.01)])

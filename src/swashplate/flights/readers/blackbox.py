@@ -18,6 +18,7 @@ from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event
 from swashplate.flights.readers import blackbox_header, checks, clocked
+from swashplate.flights.readers.blackbox_chirp import chirps
 from swashplate.flights.readers.blackbox_encodings import Whole
 from swashplate.flights.readers.blackbox_fields import Fields, gps_place
 from swashplate.flights.readers.blackbox_frames import FoundFrames, find_frames
@@ -157,7 +158,7 @@ def _when(after: int, main: Main) -> float:
 
 
 def _events(frames: FoundFrames, header: Header, main: Main) -> tuple[Event, ...]:
-    events = []
+    events = chirps(header, main.columns, main.time)
     for told in frames.events:
         time = _when(told.after, main)
         if told.kind == 14:  # a pause lies behind it

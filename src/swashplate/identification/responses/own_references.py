@@ -20,6 +20,9 @@ from swashplate.flights.maneuvers.sweeps import all_rising
 from swashplate.flights.provenance import Event
 from swashplate.identification.responses.spectra import Signals
 
+_FOLDED = 0.45
+"""Share of the rate up to which a chirp is followed."""
+
 
 @dataclass(frozen=True)
 class OwnReferences:
@@ -131,7 +134,8 @@ def _told(k: int, time: Array, event: Event) -> _Found | None:
         return None  # a sweep without its law is looked for in the inputs
     chirp = Chirp(int(numbers[0]), *map(float, numbers[1:]))
     start, stop = float(event.details["start"]), float(event.details.get("seen", event.details["stop"]))
-    inside = (time >= start) & (time <= stop)
+    # Faster than half the rate the chirp is folded: it would be the reference of other frequencies.
+    inside = (time >= start) & (time <= stop) & (chirp.frequency(time - start) < _FOLDED / float(time[1] - time[0]))
     if inside.sum() * float(time[1] - time[0]) < 2.0 / chirp.start_hz:
         return None
     own = time[inside] - start

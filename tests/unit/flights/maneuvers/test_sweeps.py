@@ -15,6 +15,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.inspect import inspect
 from swashplate.flights.maneuvers.series import parse
 from swashplate.flights.maneuvers.sweeps import rising, sweeps
+from swashplate.flights.provenance import Event, Provenance
 from swashplate.flights.readers.read import read
 
 TIME = np.arange(12_000) / 100.0
@@ -74,6 +75,41 @@ def test_what_is_no_sweep_is_not_seen(kind: str) -> None:
             "doublets": parse("3211:roll,1s,1").signals(TIME % 20.0)["roll"] + 0.05 * white,
         }[kind]
         assert rising(TIME, np.asarray(signal)) is None
+
+
+def test_no_sweep_crosses_a_change_of_mode() -> None:
+    """A resonance that moves up with the mode is no sweep; nor is what a sweep and the next mode's motion make."""
+    mode = tuple(Event(at, "mode", name) for at, name in ((0.0, "LOITER"), (50.0, "POSHOLD")))
+    one = Flight({"log": stream(TIME, {"mixer_roll": _swept(1, noise=0.001)})}, Provenance(events=mode))
+    for found in sweeps(one):
+        assert found.stop <= 50.0 or found.start >= 50.0
+    assert [found.stop for found in sweeps(one)] == pytest.approx([50.0, 80.0], abs=2.0)
+    quick, slow = (parse(f"sweep:roll,{band}Hz,30s,0.1") for band in ("2-4.5", "0.6-1.9"))
+    joined = np.asarray(slow.signals(TIME - 20.0)["roll"] + quick.signals(TIME - 50.0)["roll"])
+    (both,) = sweeps(_flight(mixer_roll=joined))
+    assert both.start < 40.0 < 60.0 < both.stop  # it is one where no mode parts it
+    parted = sweeps(Flight({"log": stream(TIME, {"mixer_roll": joined})}, Provenance(events=mode)))
+    assert all(found.stop <= 50.0 or found.start >= 50.0 for found in parted)
+
+
+def test_a_sweep_in_a_set_point_counts_where_the_loop_hides_it_in_the_command() -> None:
+    rng = np.random.default_rng(1)
+    swept, noise = _swept(2, noise=0.001), rng.standard_normal(TIME.size)
+    (found,) = sweeps(_flight(mixer_roll=noise + 0.1 * swept, p_demand=swept))
+    assert (found.axis, found.channel) == ("roll", "p_demand")
+    (found,) = sweeps(_flight(mixer_roll=swept, p_demand=10.0 * swept))
+    assert found.channel == "mixer_roll"
+
+
+def test_a_resonance_that_outlasts_a_sweep_does_not_hide_it() -> None:
+    rng = np.random.default_rng(3)
+    ringing = lfilter([1.0], [1.0, -0.62, 0.998], rng.standard_normal(TIME.size))  # at 20 Hz, hardly damped
+    signal = _swept(1, noise=0.001) + 0.07 * ringing / np.std(ringing)
+    ridge = rising(TIME, np.asarray(signal))
+    assert ridge is not None
+    assert ridge.frequency[0] < 1.0
+    assert ridge.frequency[-1] == pytest.approx(10.0, rel=0.3)
+    assert rising(TIME, np.asarray(ringing)) is None
 
 
 def test_short_and_constant_signals_hold_none() -> None:
