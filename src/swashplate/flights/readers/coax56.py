@@ -17,7 +17,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.readers import checks, frames, mat
+from swashplate.flights.readers import checks, clocked, frames, mat
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import QUATERNION
@@ -128,11 +128,16 @@ def read(source: Source, options: Options) -> Flight:
     for name, values in fields.items():
         checks.finite(values, channel=f"Data.{name}", where=source.name)
     fields = _in_inside_units(fields, source, options)
-    keep, dropped = checks.usable(
-        fields["time"][:, 0], where=source.name, bad_stamps=options.bad_stamps, channel="Data.time"
+    told = clocked.Told()
+    time, keep = clocked.usable(
+        fields["time"][:, 0],
+        fields.values(),
+        where=source.name,
+        bad_stamps=options.bad_stamps,
+        told=told,
+        channel="Data.time",
     )
     fields = {name: values[keep] for name, values in fields.items()}
-    time = fields["time"][:, 0]
     down = frames.axes("north-west-up")
     scalar_first = fields["orientation"][:, (3, 0, 1, 2)]
     quaternion_notes = checks.quaternion_notes(scalar_first, channel="Data.orientation", where=source.name)
@@ -149,8 +154,8 @@ def read(source: Source, options: Options) -> Flight:
     by_name = dict(zip(_INPUTS, fields["inputs"].T, strict=True))
     inputs = {name: by_name[name] for name in ("motor_lower", "motor_upper", "servo_roll", "servo_pitch")}
 
-    notes = (*_NOTES, *quaternion_notes, *filter(None, (dropped,)), *checks.constant_notes(inputs))
+    notes = (*_NOTES, *quaternion_notes, *told.notes, *checks.constant_notes(inputs))
     return Flight(
         streams={"motion": stream(time, motion | logged, logged_units), "inputs": stream(time, inputs)},
-        provenance=source.provenance(NAME, VERSION, vehicle="coax", notes=notes),
+        provenance=source.provenance(NAME, VERSION, vehicle="coax", notes=notes, damage=tuple(told.damage)),
     )

@@ -34,7 +34,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import epoch, units
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.readers import checks, tables
+from swashplate.flights.readers import checks, clocked, tables
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import CHANNELS, LOGGED_UNIT, channel, is_known
@@ -317,18 +317,19 @@ def read(source: Source, options: Options) -> Flight:
         checks.finite(channels[name], channel=name, where=source.name)  # a factor can overflow
     if not channels:
         raise FlightError("there is no channel beside time.", where=source.name, hint="Export the channels too.")
-    keep, dropped = checks.usable(time, where=source.name, bad_stamps=options.bad_stamps)
+    told = clocked.Told()
+    time, keep = clocked.usable(time, channels.values(), where=source.name, bad_stamps=options.bad_stamps, told=told)
     channels = {name: values[keep] for name, values in channels.items()}
     foreign = {name: labels[name] for name in channels if not is_known(name)}
-    notes = (*filter(None, (dropped,)), *_near_misses(channels), *checks.constant_notes(channels))
-    log = stream(time[keep], channels, foreign)
+    notes = (*told.notes, *_near_misses(channels), *checks.constant_notes(channels))
+    log = stream(time, channels, foreign)
     for name in channels:
         unit = options.units.get(name, columns[name].unit)
         if unit and unit != log[name].attrs.get("units"):
             log[name].attrs[LOGGED_UNIT] = unit
     return Flight(
         streams={"log": log},
-        provenance=source.provenance(NAME, VERSION, notes=notes, epoch=zero),
+        provenance=source.provenance(NAME, VERSION, notes=notes, damage=tuple(told.damage), epoch=zero),
     )
 
 

@@ -17,7 +17,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.readers import checks, frames, tables
+from swashplate.flights.readers import checks, clocked, frames, tables
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import POSITION, QUATERNION, RATES
@@ -71,10 +71,13 @@ def read(source: Source, options: Options) -> Flight:
     if options.units:
         raise UnitError("units are known for this file and cannot be given.", where=source.name, channel="units")
     columns = _columns(source)
-    keep, dropped = checks.usable(columns["t"], where=source.name, bad_stamps=options.bad_stamps, channel="t")
+    told = clocked.Told()
+    time, keep = clocked.usable(
+        columns["t"], columns.values(), where=source.name, bad_stamps=options.bad_stamps, told=told, channel="t"
+    )
     columns = {name: values[keep] for name, values in columns.items()}
     _plausible(columns, source)
-    time, down = columns["t"], frames.axes("north-west-up")
+    down = frames.axes("north-west-up")
 
     def turned(names: tuple[str, ...]) -> Array:
         return frames.to_local(np.stack([columns[name] for name in names], axis=1), down).T
@@ -98,7 +101,11 @@ def read(source: Source, options: Options) -> Flight:
             "battery": stream(time, {"voltage": columns[_VOLTAGE]}),
         },
         provenance=source.provenance(
-            NAME, VERSION, vehicle=VEHICLE, notes=(*notes, *filter(None, (dropped,)), *checks.constant_notes(motors))
+            NAME,
+            VERSION,
+            vehicle=VEHICLE,
+            notes=(*notes, *told.notes, *checks.constant_notes(motors)),
+            damage=tuple(told.damage),
         ),
     )
 

@@ -11,7 +11,7 @@ from swashplate.errors import FlightError
 from swashplate.flights import datasets
 from swashplate.flights.epoch import rebased
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import analogue, blackbox
+from swashplate.flights.readers import analogue, blackbox, checks
 from swashplate.flights.readers.given_units import with_units
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
@@ -114,7 +114,15 @@ def read(
         bad_stamps=bad_stamps,
         log=number if log is None else log,
     )
+    flight = _with_limits(flight)
     return flight if window is None else cut(flight, *window, where=file)
+
+
+def _with_limits(flight: Flight) -> Flight:
+    """The flight, with what lies beyond the schema's limits among the damage (once: a saved flight may say it)."""
+    origin = flight.provenance
+    told = tuple(text for text in checks.beyond_limits(flight) if text not in origin.damage)
+    return replace(flight, provenance=replace(origin, damage=(*origin.damage, *told))) if told else flight
 
 
 def _whole(

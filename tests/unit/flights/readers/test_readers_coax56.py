@@ -100,7 +100,9 @@ def test_dropping_bad_stamps_is_counted(tmp_path: Path) -> None:
     time[4], time[7] = time[3], time[2]
     flight = read(write_coax(tmp_path / "a.mat", time=time), bad_stamps="drop")
     assert flight.time("x").size == N - 2
-    assert any("2 samples dropped" in note and "sample 4" in note for note in flight.provenance.notes)
+    (said,) = flight.provenance.damage
+    assert "2 of 12 samples (16.7 %) are lost" in said
+    assert "sample 4" in said
 
 
 def _time(index: int, source: int) -> np.ndarray:

@@ -180,7 +180,7 @@ BAD_TABLES = {
     "underscore": ("time [s],x [m]\n0,1_0\n1,1\n", "'1_0' in line 2"),
     "cut off": ("time [s],x [m]\n0,1\n1\n", "line 3 has 1 cell, expected 2"),
     "backwards": ("time [s],x [m]\n0,1\n2,1\n1,1\n", "time: time goes backwards at sample 2"),
-    "duplicated": ("time [s],x [m]\n0,1\n0,1\n", "time: time repeats the stamp before it at sample 1"),
+    "duplicated": ("time [s],x [m]\n0,1\n0,2\n", "time: time repeats the stamp before it at sample 1"),
     "doubled name": ("time [s],x [m],x [m]\n0,1,1\n1,1,1\n", "x: the name stands twice"),
     "nameless": ("time [s],,x [m]\n0,1,1\n1,1,1\n", "column 2 has no name"),
     "prose": ("Dear reader, this is no log.", "there is no time column"),

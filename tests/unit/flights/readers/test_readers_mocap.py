@@ -86,7 +86,7 @@ def test_poses_are_found_behind_another_block(tmp_path: Path) -> None:
 def test_occluded_samples_are_dropped_and_counted(tmp_path: Path, lost: str) -> None:
     flight = read(_file(tmp_path, vicon(["1,0,0.1,0,0,1,1,1", lost, "3,0,0.1,0,0,1,1,2"])))
     assert flight.time("x").tolist() == [0.0, 0.02]
-    assert any("1 of 3 samples dropped: 'coax:coax' was not seen" in note for note in flight.provenance.notes)
+    assert flight.provenance.damage == ("1 of 3 samples (33.3 %) are lost: 'coax:coax' was not seen (occlusion)",)
 
 
 BAD_VICON = {
@@ -141,7 +141,7 @@ def test_motive_euler_angles_and_the_newer_header(tmp_path: Path) -> None:
     )
     flight = read(_file(tmp_path, header + "0,0.0,10,0,0,0,1,0\n1,0.01,,,,,,\n2,0.02,0,0,10,0,1,0\n"))
     assert np.rad2deg(_euler(flight)) == pytest.approx(np.array([[10, 0, 0], [0, 10, 0]]), abs=1e-9)
-    assert any("1 of 3 samples dropped" in note for note in flight.provenance.notes)
+    assert any("1 of 3 samples (33.3 %) are lost" in said for said in flight.provenance.damage)
 
 
 BAD_MOTIVE = {
@@ -150,7 +150,7 @@ BAD_MOTIVE = {
     "markers only": (motive([]).replace("Rigid Body,", "Marker,"), "no rigid body"),
     "no length unit": (motive(["0,0,0,0,0,1,0,0,0", "1,1,0,0,0,1,0,0,0"], first="Rotation Type,Quaternion"), "unit ''"),
     "no unit quaternion": (motive(["0,0,0,0,0,3,0,0,0", "1,1,0,0,0,3,0,0,0"]), "norm is off 1 by 2"),
-    "duplicated": (motive(["0,0,0,0,0,1,0,0,0", "1,0,0,0,0,1,0,0,0"]), "repeats the stamp"),
+    "duplicated": (motive(["0,0,0,0,0,1,0,0,0", "1,0,0,0,0,1,1,0,0"]), "repeats the stamp"),
 }
 
 
