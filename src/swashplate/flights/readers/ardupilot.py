@@ -129,6 +129,7 @@ def read(source: Source, options: Options) -> Flight:
     refuse_mapping(options, "an ArduPilot log", where=source.name)
     text = source.text
     log = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
+    _refuse_unstamped(log, source)
     log, end, said = _one_run(log)
     told = story(log, end=end)
     left = clocked.Told(list(log.notes), [*log.damage, *filter(None, (said,)), *told.damage])
@@ -153,6 +154,20 @@ def read(source: Source, options: Options) -> Flight:
         events=told.events,
     )
     return Flight(streams, provenance)
+
+
+def _refuse_unstamped(log: Messages, source: Source) -> None:
+    """Refuses a log of measurements none of which says when: counting messages would be a guess at their times."""
+    known = {message.name for message in _MESSAGES}
+    there = {name: table for name, table in log.tables.items() if name in known and len(table)}
+    if there and not any(np.isfinite(seconds(table)).any() for table in there.values()):
+        raise FlightError(
+            f"the messages carry no time stamps (found {', '.join(sorted(there))}, expected TimeUS or TimeMS in each): "
+            "firmware before 3.1 wrote none, so the log does not say when anything was measured.",
+            where=source.name,
+            channel="time",
+            hint="Fly again with newer firmware: nothing can be identified from this log.",
+        )
 
 
 def _one_run(log: Messages) -> tuple[Messages, float, str]:
