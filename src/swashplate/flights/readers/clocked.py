@@ -49,6 +49,10 @@ def share(count: int, total: int, what: str = "samples") -> str:
     return f"{count} of {total} {what} ({100.0 * count / max(total, 1):.3g} %)"
 
 
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
 # ---- one row of stamps -----------------------------------------------------------------------------------------------
 def longest_increasing(time: Array) -> Mask:
     """Which stamps to keep so that the most of them strictly increase (longest increasing subsequence).
@@ -154,7 +158,7 @@ def usable(
     checks.finite(time, channel=channel, where=where)
     time, turned = unturned(time, (*turns, *dict.fromkeys(TURN * each for each in (1e-6, 1e-3, tick))))
     if turned:
-        told.notes.append(f"the clock's counter turned over {turned} time{'s' * (turned != 1)}: it was counted on")
+        told.notes.append(f"the clock's counter turned over {_times(turned)}: it was counted on")
     twice = copies(time, columns)
     if twice.any():
         told.notes.append(f"{share(int(twice.sum()), time.size)} are copies of the one before them: left out")
@@ -232,8 +236,7 @@ def longest_run(clocks: Sequence[tuple[NDArray[np.int64], Array]]) -> tuple[tupl
     if not anew:
         return (first, last), ""
     lost = total - sum(place.size for place, _ in inside)
-    times = "once" if anew == 1 else f"{anew} times"
-    said = f"the clock starts anew {times}; only the longest run was read: {share(lost, total)} are lost"
+    said = f"the clock starts anew {_times(anew)}; only the longest run was read: {share(lost, total)} are lost"
     return (first, last), said
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from swashplate.errors import FlightError, UnitError
@@ -33,22 +33,34 @@ class Faults:
     def add(self, error: FlightError) -> None:
         self.errors.append(error)
 
-    def refuse(self) -> None:
+    def refuse(self, beside: Sequence[str] = ()) -> None:
         """Raises what was gathered: a single error as it is, several as one list.
+
+        Args:
+            beside: what else was found on the way, for the end of the message.
 
         Raises:
             FlightError: UnitError where units are all that is wrong.
         """
-        if len(self.errors) == 1:
-            raise self.errors[0]
         if not self.errors:
             return
-        told = [f"({i}) {f'{e.channel}: ' if e.channel else ''}{e.problem}" for i, e in enumerate(self.errors, 1)]
-        more = [f"and {len(told) - _MOST} more."] if len(told) > _MOST else []
+        also = [f"Beside that: {'; '.join(beside)}."] if beside else []
         kind = UnitError if all(isinstance(error, UnitError) for error in self.errors) else FlightError
+        if len(self.errors) == 1:
+            (only,) = self.errors
+            raise kind(" ".join([only.problem, *also]), where=only.where, channel=only.channel, hint=only.hint)
         places = {error.where for error in self.errors}
+        place = next(iter(places)) if len(places) == 1 else self.where
+        heads = [
+            ": ".join(part for part in (e.where if e.where != place else "", e.channel) if part) for e in self.errors
+        ]
+        told = [
+            f"({i}) {f'{head}: ' if head else ''}{e.problem}"
+            for i, (head, e) in enumerate(zip(heads, self.errors, strict=True), 1)
+        ]
+        more = [f"and {len(told) - _MOST} more."] if len(told) > _MOST else []
         raise kind(
-            " ".join([f"has {len(told)} faults:", *told[:_MOST], *more]),
-            where=places.pop() if len(places) == 1 else self.where,
+            " ".join([f"has {len(told)} faults:", *told[:_MOST], *more, *also]),
+            where=place,
             hint=" ".join(dict.fromkeys(error.hint for error in self.errors if error.hint)) or None,
         )

@@ -60,7 +60,8 @@ def flight(
     version: str,
     world_axes: str,
     body_axes: str,
-    notes: tuple[str, ...] = (),
+    notes: tuple[str, ...],
+    told: clocked.Told,
 ) -> Flight:
     """A tracked body as a flight with the stream "motion": x y z [m, NED] and qw qx qy qz (FRD to NED).
 
@@ -78,7 +79,6 @@ def flight(
             where=where,
             hint="Choose another body, or export a longer record.",
         )
-    told = clocked.Told()
     time, keep = clocked.usable(
         track.time,
         (track.position, *(() if track.quaternion is None else (track.quaternion,))),

@@ -20,6 +20,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, clocked, frames, tables
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
+from swashplate.flights.readers.table_layout import even_rows
 from swashplate.flights.schema import POSITION, QUATERNION, RATES
 
 NAME = "nanobench"
@@ -70,8 +71,8 @@ def read(source: Source, options: Options) -> Flight:
     """
     if options.units:
         raise UnitError("units are known for this file and cannot be given.", where=source.name, channel="units")
-    columns = _columns(source)
     told = clocked.Told()
+    columns = _columns(source, told)
     time, keep = clocked.usable(
         columns["t"], columns.values(), where=source.name, bad_stamps=options.bad_stamps, told=told, channel="t"
     )
@@ -110,7 +111,7 @@ def read(source: Source, options: Options) -> Flight:
     )
 
 
-def _columns(source: Source) -> dict[str, Array]:
+def _columns(source: Source, told: clocked.Told) -> dict[str, Array]:
     """The columns that are used, as numbers, every one finite."""
     rows = [row for row in tables.rows_of(source.text or "", where=source.name, delimiter=",") if any(row)]
     head = rows[0] if rows else []
@@ -122,8 +123,12 @@ def _columns(source: Source) -> dict[str, Array]:
             channel=missing[0],
             hint="Download it again; for your own tables say which columns are which with a mapping.",
         )
+    wide = len(head)
+    data, lines = even_rows(
+        rows[1:], range(2, len(rows) + 1), low=wide, high=wide, where=source.name, told=told, again=[head]
+    )
     columns = {
-        name: tables.column(rows[1:], head.index(name), name=name, where=source.name, first_line=2) for name in _COLUMNS
+        name: tables.column(data, head.index(name), name=name, where=source.name, lines=lines) for name in _COLUMNS
     }
     for name, values in columns.items():
         checks.finite(values, channel=name, where=source.name)

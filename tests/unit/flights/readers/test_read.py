@@ -25,7 +25,7 @@ def test_a_mapping_wins_over_a_reader_that_knows_the_head(tmp_path: Path) -> Non
 
 def test_a_mapping_of_columns_for_a_file_without_columns_is_refused(tmp_path: Path) -> None:
     (tmp_path / "flight.bin").write_bytes(b"\xa3\x95\x80\x80YFMT" + bytes(range(256)))
-    with pytest.raises(FlightError, match=r"flight\.bin: mapping: is no table of text"):
+    with pytest.raises(FlightError, match=r"flight\.bin: mapping: is no table"):
         sp.read(tmp_path / "flight.bin", mapping=COLUMNS)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -188,3 +189,15 @@ def test_a_wrong_table_in_the_mapping(tmp_path: Path) -> None:
         read(path, mapping={"mocap": {"rotation": 3}})
     with pytest.raises(UnitError, match=r"unit 'deg' is a unit of"):
         read(_file(tmp_path, vicon(["1,0,0,0,0,1,1,1", "2,0,0,0,0,1,1,1"])), units={"position": "deg"})
+
+
+@pytest.mark.parametrize("make", [vicon, motive])
+def test_rows_longer_than_the_heads_are_never_read(tmp_path: Path, make: Callable[[list[str]], str]) -> None:
+    """A column more in the middle would turn a rotation into a position."""
+    row = "{k},{k},0,0,0,1,{k},2" if make is vicon else "{k},0.0{k},0,0,0,1,{k},2,3,0,0,0,0"
+    rows = [row.format(k=k) for k in range(1, 7)]
+    whole = read(_file(tmp_path, make(rows)))
+    flight = read(_file(tmp_path, make([*rows[:4], *[f"{line},0" for line in rows[4:]]])))
+    assert flight.values("x").tolist() == whole.values("x").tolist()[:4]
+    assert "2 of 6 rows (33.3 %) are lost" in flight.provenance.damage[0]
+    assert whole.provenance.damage == ()
