@@ -108,9 +108,13 @@ def channels_text() -> str:
     from swashplate.flights.schema import CHANNELS
 
     rows = [
-        (f"`{c.name}`", c.unit, c.shown_unit, c.frame.replace("->", " → "), c.description) for c in CHANNELS.values()
+        (
+            *(f"`{c.name}`", c.unit, c.shown_unit, c.frame.replace("->", " → "), c.description),
+            f"{c.shown_factor * c.largest:.3g}",
+        )
+        for c in CHANNELS.values()
     ]
-    return _table(("channel", "unit inside", "on screens", "frame", "meaning and sign"), rows)
+    return _table(("channel", "unit inside", "on screens", "frame", "meaning and sign", "at most (on screens)"), rows)
 
 
 def thresholds_text() -> str:

@@ -134,5 +134,10 @@ def test_other_files_are_refused(shared_data: Path, tmp_path: Path) -> None:
     )
     with pytest.raises(BenchError, match=r"Top Current \(A\): line 3 is blank"):
         read_rig(tmp_path / "run.csv")
+    (tmp_path / "run.csv").write_text(
+        "Time: now\nMotor PWM, Top Voltage (V), Top Current (A), Thrust (kg)\n1100,48,2,1\n1200,48,7,2,1\n"
+    )
+    with pytest.raises(BenchError, match="line 4 has 5 cells, expected 4"):
+        read_rig(tmp_path / "run.csv")
     with pytest.raises(BenchError, match="no line of heads"):
         read_rig(shared_data / "coax56" / "parameters.csv")

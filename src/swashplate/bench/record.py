@@ -203,7 +203,7 @@ def _columns(heads: str, lines: Sequence[str], *, where: str, first: int) -> dic
             where=where,
             hint="Correct the cell; decimals are written with a point, cells are separated by commas.",
         ) from None
-    if table.shape[1] < len(cells):
+    if table.shape[1] != len(cells):
         raise BenchError(f"has {table.shape[1]} numbers a line under {len(cells)} heads.", where=where)
     channels = {}
     for name, (place, unit) in named.items():

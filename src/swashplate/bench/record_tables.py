@@ -148,8 +148,16 @@ def read_rig(path: str | Path) -> BenchRecord:
     if at is None or at + 1 >= len(rows):
         raise BenchError("has no line of heads with 'Motor PWM'.", where=where, hint="Is it a run of the coaxial rig?")
     heads, body = rows[at], rows[at + 1 :]
+    for i, row in enumerate(body):
+        if any(row[len(heads) :]):
+            raise BenchError(
+                f"line {at + 2 + i} has {len(row)} cells, expected {len(heads)}: its columns may be others.",
+                where=where,
+                hint="Correct the line, or the line of heads.",
+            )
+    lines = range(at + 2, at + 2 + len(body))
     columns = {
-        head: tables.column(body, i, name=head, where=where, first_line=at + 2) for i, head in enumerate(heads) if head
+        head: tables.column(body, i, name=head, where=where, lines=lines) for i, head in enumerate(heads) if head
     }
     for head, values in columns.items():
         if not np.isfinite(values).all():

@@ -28,6 +28,17 @@ _ISO = re.compile(
     r"\s*(?P<zone>Z|[+-]\d{2}:?\d{2})?"
 )
 
+_US = re.compile(  # month first, as AM and PM show
+    r"(?P<month>\d{1,2})/(?P<day>\d{1,2})/(?P<year>\d{4})[ T]+(?P<hour>\d{1,2}):(?P<minute>\d{2})"
+    r"(?::(?P<second>\d{2})(?P<fraction>[.,]\d+)?)?\s*(?P<half>[AP]M)",
+    re.IGNORECASE,
+)
+_DOTTED = re.compile(
+    r"(?P<day>\d{1,2})\.(?P<month>\d{1,2})\.(?P<year>\d{4})[ T]+(?P<hour>\d{1,2}):(?P<minute>\d{2})"
+    r"(?::(?P<second>\d{2})(?P<fraction>[.,]\d+)?)?"
+)
+_CLOCK = re.compile(r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2})(?P<fraction>[.,]\d+)?")
+
 
 def zero_of(first: float | Decimal) -> int:
     """The whole second [s] that becomes time zero where the first stamp is large, else 0."""
@@ -81,7 +92,53 @@ def from_iso(text: str) -> Decimal | None:
         day = datetime.fromisoformat(f"{match['day']}T{match['time']}{(match['zone'] or 'Z')}")
     except ValueError:
         return None
-    return int(day.timestamp()) + Decimal("0." + match["fraction"][1:] if match["fraction"] else 0)
+    return int(day.timestamp()) + _fraction(match)
+
+
+def _fraction(match: re.Match[str]) -> Decimal:
+    return Decimal("0." + match["fraction"][1:] if match["fraction"] else 0)
+
+
+def from_text(text: str) -> Decimal | None:
+    """Seconds since 1970 of a date and time as tables write them; None where it is none.
+
+    ISO 8601, `03/05/2026 02:20:00.5 PM` (the United States: month first) and `05.03.2026 14:20:00,5`. Dates with
+    slashes and without AM or PM are not read: nobody can tell day from month.
+    """
+    if (iso := from_iso(text)) is not None:
+        return iso
+    match = _US.fullmatch(text.strip()) or _DOTTED.fullmatch(text.strip())
+    if match is None:
+        return None
+    hour = int(match["hour"])
+    if half := match.groupdict().get("half"):
+        if not 1 <= hour <= 12:
+            return None
+        hour = hour % 12 + 12 * (half.upper() == "PM")
+    year, month, day, minute, second = (int(match[p] or 0) for p in ("year", "month", "day", "minute", "second"))
+    try:
+        when = datetime(year, month, day, hour, minute, second, tzinfo=UTC)
+    except ValueError:
+        return None
+    return int(when.timestamp()) + _fraction(match)
+
+
+def of_day(text: str) -> Decimal | None:
+    """Seconds since midnight of a time of day such as `14:23:00.1`; None where it is none."""
+    match = _CLOCK.fullmatch(text.strip())
+    if match is None or int(match["hour"]) > 23 or int(match["minute"]) > 59 or int(match["second"]) > 60:
+        return None
+    return 3600 * int(match["hour"]) + 60 * int(match["minute"]) + int(match["second"]) + _fraction(match)
+
+
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}|\d{1,2}[./]\d{1,2}[./]\d{4}")
+
+
+def is_time(text: str) -> bool:
+    """Whether a cell of a table is a date, a time of day or both."""
+    if not text[:1].isdigit():
+        return False
+    return _DATE.fullmatch(text) is not None or of_day(text) is not None or from_text(text) is not None
 
 
 def small(stamps: Sequence[Decimal]) -> tuple[Array, int]:

@@ -24,6 +24,8 @@ class Channel:
         description: what it is, with its sign.
         frame: "NED", "FRD", "NED->FRD" or "" where a frame makes no sense.
         screen_unit: the unit that a pilot expects on plots and in tables.
+        largest: magnitude [unit] beyond which no aircraft, sensor or command of this kind goes: a number beyond it has
+            another unit or is damaged. Wide on purpose; it says nothing about what is usual.
     """
 
     name: str
@@ -31,6 +33,7 @@ class Channel:
     description: str
     frame: str = ""
     screen_unit: str = ""
+    largest: float = np.inf
 
     @property
     def shown_unit(self) -> str:
@@ -43,6 +46,31 @@ class Channel:
             return 180.0 / np.pi
         return 1e6 if (self.unit, self.shown_unit) == ("s", "us") else 1.0
 
+
+_LARGEST = {
+    "place": 2.1e7,  # m: half way round the Earth
+    "height": 1e5,  # m: the edge of space
+    "speed": 340.0,  # m/s: sound; rotors end far below it
+    "angle": 1e3,  # rad: 159 turns of a heading that is counted on
+    "turning": 100.0,  # rad/s: 5,700 deg/s; the widest range of an aircraft's gyroscope is 4,000 deg/s
+    "force": 1e3,  # m/s^2: 100 g; the accelerometers of autopilots end at 16 to 32 g
+    "rotor": 2e4,  # rad/s: 190,000 rpm, above the fastest model motors
+    "unit": 2.0,  # of a part of a quaternion, whose norm is 1
+    "command": 10.0,  # ten times full deflection
+    "voltage": 1e3,  # V
+    "current": 1e4,  # A
+    "pulse": 0.05,  # s: servos are sent 20 ms at most
+    "frequency": 1e3,  # Hz
+}
+"""Magnitudes that nothing of a kind exceeds, in units inside."""
+_KINDS = (
+    ("x y z", "place"), ("vx vy vz u v w airspeed wind_north wind_east wind_down", "speed"),
+    ("phi theta psi alpha_lower beta_lower eta_bar zeta_bar", "angle"), ("qw qx qy qz", "unit"), ("p q r", "turning"),
+    ("ax ay az", "force"), ("omega_lower omega_upper omega_rotor", "rotor"), ("voltage", "voltage"),
+    ("current", "current"),
+    ("motor_lower motor_upper servo_roll servo_pitch mixer_roll mixer_pitch mixer_yaw mixer_collective", "command"),
+)  # fmt: skip
+_LIMITS = {name: _LARGEST[kind] for names, kind in _KINDS for name in names.split()}
 
 _CHANNELS = (
     Channel("x", "m", "position north", "NED"),
@@ -94,7 +122,7 @@ _CHANNELS = (
     Channel("wind_down", "m/s", "wind downwards", "NED"),
 )
 
-CHANNELS: dict[str, Channel] = {channel.name: channel for channel in _CHANNELS}
+CHANNELS: dict[str, Channel] = {c.name: replace(c, largest=_LIMITS[c.name]) for c in _CHANNELS}
 POSITION = ("x", "y", "z")
 ATTITUDE = ("phi", "theta", "psi")
 VELOCITY = ("u", "v", "w")
@@ -119,21 +147,24 @@ _LOGGED = {
     entry.name: entry
     for entry in (
         Channel("sid_target", "", "what ArduPilot's System ID mode adds, in the unit of its axis"),
-        Channel("sid_frequency", "Hz", "frequency of ArduPilot's chirp"),
-        Channel("altitude_baro", "m", "barometric altitude above the start, up positive"),
+        Channel("sid_frequency", "Hz", "frequency of ArduPilot's chirp", largest=_LARGEST["frequency"]),
+        Channel("altitude_baro", "m", "barometric altitude above the start, up positive", largest=_LARGEST["height"]),
     )
 }
 _NUMBERED = re.compile(r"(rcin|rcout)_\d{1,2}")
-_ROTORS = {"motor": ("1", "motor command of a multirotor, 0 to 1"), "omega": ("rad/s", "rotor speed of a multirotor")}
+_ROTORS = {
+    "motor": Channel("motor", "1", "motor command of a multirotor, 0 to 1", largest=_LARGEST["command"]),
+    "omega": Channel("omega", "rad/s", "rotor speed of a multirotor", largest=_LARGEST["rotor"]),
+}
 _ROTOR = re.compile(r"(motor|omega)_\d{1,2}")
 
 
 def _family(name: str) -> Channel | None:
     """The entry of a name that stands for a family: `p_imu2`, `phi_demand`, `rcin_3`, `motor_4`."""
     if _NUMBERED.fullmatch(name):
-        return Channel(name, "s", _PULSES[name.partition("_")[0]], "", "us")
+        return Channel(name, "s", _PULSES[name.partition("_")[0]], "", "us", _LARGEST["pulse"])
     if _ROTOR.fullmatch(name):
-        return Channel(name, *_ROTORS[name.partition("_")[0]])
+        return replace(_ROTORS[name.partition("_")[0]], name=name)
     if name in _LOGGED:
         return _LOGGED[name]
     base, _, variant = name.partition("_")

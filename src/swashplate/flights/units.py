@@ -11,6 +11,7 @@ from swashplate.errors import UnitError
 
 _FOOT = 0.3048  # m, exact (international foot)
 _INCH = 0.0254  # m, exact
+_MILE = 1609.344  # m, exact (international mile)
 _GRAVITY = 9.80665  # m/s^2, exact (standard gravity)
 _TURN = 2.0 * math.pi
 _DEGREE = math.pi / 180.0
@@ -22,6 +23,7 @@ _UNITS: dict[str, tuple[str, float]] = {
     "us": ("s", 1e-6),
     "ns": ("s", 1e-9),
     "min": ("s", 60.0),
+    "h": ("s", 3600.0),
     "m": ("m", 1.0),
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
@@ -32,6 +34,7 @@ _UNITS: dict[str, tuple[str, float]] = {
     "mm/s": ("m/s", 1e-3),
     "ft/s": ("m/s", _FOOT),
     "km/h": ("m/s", 1.0 / 3.6),
+    "mph": ("m/s", _MILE / 3600.0),
     "kn": ("m/s", 1852.0 / 3600.0),
     "m/s^2": ("m/s^2", 1.0),
     "ft/s^2": ("m/s^2", _FOOT),
@@ -60,15 +63,18 @@ _UNITS: dict[str, tuple[str, float]] = {
     "Hz": ("Hz", 1.0),
 }
 _SPELLINGS = {
-    "sec": "s", "second": "s", "seconds": "s", "µs": "us",
+    "sec": "s", "second": "s", "seconds": "s", "millisecond": "ms", "milliseconds": "ms", "msec": "ms",
+    "microsecond": "us", "microseconds": "us", "usec": "us", "µs": "us", "nanosecond": "ns", "nanoseconds": "ns",
     "meter": "m", "meters": "m", "metres": "m", "millimeters": "mm", "centimeters": "cm", "feet": "ft", "inches": "in",
     "fps": "ft/s", "ft/sec": "ft/s", "m/sec": "m/s", "m/s2": "m/s^2", "m/s²": "m/s^2", "m/s/s": "m/s^2",
-    "kt": "kn", "kts": "kn", "knots": "kn", "kph": "km/h",
+    "kt": "kn", "kts": "kn", "knots": "kn", "kph": "km/h", "mi/h": "mph",
+    "m s^-1": "m/s", "m s^-2": "m/s^2",
     "degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad", "radians": "rad",
     "deg/sec": "deg/s", "°/s": "deg/s", "dps": "deg/s", "rad/sec": "rad/s", "r/min": "rpm", "1/min": "rpm",
     "rad/s2": "rad/s^2", "rad/s²": "rad/s^2", "deg/s2": "deg/s^2", "deg/s²": "deg/s^2", "°/s²": "deg/s^2",
+    "rad s^-1": "rad/s", "deg s^-1": "deg/s", "rad s^-2": "rad/s^2", "deg s^-2": "deg/s^2",
     "rad/sec2": "rad/s^2", "deg/sec2": "deg/s^2",
-    "-": "1", "percent": "%", "volt": "V", "volts": "V",
+    "-": "1", "percent": "%", "volt": "V", "volts": "V", "v": "V", "amp": "A", "amps": "A",
 }  # fmt: skip
 
 

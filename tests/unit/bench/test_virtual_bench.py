@@ -165,6 +165,7 @@ def test_units_are_converted_and_foreign_columns_ignored(tmp_path: Path) -> None
         (_GOOD[:2], "nothing after the header"),
         ([*_GOOD, *_ROWS[:3]], "has 3 samples, expected at least 10"),
         ([*_GOOD, *_ROWS[:5], "0.05,hello,955", *_ROWS[6:]], "does not read as a table of numbers from line 4 on"),
+        ([*_GOOD, *[f"{row},7" for row in _ROWS]], "numbers a line under"),
         ([*_GOOD, *_ROWS[:5], "0.05,nan,955", *_ROWS[6:]], "Fz: line 9 is not a finite number"),
         ([*_GOOD, *_ROWS[:5], *_ROWS[6:]], "time: is not uniform: 0.02 s after 0.04 s"),
         ([*_GOOD[:2], "clock [s],Fz [N],omega_upper [rpm]", *_ROWS], "time: the column is missing"),

@@ -162,6 +162,14 @@ def read(source: Source, options: Options) -> Flight:
     if options.units:
         raise _refuse("units belong into the calibration file.", source, hint="Leave --unit out.")
     raw = _volts(source, options, recorder, channels)
+    if len(raw.streams) > 1:
+        blank = [name.removeprefix("volts ") for name in raw.streams["log_2"].data_vars]
+        raise _refuse(
+            "has blank cells where other channels have volts; a recorder samples all of them at once.",
+            source,
+            ", ".join(blank),
+            "Complete the cells, or leave these lines out.",
+        )
     notes = [note for note in raw.provenance.notes if not note.startswith("volts ")]
     values: dict[str, tuple[Array, str]] = {}
     for name, entry in channels.items():
@@ -190,7 +198,9 @@ def read(source: Source, options: Options) -> Flight:
     time = raw.time(next(iter(raw.channels)))
     data = stream(time, {name: v for name, (v, _) in values.items()}, labels)
     notes += checks.constant_notes({name: v for name, (v, _) in values.items()})
-    flight = Flight({"recorder": data}, source.provenance(NAME, VERSION, notes=tuple(notes)))
+    flight = Flight(
+        {"recorder": data}, source.provenance(NAME, VERSION, notes=tuple(notes), damage=raw.provenance.damage)
+    )
     flight = flight.done("calibrate", channels={name: dict(entry) for name, entry in channels.items()})
     return _filtered(flight, {**_FILTER, **chosen}, source)
 

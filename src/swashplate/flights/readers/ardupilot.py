@@ -129,12 +129,13 @@ def read(source: Source, options: Options) -> Flight:
     refuse_mapping(options, "an ArduPilot log", where=source.name)
     text = source.text
     log = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
+    _refuse_unstamped(log, source)
     log, end, said = _one_run(log)
     told = story(log, end=end)
-    notes: list[str] = list(log.notes)
+    left = clocked.Told(list(log.notes), [*log.damage, *filter(None, (said,)), *told.damage])
     if "Plane" in told.vehicle:  # its terms are angles of control surfaces, not commands to a mixer
         log = Messages({n: t for n, t in log.tables.items() if n[:3] != "PID"}, log.notes, log.damage)
-    streams = _streams(log, told.events, notes)
+    streams = _streams(log, told.events, left)
     if not streams:
         raise FlightError(
             f"holds no flight: no known message has two samples ({sum(map(len, log.tables.values()))} messages of "
@@ -142,18 +143,31 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Copy the log again; check that ATT, RATE or IMU are in LOG_BITMASK.",
         )
-    notes += [*_filters(told.parameters, streams), *_remarks(log, streams)]
-    damage = (*log.damage, *filter(None, (said,)), *told.damage)
+    left.notes += [*_filters(told.parameters, streams), *_remarks(log, streams)]
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=told.vehicle,
-        notes=tuple(notes),
-        damage=damage,
+        notes=tuple(left.notes),
+        damage=tuple(left.damage),
         parameters=told.parameters,
         events=told.events,
     )
     return Flight(streams, provenance)
+
+
+def _refuse_unstamped(log: Messages, source: Source) -> None:
+    """Refuses a log of measurements none of which says when: counting messages would be a guess at their times."""
+    known = {message.name for message in _MESSAGES}
+    there = {name: table for name, table in log.tables.items() if name in known and len(table)}
+    if there and not any(np.isfinite(seconds(table)).any() for table in there.values()):
+        raise FlightError(
+            f"the messages carry no time stamps (found {', '.join(sorted(there))}, expected TimeUS or TimeMS in each): "
+            "firmware before 3.1 wrote none, so the log does not say when anything was measured.",
+            where=source.name,
+            channel="time",
+            hint="Fly again with newer firmware: nothing can be identified from this log.",
+        )
 
 
 def _one_run(log: Messages) -> tuple[Messages, float, str]:
@@ -163,7 +177,7 @@ def _one_run(log: Messages) -> tuple[Messages, float, str]:
     place = np.concatenate([p for p, _ in timed]) if timed else np.zeros(0, np.int64)
     time = np.concatenate([t for _, t in timed]) if timed else np.zeros(0)
     order = np.argsort(place, kind="stable")
-    (first, last), said = clocked.longest_run(place[order], time[order])
+    (first, last), said = clocked.longest_run([(place[order], time[order])])
     if said:
         cut = {name: t.rows((t.place >= first) & (t.place < last)) for name, t in log.tables.items()}
         log = Messages({name: t for name, t in cut.items() if len(t)}, log.notes, log.damage)
@@ -183,7 +197,7 @@ def _chosen(table: MessageTable, wanted: tuple[tuple[str, ...], int] | None) -> 
     return table.rows(table.number(field) == number)
 
 
-def _streams(log: Messages, events: tuple[Event, ...], notes: list[str]) -> dict[str, xr.Dataset]:
+def _streams(log: Messages, events: tuple[Event, ...], told: clocked.Told) -> dict[str, xr.Dataset]:
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     target_unit = next(
@@ -205,7 +219,7 @@ def _streams(log: Messages, events: tuple[Event, ...], notes: list[str]) -> dict
             columns[name] = (values, target_unit if channel == "sid_target" else unit)
         if message.total and columns:
             columns[message.total] = (np.sum([values for values, _ in columns.values()], axis=0), "1")
-        made = clocked.made_stream(message.stream, seconds(table), columns, notes=notes)
+        made = clocked.made_stream(message.stream, seconds(table), columns, told=told)
         if made is not None:
             streams[message.stream] = made
             taken |= set(map(str, made.data_vars))

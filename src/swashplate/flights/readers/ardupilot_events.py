@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,16 +11,11 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
 from swashplate.flights.provenance import Event
+from swashplate.flights.readers.ardupilot_modes import is_firmware, mode_name
 from swashplate.flights.readers.dataflash import Messages, MessageTable
 
 _STATISTICS = "STAT_"  # counters that ArduPilot keeps among its parameters
 _EV_ARMED, _EV_DISARMED = (10, 15), 11
-_MODES: Mapping[int, str] = {
-    0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 7: "CIRCLE", 9: "LAND",
-    11: "DRIFT", 13: "SPORT", 14: "FLIP", 15: "AUTOTUNE", 16: "POSHOLD", 17: "BRAKE", 18: "THROW", 20: "GUIDED_NOGPS",
-    21: "SMART_RTL", 22: "FLOWHOLD", 23: "FOLLOW", 24: "ZIGZAG", 25: "SYSTEMID", 26: "AUTOROTATE", 27: "AUTO_RTL",
-    28: "TURTLE",
-}  # fmt: skip
 # SIDS: field of the message -> field of `Chirp`.
 _CHIRP = {
     "Mag": "magnitude", "FSt": "start_hz", "FSp": "stop_hz", "TFin": "fade_in", "TC": "dwell", "TR": "record",
@@ -81,7 +74,7 @@ def _texts(messages: Messages) -> list[Event]:
     return [Event(time, "message", text) for time, text in rows if math.isfinite(time) and text]
 
 
-def _modes(messages: Messages) -> list[Event]:
+def _modes(messages: Messages, firmware: str) -> list[Event]:
     table = messages.get("MODE")
     if table is None:
         return []
@@ -89,7 +82,7 @@ def _modes(messages: Messages) -> list[Event]:
     events: list[Event] = []
     for time, mode, word in zip(seconds(table).tolist(), number.tolist(), table.text("Mode"), strict=True):
         if math.isfinite(time):
-            name = _MODES.get(int(mode), f"mode {int(mode)}") if math.isfinite(mode) else word
+            name = mode_name(firmware, int(mode)) if math.isfinite(mode) else word
             if not events or events[-1].text != name:
                 events.append(Event(time, "mode", name))
     return events
@@ -167,8 +160,14 @@ def _reached(data: MessageTable | None, begin: float, until: float) -> float | N
     return float(own.max()) if own.size else None
 
 
-def _vehicle(texts: list[Event]) -> str:
-    firmware = next((e.text for e in texts if re.match(r"Ardu\w+ V|(AP|Ardu)\w* ?(Copter|Plane|Rover)", e.text)), "")
+def _firmware(messages: Messages, texts: list[Event]) -> str:
+    """The firmware's name and version as the log says it, in a message or in VER; "" where it does not."""
+    told = messages.get("VER")
+    said = [*(event.text for event in texts), *(told.text("FWS") if told is not None else ())]
+    return next(filter(is_firmware, said), "")
+
+
+def _vehicle(firmware: str, texts: list[Event]) -> str:
     frame = next((e.text.partition(":")[2].strip() for e in texts if e.text.startswith("Frame:")), "")
     return ", ".join(part for part in (firmware, frame) if part)
 
@@ -182,8 +181,9 @@ def story(messages: Messages, *, end: float) -> Story:
     """
     parameters, changes = _parameters(messages)
     texts, arming = _texts(messages), _arming(messages)
+    firmware = _firmware(messages, texts)
     sweeps, damage = _sweeps(messages, end)
     if arming and arming[-1].kind == "armed":
         damage.append(f"the log is cut off: it ends at {end:.2f} s with the motors armed since {arming[-1].time:.2f} s")
-    events = sorted((*changes, *texts, *_modes(messages), *arming, *sweeps), key=lambda event: event.time)
-    return Story(_vehicle(texts), parameters, tuple(events), tuple(damage))
+    events = sorted((*changes, *texts, *_modes(messages, firmware), *arming, *sweeps), key=lambda event: event.time)
+    return Story(_vehicle(firmware, texts), parameters, tuple(events), tuple(damage))

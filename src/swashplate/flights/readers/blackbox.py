@@ -54,9 +54,9 @@ def read(source: Source, options: Options) -> Flight:
     main = main_frames(frames, header)
     fields = Fields(header, header.layouts["I"].names)
     columns = fields.columns(main.columns)
-    notes = list(note)
+    told = clocked.Told(list(note), [*_lost(frames), *main.damage])
     streams: dict[str, xr.Dataset] = {}
-    made = clocked.made_stream("blackbox", main.time, columns, notes=notes)
+    made = clocked.made_stream("blackbox", main.time, columns, told=told)
     if made is None:
         raise FlightError(
             f"holds no flight: {len(main.time)} main frames of {frames.intra.size} can be used, and two are needed.",
@@ -64,19 +64,19 @@ def read(source: Source, options: Options) -> Flight:
             hint="Copy the log again; a log of nothing but a header was never written to.",
         )
     streams["blackbox"] = made
-    gps = _gps(frames, header, main, notes)
+    gps = _gps(frames, header, main, told)
     if gps is not None:
         streams["gps"] = gps
     inputs = {
         str(n): np.asarray(v.values, np.float64) for n, v in made.data_vars.items() if str(n).startswith("mixer_")
     }
-    notes += [*main.notes, *_unfinished(frames), *fields.remarks(columns), *checks.constant_notes(inputs)]
+    told.notes += [*main.notes, *_unfinished(frames), *fields.remarks(columns), *checks.constant_notes(inputs)]
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=" ".join(filter(None, (header.values.get("Craft name", ""), fields.firmware))),
-        notes=tuple(notes),
-        damage=(*_lost(frames), *main.damage),
+        notes=tuple(told.notes),
+        damage=tuple(told.damage),
         parameters=_parameters(header, own=fields.rotorflight),
         events=_events(frames, header, main),
     )
@@ -176,7 +176,7 @@ def _events(frames: FoundFrames, header: Header, main: Main) -> tuple[Event, ...
     return tuple(sorted(events, key=lambda event: event.time))
 
 
-def _gps(frames: FoundFrames, header: Header, main: Main, notes: list[str]) -> xr.Dataset | None:
+def _gps(frames: FoundFrames, header: Header, main: Main, told: clocked.Told) -> xr.Dataset | None:
     """GPS frames: places count from the home before them, times from the main frame before them."""
     if "G" not in frames.others or not main.clock.size:
         return None
@@ -194,7 +194,7 @@ def _gps(frames: FoundFrames, header: Header, main: Main, notes: list[str]) -> x
             values = values + _home(frames, header, name, after)
         channel, unit, factor = gps_place(name)
         columns[channel] = (values * factor, unit)
-    return clocked.made_stream("gps", time, _unlike(columns), notes=notes)
+    return clocked.made_stream("gps", time, _unlike(columns), told=told)
 
 
 def _unlike(columns: Mapping[str, tuple[Array, str]]) -> dict[str, tuple[Array, str]]:

@@ -15,12 +15,14 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.flights.readers.blackbox_encodings import Whole
 from swashplate.flights.readers.blackbox_header import Header
+from swashplate.flights.schema import is_known
 
 _AXES = ("roll", "pitch", "yaw")
 _SIGNS = (1.0, -1.0, -1.0)  # forward-left-up to forward-right-down
@@ -67,7 +69,7 @@ class Fields:
         self.fine = 0.1 if header.number("blackbox_high_resolution") > 0.0 else 1.0
         self.notes: list[str] = []
 
-    def columns(self, values: Mapping[str, Whole]) -> dict[str, tuple[Array, str]]:
+    def columns(self, values: Mapping[str, NDArray[Any]]) -> dict[str, tuple[Array, str]]:
         """Numbers and their unit, by channel."""
         columns: dict[str, tuple[Array, str]] = {}
         for name in self.names:
@@ -136,11 +138,12 @@ class Fields:
         return self._plain("vbatLatest")  # counts of a converter
 
     def _plain(self, name: str) -> _Place:
-        """A field that is kept as logged, under its own name."""
-        return _Place(_own_name(name))
+        """A field that is kept as logged, under its own name; one that the schema gives a unit to is not its own."""
+        own = _own_name(name)
+        return _Place(f"{own}_raw" if is_known(own) else own)
 
     def _sums(
-        self, values: Mapping[str, Whole], columns: Mapping[str, tuple[Array, str]]
+        self, values: Mapping[str, NDArray[Any]], columns: Mapping[str, tuple[Array, str]]
     ) -> dict[str, tuple[Array, str]]:
         """Betaflight logs no commands to its mixer: they are the sums of the terms of its PID controller."""
         made = {}

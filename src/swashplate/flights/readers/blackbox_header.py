@@ -26,6 +26,7 @@ ENCODINGS = {
     5: "Elias delta, signed", 6: "TAG8_8SVB", 7: "TAG2_3S32", 8: "TAG8_4S16", 9: "nothing", 10: "TAG2_3SVARIABLE",
 }  # fmt: skip
 _NEEDS_HISTORY = (1, 2, 3, 6)
+_UNSIGNED = (1, 4, 9)  # encodings that write no number below zero
 
 
 @dataclass(frozen=True)
@@ -160,9 +161,8 @@ def _layout(letter: str, lists: Mapping[tuple[str, str], list[str]], *, where: s
     numbers = {}
     for what, known in (("signed", {0: "", 1: ""}), ("predictor", PREDICTORS), ("encoding", ENCODINGS)):
         source = home if what == "signed" else letter
-        if what == "signed" and (home, what) not in lists:  # optional, says the documentation
-            numbers[what] = [0] * len(names)
-            continue
+        if what == "signed" and (home, what) not in lists:
+            continue  # optional, says the documentation: then how the fields are written tells it
         cells = lists.get((source, what), [])
         if len(cells) != len(names):
             raise FlightError(
@@ -192,6 +192,13 @@ def _layout(letter: str, lists: Mapping[tuple[str, str], list[str]], *, where: s
         raise FlightError(
             "predicts from motor[0], which is no field.", where=where, channel=f"Field {letter} predictor"
         )
-    return FrameLayout(
-        tuple(names), tuple(map(bool, numbers["signed"])), tuple(numbers["predictor"]), tuple(numbers["encoding"])
-    )
+    signed = tuple(map(bool, numbers["signed"])) if "signed" in numbers else _written_signed(home, lists)
+    return FrameLayout(tuple(names), signed, tuple(numbers["predictor"]), tuple(numbers["encoding"]))
+
+
+def _written_signed(home: str, lists: Mapping[tuple[str, str], list[str]]) -> tuple[bool, ...]:
+    """Whether each field is signed, where the header has no line that says so: by the encoding of its whole values.
+
+    P frames are no witness: they write differences, which are signed for every field.
+    """
+    return tuple(not cell.isdigit() or int(cell[:9]) not in _UNSIGNED for cell in lists.get((home, "encoding"), []))

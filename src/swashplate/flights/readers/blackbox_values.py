@@ -15,10 +15,10 @@ from swashplate.arrays import Array
 from swashplate.flights.readers.blackbox_encodings import Whole
 from swashplate.flights.readers.blackbox_frames import FoundFrames
 from swashplate.flights.readers.blackbox_header import Header
+from swashplate.flights.readers.clocked import TURN
 
 _LEAP = 10_000_000  # us: a clock that goes further from one frame to the next is damaged, says the documentation
 _LONG = 1024  # frames behind one I frame: longer rows are added up one by one, shorter ones side by side
-_TURN = 1 << 32  # where 32 bits of microseconds begin anew: after 71.6 minutes
 _WILD = 3  # frames at a seam of two runs of the clock that may be left out of the first
 _RESUMES = 14  # the event that announces a leap
 
@@ -138,7 +138,7 @@ def _one_by_one(row: list[int], *, signed: bool) -> list[int]:
         total = one + two
         value = (row[i] + ((total + (total < 0)) >> 1)) & 0xFFFFFFFF
         if signed and value & 0x80000000:
-            value -= _TURN
+            value -= TURN
         row[i] = value
         one, two = value, one
     return row
@@ -150,7 +150,7 @@ def main_frames(frames: FoundFrames, header: Header) -> Main:
     values = predicted(frames, header)
     damage, notes = list[str](), list[str]()
     keep = _complete(frames, header, damage, notes)
-    ticks = values[names.index("time")] & (_TURN - 1)
+    ticks = values[names.index("time")] & (TURN - 1)
     clock = _clock(frames, ticks, keep, damage)
     columns = {name: values[i][keep] for i, name in enumerate(names)}
     return Main(columns, clock[keep] / 1e6, keep, clock / 1e6, tuple(damage), tuple(notes))
@@ -202,11 +202,11 @@ def _clock(frames: FoundFrames, ticks: Whole, keep: NDArray[np.bool_], damage: l
     chosen = np.flatnonzero(keep)
     if not chosen.size:
         return np.zeros(ticks.size)
-    steps = np.diff(ticks[chosen], prepend=ticks[chosen[:1]]) % _TURN
+    steps = np.diff(ticks[chosen], prepend=ticks[chosen[:1]]) % TURN
     leaps = (steps == 0) | (steps > _LEAP)
     leaps[0] = False
     at_resume = np.isin(chosen, np.fromiter(resumed, dtype=np.int64)) if resumed else np.zeros(chosen.size, np.bool_)
-    leaps &= ~(at_resume & (steps > 0) & (steps < _TURN // 2))
+    leaps &= ~(at_resume & (steps > 0) & (steps < TURN // 2))
     if leaps.any():
         runs = np.cumsum(leaps)
         # A single wild frame parts one run into two that go on alike: join what continues.
@@ -218,7 +218,7 @@ def _clock(frames: FoundFrames, ticks: Whole, keep: NDArray[np.bool_], damage: l
             "run were left out"
         )
         chosen = chosen[best]
-        steps = np.diff(ticks[chosen], prepend=ticks[chosen[:1]]) % _TURN
+        steps = np.diff(ticks[chosen], prepend=ticks[chosen[:1]]) % TURN
     clock = np.zeros(ticks.size)
     clock[chosen] = float(ticks[chosen[0]]) + np.cumsum(steps)
     between = np.interp(np.arange(ticks.size), chosen, clock[chosen])
@@ -257,7 +257,7 @@ def _seam(early: Whole, late: Whole) -> tuple[int, int]:
     """
     seams = [(0, -1)]
     for cut in range(min(_WILD, early.size)):
-        after = (late - early[-1 - cut]) % _TURN
+        after = (late - early[-1 - cut]) % TURN
         goes_on = (after > 0) & (after <= _LEAP)
         if goes_on.any():
             seams.append((cut, int(np.argmax(goes_on))))

@@ -1,14 +1,15 @@
-"""What every reader asks of what it read: increasing times, finite numbers, plausible quaternions, moving inputs."""
+"""What every reader asks of what it read: finite and possible numbers, plausible quaternions, moving inputs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
+from swashplate.flights.flight import Flight
+from swashplate.flights.schema import channel
 
 _NORM_TOLERANCE = 0.01  # six decimals of a motion capture export lose 1e-6; anything near 1 % is no unit quaternion
 
@@ -31,44 +32,6 @@ def finite(values: Array, *, channel: str, where: str, first_row: int = 0) -> No
         )
 
 
-def usable(time: Array, *, where: str, bad_stamps: str, channel: str = "time") -> tuple[NDArray[np.bool_], str]:
-    """Which samples have a time [s] that increases, and a note where some were dropped.
-
-    Args:
-        time: stamps, shape (n,).
-        bad_stamps: "error" (a stamp that repeats or goes back is an error that names the sample) or "drop".
-
-    Returns:
-        Mask of samples to keep, shape (n,), and a note ("" where all are kept).
-    """
-    if bad_stamps not in ("error", "drop"):
-        raise FlightError(f"bad_stamps is '{bad_stamps}', expected 'error' or 'drop'.", where=where)
-    if time.size < 2:
-        count = "one sample" if time.size else "no samples"
-        raise FlightError(
-            f"has {count}; a flight needs at least two.", where=where, channel=channel, hint="Give a longer record."
-        )
-    finite(time, channel=channel, where=where)
-    before = np.maximum.accumulate(time)[:-1]
-    keep = np.concatenate(([True], time[1:] > before))
-    wrong = np.flatnonzero(~keep)
-    if not wrong.size:
-        return keep, ""
-    first = int(wrong[0])
-    what = "repeats the stamp before it" if time[first] == before[first - 1] else "goes backwards"
-    if bad_stamps == "error":
-        raise FlightError(
-            f"time {what} at sample {first} ({before[first - 1]:.6f} s, then {time[first]:.6f} s); "
-            f"{wrong.size} of {time.size} samples do not increase.",
-            where=where,
-            channel=channel,
-            hint="Repair the log, or leave these samples out: --drop-bad-stamps (in Python bad_stamps='drop').",
-        )
-    if keep.sum() < 2:
-        raise FlightError("less than two samples have increasing times.", where=where, channel=channel)
-    return keep, f"{wrong.size} samples dropped because their time repeats or goes backwards, first at sample {first}"
-
-
 def quaternion_notes(quaternion: Array, *, channel: str, where: str) -> tuple[str, ...]:
     """Notes on sign flips and single bad norms of quaternions, shape (n, 4); refuses what is no attitude at all."""
     with np.errstate(over="ignore"):  # damaged numbers may be as large as they like: their norm is refused below
@@ -89,6 +52,25 @@ def quaternion_notes(quaternion: Array, *, channel: str, where: str) -> tuple[st
     if flips:
         notes.append(f"the attitude quaternion flips its sign {flips} times, as logged (conditioning repairs it)")
     return tuple(notes)
+
+
+def beyond_limits(flight: Flight) -> tuple[str, ...]:
+    """What is told of each channel with numbers that nothing of its kind can have (`Channel.largest`)."""
+    told = []
+    for name in flight.channels:
+        known = channel(name)
+        values = np.abs(flight.values(name))
+        with np.errstate(invalid="ignore"):  # a netCDF file may hold NaN
+            wrong = values > known.largest
+        if count := int(np.sum(wrong)):
+            shown, unit = known.shown_factor, known.shown_unit.replace("1", "")
+            told.append(
+                f"{name}: {count} of {values.size} samples ({100.0 * count / values.size:.3g} %) are impossible: found "
+                f"up to {shown * np.nanmax(values):.3g} {unit}".rstrip()
+                + f", expected {shown * known.largest:.3g} {unit}".rstrip()
+                + f" at most ({known.description}). Check the unit it was read with, and the log's header"
+            )
+    return tuple(told)
 
 
 def constant_notes(channels: Mapping[str, Array]) -> tuple[str, ...]:

@@ -1,26 +1,59 @@
-"""Streams from a log's stamped samples: what to do about stamps that fall back, and numbers that are none."""
+"""What a log's clock did, by one rule for every reader.
+
+* A counter of 32 bits that turned over is counted on: nothing is lost, and a note says so.
+* Where the clock was started anew, the longest run is read. Two runs are never spliced.
+* Of that run the most samples whose stamps increase are kept.
+* A sample that stands in the log twice, stamp and numbers, is a copy: leaving one out loses nothing.
+
+Whatever else is left out is lost. It is told as damage, a problem with its share of the log.
+"""
 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.errors import FlightError
 from swashplate.flights import units
 from swashplate.flights.flight import stream
+from swashplate.flights.readers import checks
 from swashplate.flights.schema import channel
 
 Mask = NDArray[np.bool_]
 
+TURN = 1 << 32  # ticks: where a counter of 32 bits begins anew, after 71.6 minutes of microseconds
+DAY = 86400.0  # s: where a time of day begins anew
+
 _END = 1 << 62  # behind every place in a file
 _FALL = 1.0  # s: messages overtake each other by milliseconds; a clock that falls by more was started anew
 _WINDOW = 11  # messages: fewer damaged stamps than half of that do not look like a reset
+_SEAM = 3.0  # usual steps, and a second at least: a longer pause leaves open whether a counter turned over
 
 
+@dataclass
+class Told:
+    """What a reader says of a log: `notes` for the user to know, `damage` for what is lost."""
+
+    notes: list[str] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+
+
+def share(count: int, total: int, what: str = "samples") -> str:
+    """How much of something is meant: "600 of 1200 samples (50 %)"."""
+    return f"{count} of {total} {what} ({100.0 * count / max(total, 1):.3g} %)"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+# ---- one row of stamps -----------------------------------------------------------------------------------------------
 def longest_increasing(time: Array) -> Mask:
     """Which stamps to keep so that the most of them strictly increase (longest increasing subsequence).
 
@@ -51,6 +84,114 @@ def longest_increasing(time: Array) -> Mask:
     return keep
 
 
+def unturned(time: Array, turns: Iterable[float]) -> tuple[Array, int]:
+    """Stamps of a counter that turned over, counted on, and how often it did.
+
+    A fall counts as a turn where one of `turns` explains it to within a usual step; any other fall is left as it is.
+
+    Args:
+        time: [s], shape (n,), finite.
+        turns: what the counter may hold [s].
+    """
+    steps = np.diff(time)
+    falls = steps < 0.0
+    if not falls.any() or not (steps > 0.0).any():
+        return time, 0
+    usual = max(1.0, _SEAM * float(np.median(steps[steps > 0.0])))
+    for turn in turns:
+        # Neighbours that overtake each other at the seam step back over it: up by nearly a turn.
+        over = np.where(np.abs(np.abs(steps) - turn) < usual, -np.sign(steps), 0.0)
+        count = int(np.sum(over))
+        if count > 0 and turn > 2.0 * usual:
+            return np.asarray(time + turn * np.concatenate(([0.0], np.cumsum(over)))), count
+    return time, 0
+
+
+def copies(time: Array, columns: Iterable[Array]) -> Mask:
+    """Which samples are the one before them once more: the same stamp and the same numbers, shape (n,).
+
+    Args:
+        columns: of shape (n,) or (n, k).
+    """
+    same = np.concatenate(([False], time[1:] == time[:-1]))[: time.size]
+    doubled = np.flatnonzero(same)
+    for values in columns if doubled.size else ():
+        now, before = values[doubled], values[doubled - 1]
+        alike = (now == before) | ((now != now) & (before != before))
+        same[doubled] &= alike if alike.ndim == 1 else alike.all(axis=1)
+    return np.asarray(same)
+
+
+def usable(
+    time: Array,
+    columns: Iterable[Array] = (),
+    *,
+    where: str,
+    bad_stamps: str,
+    told: Told,
+    channel: str = "time",
+    tick: float = 1e-6,
+    turns: Sequence[float] = (),
+) -> tuple[Array, Mask]:
+    """The stamps of a table that can be used, and which samples they are of.
+
+    A table's owner can mend it, so by default bad stamps are an error; what is dropped on request is told as damage.
+
+    Args:
+        time: stamps [s], shape (n,).
+        columns: the samples' numbers, of shape (n,) or (n, k).
+        bad_stamps: "error" (a stamp that repeats or goes back is an error that names the sample) or "drop".
+        told: takes what was left out.
+        tick: of the file's counter [s], beside micro- and milliseconds.
+        turns: other times [s] at which the clock begins anew.
+
+    Returns:
+        Stamps that increase, shape (m,), and a mask of the samples that are kept, shape (n,).
+    """
+    if bad_stamps not in ("error", "drop"):
+        raise FlightError(f"bad_stamps is '{bad_stamps}', expected 'error' or 'drop'.", where=where)
+    if time.size < 2:
+        count = "one sample" if time.size else "no samples"
+        raise FlightError(
+            f"has {count}; a flight needs at least two.", where=where, channel=channel, hint="Give a longer record."
+        )
+    checks.finite(time, channel=channel, where=where)
+    time, turned = unturned(time, (*turns, *dict.fromkeys(TURN * each for each in (1e-6, 1e-3, tick))))
+    if turned:
+        told.notes.append(f"the clock's counter turned over {_times(turned)}: it was counted on")
+    twice = copies(time, columns)
+    if twice.any():
+        told.notes.append(f"{share(int(twice.sum()), time.size)} are copies of the one before them: left out")
+    place = np.flatnonzero(~twice)
+    (first, last), anew = longest_run([(place, time[place])])
+    keep = ~twice & (np.arange(time.size) >= first) & (np.arange(time.size) < last)
+    keep[keep] = longest_increasing(time[keep])
+    lost = ~keep & ~twice
+    if lost.any():
+        some, (bad, found) = share(int(lost.sum()), time.size), _first_bad(time, twice)
+        said = anew or f"{some} are lost because their time repeats or goes backwards, first at sample {bad}"
+        if bad_stamps == "error":
+            raise FlightError(
+                f"{found}; {some} can not be used{': the clock starts anew there' * bool(anew)}.",
+                where=where,
+                channel=channel,
+                hint="Repair the log, or leave these samples out: --drop-bad-stamps (in Python bad_stamps='drop').",
+            )
+        told.damage.append(said)
+    if keep.sum() < 2:
+        raise FlightError("less than two samples have increasing times.", where=where, channel=channel)
+    return time[keep], keep
+
+
+def _first_bad(time: Array, twice: Mask) -> tuple[int, str]:
+    """The first sample whose time does not increase, and what is wrong with it in words."""
+    before = np.maximum.accumulate(time)[:-1]
+    at = int(np.flatnonzero((time[1:] <= before) & ~twice[1:])[0]) + 1
+    what = "repeats the stamp before it" if time[at] == before[at - 1] else "goes backwards"
+    return at, f"time {what} at sample {at} ({before[at - 1]:.6f} s, then {time[at]:.6f} s)"
+
+
+# ---- the stamps of a whole log ---------------------------------------------------------------------------------------
 def resets(place: NDArray[np.int64], time: Array) -> NDArray[np.int64]:
     """Places in the file at which the clock of the log started anew, in order.
 
@@ -71,22 +212,32 @@ def resets(place: NDArray[np.int64], time: Array) -> NDArray[np.int64]:
     return np.unique(np.asarray(places, dtype=np.int64))
 
 
-def longest_run(place: NDArray[np.int64], time: Array) -> tuple[tuple[int, int], str]:
-    """The part of the file (first place, place after its last) with the most messages between clock resets.
+def longest_run(clocks: Sequence[tuple[NDArray[np.int64], Array]]) -> tuple[tuple[int, int], str]:
+    """The part of a file (first place, place after its last) with the most messages between clock resets.
+
+    Args:
+        clocks: places (increasing, comparable between clocks) and stamps [s] of the messages that one clock stamps.
 
     Returns:
-        The part, and in words what was left out ("" where the clock never falls back).
+        The part, and in words what is lost ("" where no clock falls back).
     """
-    edges = [0, *resets(place, time).tolist(), _END]
-    counts = np.histogram(place, bins=edges)[0] if len(edges) > 2 else np.array([place.size])
-    best = int(np.argmax(counts))
-    said = ""
-    if len(edges) > 2:
-        said = (
-            f"the clock starts anew {len(edges) - 2} times; only the longest run was read ({counts[best]} of "
-            f"{counts.sum()} messages, the {best + 1}. run)"
-        )
-    return (edges[best], edges[best + 1]), said
+    total, anew, first, last = sum(place.size for place, _ in clocks), 0, 0, _END
+    inside = sorted(clocks, key=lambda clock: -clock[0].size)  # fast ones know the place best
+    while True:
+        edges = next((found for place, time in inside if (found := resets(place, time)).size), None)
+        if edges is None:
+            break
+        bounds = [first, *edges.tolist(), last]
+        counts = np.sum([np.histogram(place, bins=bounds)[0] for place, _ in inside], axis=0)
+        best = int(np.argmax(counts))
+        first, last, anew = bounds[best], bounds[best + 1], anew + len(edges)
+        chosen = [(place >= first) & (place < last) for place, _ in inside]
+        inside = [(place[mask], time[mask]) for (place, time), mask in zip(inside, chosen, strict=True)]
+    if not anew:
+        return (first, last), ""
+    lost = total - sum(place.size for place, _ in inside)
+    said = f"the clock starts anew {_times(anew)}; only the longest run was read: {share(lost, total)} are lost"
+    return (first, last), said
 
 
 def converted(values: Array, unit: str) -> tuple[Array, str]:
@@ -94,16 +245,14 @@ def converted(values: Array, unit: str) -> tuple[Array, str]:
     return (units.to_inside(values, unit), units.inside_unit(unit)) if unit else (values, "")
 
 
-def made_stream(
-    name: str, time: Array, columns: Mapping[str, tuple[Array, str]], *, notes: list[str]
-) -> xr.Dataset | None:
+def made_stream(name: str, time: Array, columns: Mapping[str, tuple[Array, str]], *, told: Told) -> xr.Dataset | None:
     """A stream from what a log holds; None where fewer than two samples can be used.
 
     Args:
-        name: of the stream, for the notes.
+        name: of the stream, for what is told.
         time: stamps [s], shape (n,), in any state.
         columns: values and their unit in the log, by channel.
-        notes: takes a line for what was left out.
+        told: takes a line for what was left out.
     """
     channels = {
         channel_name: converted(np.asarray(v, dtype=np.float64), unit) for channel_name, (v, unit) in columns.items()
@@ -113,22 +262,26 @@ def made_stream(
         del channels[key]
     if not channels or time.size < 2:
         return None
-    usable = np.isfinite(time)
+    good = np.isfinite(time)
     for values, _ in channels.values():
-        usable &= np.isfinite(values)
-    lost = int(usable.size - usable.sum())
-    if lost:
-        notes.append(f"{name}: {lost} of {usable.size} samples left out because a number is missing or not finite")
-    rising = longest_increasing(time[usable])
+        good &= np.isfinite(values)
+    if not good.all():
+        lost = share(int(good.size - good.sum()), good.size)
+        told.damage.append(f"{name}: {lost} are lost because a number is missing or not finite")
+    twice = copies(time[good], [values[good] for values, _ in channels.values()])
+    if twice.any():
+        told.notes.append(f"{name}: {share(int(twice.sum()), good.size)} are copies of the one before them: left out")
+    good[good] = ~twice
+    rising = longest_increasing(time[good])
     if not rising.all():
-        count = int(rising.size - rising.sum())
-        notes.append(f"{name}: {count} of {rising.size} samples left out because their time repeats or goes backwards")
-    if rising.sum() < 2:
+        lost = share(int(rising.size - rising.sum()), rising.size)
+        told.damage.append(f"{name}: {lost} are lost because their time repeats or goes backwards")
+    good[good] = rising
+    if good.sum() < 2:
         return None
-    stamps = time[usable][rising]
     known = {key: channel(key).unit for key in channels}
     labels = {key: unit for key, (_, unit) in channels.items() if not known[key]}
-    return stream(stamps, {key: values[usable][rising] for key, (values, _) in channels.items()}, labels)
+    return stream(time[good], {key: values[good] for key, (values, _) in channels.items()}, labels)
 
 
 def unread(counts: Mapping[str, int], read: Sequence[str]) -> tuple[str, ...]:

@@ -11,13 +11,16 @@ and delay differ from flight to flight and are found from the data.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.readers import checks, frames, mat
+from swashplate.flights.readers import checks, clocked, frames, mat
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import QUATERNION
@@ -40,29 +43,21 @@ _NOTES = (
 )
 
 
-def recognises(source: Source) -> bool:
-    """A MATLAB file, or one that says it is: no other `.mat` layout is read, so this reader explains what is wrong."""
-    content = source.content
-    return mat.is_level_5(content) or mat.is_version_7_3(content) or source.path.suffix.lower() == ".mat"
-
-
-def _fields(source: Source) -> dict[str, Array]:
-    """The struct's fields as arrays of shape (n, rows), checked for presence, type and shape."""
-    variables = mat.load(source)
+def is_record(variables: Mapping[str, Any]) -> bool:
+    """Whether a MATLAB file's variables are a record of the CoaX: a struct `Data` with most of its fields."""
     data = variables.get("Data")
-    if not isinstance(data, dict):
-        raise FlightError(
-            f"holds {', '.join(sorted(variables)) or 'nothing'}; expected a struct 'Data' with {', '.join(_ROWS)}.",
-            where=source.name,
-            hint="Is it a CoaX-56 flight? Bench records and other .mat files are not flights; export them as CSV.",
-        )
+    return isinstance(data, dict) and 2 * len(data.keys() & _ROWS.keys()) >= len(_ROWS)
+
+
+def _fields(data: Mapping[str, Any], source: Source) -> dict[str, Array]:
+    """The struct's fields as arrays of shape (n, rows), checked for presence, type and shape."""
     missing = [name for name in _ROWS if name not in data]
     if missing:
         raise FlightError(
             f"the struct 'Data' lacks {', '.join(missing)}; it has {', '.join(data) or 'nothing'}.",
             where=source.name,
             channel=missing[0],
-            hint="A CoaX-56 flight has them all; export other logs as CSV.",
+            hint="A CoaX-56 flight has them all; for your own records say which variables are which in a mapping file.",
         )
     fields: dict[str, Array] = {}
     for name, rows in _ROWS.items():
@@ -110,10 +105,11 @@ def _in_inside_units(fields: dict[str, Array], source: Source, options: Options)
     return converted
 
 
-def read(source: Source, options: Options) -> Flight:
+def read(variables: Mapping[str, Any], source: Source, options: Options) -> Flight:
     """A CoaX-56 record as a flight with the streams "motion" and "inputs" at the same native stamps.
 
     Args:
+        variables: of the file.
         source: the `.mat` file.
         options: `units` by field (`position`, `lintwist`, `angtwist`, `inputs`, `time`) and `bad_stamps`.
 
@@ -124,15 +120,20 @@ def read(source: Source, options: Options) -> Flight:
     Raises:
         FlightError, UnitError: naming the file, the field, what was found and what to do.
     """
-    fields = _fields(source)
+    fields = _fields(variables["Data"], source)
     for name, values in fields.items():
         checks.finite(values, channel=f"Data.{name}", where=source.name)
     fields = _in_inside_units(fields, source, options)
-    keep, dropped = checks.usable(
-        fields["time"][:, 0], where=source.name, bad_stamps=options.bad_stamps, channel="Data.time"
+    told = clocked.Told()
+    time, keep = clocked.usable(
+        fields["time"][:, 0],
+        fields.values(),
+        where=source.name,
+        bad_stamps=options.bad_stamps,
+        told=told,
+        channel="Data.time",
     )
     fields = {name: values[keep] for name, values in fields.items()}
-    time = fields["time"][:, 0]
     down = frames.axes("north-west-up")
     scalar_first = fields["orientation"][:, (3, 0, 1, 2)]
     quaternion_notes = checks.quaternion_notes(scalar_first, channel="Data.orientation", where=source.name)
@@ -149,8 +150,8 @@ def read(source: Source, options: Options) -> Flight:
     by_name = dict(zip(_INPUTS, fields["inputs"].T, strict=True))
     inputs = {name: by_name[name] for name in ("motor_lower", "motor_upper", "servo_roll", "servo_pitch")}
 
-    notes = (*_NOTES, *quaternion_notes, *filter(None, (dropped,)), *checks.constant_notes(inputs))
+    notes = (*_NOTES, *quaternion_notes, *told.notes, *checks.constant_notes(inputs))
     return Flight(
         streams={"motion": stream(time, motion | logged, logged_units), "inputs": stream(time, inputs)},
-        provenance=source.provenance(NAME, VERSION, vehicle="coax", notes=notes),
+        provenance=source.provenance(NAME, VERSION, vehicle="coax", notes=notes, damage=tuple(told.damage)),
     )

@@ -22,7 +22,8 @@ from swashplate.flights.readers.source import Source, refuse_oversized
 
 _HEADER = 128
 _COMPRESSED, _MATRIX = 15, 14
-_CELL, _STRUCT, _CHAR = 1, 2, 4
+_CELL, _STRUCT, _CHAR, _OPAQUE = 1, 2, 4, 17
+_OTHERS = {3: "an object", 5: "a sparse matrix", 16: "a function handle"}
 _NUMERIC = range(6, 16)
 _COMPLEX_FLAG = 0x0800
 # Element kind -> NumPy type; 16 to 18 are UTF-8, -16 and -32.
@@ -133,6 +134,11 @@ def _variable(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
         raise _DamagedError("a variable has no array flags")
     flag = struct.unpack_from(order + "I", flags.data)[0]
     matlab_class, at = flag & 0xFF, flags.next
+    if matlab_class == _OPAQUE:  # no dimensions: its name, the kind of its class and the class
+        title = _element(data, at, order)
+        kind = _element(data, title.next, order)
+        called = bytes(_element(data, kind.next, order).data).decode("latin-1")
+        return bytes(title.data).decode("latin-1"), Unread(f"a MATLAB object of class {called}")
     dimensions = _element(data, at, order)
     shape = _dimensions(dimensions, order)
     title = _element(data, dimensions.next, order)
@@ -145,7 +151,7 @@ def _variable(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
         ending = "" if encoding == "utf-8" else "-le" if order == "<" else "-be"
         return name, bytes(text.data).decode(encoding + ending, errors="replace")
     if matlab_class not in (_CELL, _STRUCT):
-        return name, Unread(f"a variable of MATLAB class {matlab_class}")
+        return name, Unread(_OTHERS.get(matlab_class, f"a variable of MATLAB class {matlab_class}"))
     fields = [""]
     if matlab_class == _STRUCT:
         width = _element(data, at, order)
@@ -201,7 +207,7 @@ def load(source: Source) -> dict[str, Any]:
         raise FlightError(
             "is a MATLAB 7.3 file (HDF5 inside), which is not read.",
             where=source.name,
-            hint="In MATLAB, save it with: save('flight.mat', 'Data', '-v7').",
+            hint="In MATLAB, save it in the older format: s = load('FILE'); save('flight.mat', '-struct', 's', '-v7').",
         )
     if not is_level_5(source.content):
         raise FlightError(

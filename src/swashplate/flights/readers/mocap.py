@@ -10,7 +10,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.readers import checks, frames
+from swashplate.flights.readers import checks, clocked, frames
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import POSITION, QUATERNION
@@ -60,11 +60,12 @@ def flight(
     version: str,
     world_axes: str,
     body_axes: str,
-    notes: tuple[str, ...] = (),
+    notes: tuple[str, ...],
+    told: clocked.Told,
 ) -> Flight:
     """A tracked body as a flight with the stream "motion": x y z [m, NED] and qw qx qy qz (FRD to NED).
 
-    Samples in which the body was not seen are left out and counted in a note; the gap is then visible in the stamps.
+    Samples in which the body was not seen are left out and told as lost; the gap is then visible in the stamps.
     """
     where = source.name
     world = frames.axes(options.world_axes or world_axes, where=where)
@@ -78,11 +79,17 @@ def flight(
             where=where,
             hint="Choose another body, or export a longer record.",
         )
-    keep, dropped = checks.usable(track.time, where=where, bad_stamps=options.bad_stamps)
+    time, keep = clocked.usable(
+        track.time,
+        (track.position, *(() if track.quaternion is None else (track.quaternion,))),
+        where=where,
+        bad_stamps=options.bad_stamps,
+        told=told,
+    )
     kept = keep & seen
     lost = int(len(seen) - seen.sum())
     if lost:
-        notes = (*notes, f"{lost} of {len(seen)} samples dropped: '{track.name}' was not seen (occlusion)")
+        told.damage.append(f"{clocked.share(lost, len(seen))} are lost: '{track.name}' was not seen (occlusion)")
     position = units.to_inside(
         track.position[kept], track.length_unit, expected="m", channel=f"position of '{track.name}'", where=where
     )
@@ -99,9 +106,9 @@ def flight(
         *notes,
         f"logged world axes point {options.world_axes or world_axes}; 'north' is only the room's first axis",
         "x y z is the tracked point, not the centre of gravity; there are no inputs in this file",
-        *filter(None, (dropped,)),
+        *told.notes,
     )
     return Flight(
-        streams={"motion": stream(track.time[kept], channels)},
-        provenance=source.provenance(reader, version, vehicle=track.name, notes=notes),
+        streams={"motion": stream(time[seen[keep]], channels)},
+        provenance=source.provenance(reader, version, vehicle=track.name, notes=notes, damage=tuple(told.damage)),
     )

@@ -17,9 +17,10 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.readers import checks, frames, tables
+from swashplate.flights.readers import checks, clocked, frames, tables
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
+from swashplate.flights.readers.table_layout import even_rows
 from swashplate.flights.schema import POSITION, QUATERNION, RATES
 
 NAME = "nanobench"
@@ -70,11 +71,14 @@ def read(source: Source, options: Options) -> Flight:
     """
     if options.units:
         raise UnitError("units are known for this file and cannot be given.", where=source.name, channel="units")
-    columns = _columns(source)
-    keep, dropped = checks.usable(columns["t"], where=source.name, bad_stamps=options.bad_stamps, channel="t")
+    told = clocked.Told()
+    columns = _columns(source, told)
+    time, keep = clocked.usable(
+        columns["t"], columns.values(), where=source.name, bad_stamps=options.bad_stamps, told=told, channel="t"
+    )
     columns = {name: values[keep] for name, values in columns.items()}
     _plausible(columns, source)
-    time, down = columns["t"], frames.axes("north-west-up")
+    down = frames.axes("north-west-up")
 
     def turned(names: tuple[str, ...]) -> Array:
         return frames.to_local(np.stack([columns[name] for name in names], axis=1), down).T
@@ -98,12 +102,16 @@ def read(source: Source, options: Options) -> Flight:
             "battery": stream(time, {"voltage": columns[_VOLTAGE]}),
         },
         provenance=source.provenance(
-            NAME, VERSION, vehicle=VEHICLE, notes=(*notes, *filter(None, (dropped,)), *checks.constant_notes(motors))
+            NAME,
+            VERSION,
+            vehicle=VEHICLE,
+            notes=(*notes, *told.notes, *checks.constant_notes(motors)),
+            damage=tuple(told.damage),
         ),
     )
 
 
-def _columns(source: Source) -> dict[str, Array]:
+def _columns(source: Source, told: clocked.Told) -> dict[str, Array]:
     """The columns that are used, as numbers, every one finite."""
     rows = [row for row in tables.rows_of(source.text or "", where=source.name, delimiter=",") if any(row)]
     head = rows[0] if rows else []
@@ -115,8 +123,12 @@ def _columns(source: Source) -> dict[str, Array]:
             channel=missing[0],
             hint="Download it again; for your own tables say which columns are which with a mapping.",
         )
+    wide = len(head)
+    data, lines = even_rows(
+        rows[1:], range(2, len(rows) + 1), low=wide, high=wide, where=source.name, told=told, again=[head]
+    )
     columns = {
-        name: tables.column(rows[1:], head.index(name), name=name, where=source.name, first_line=2) for name in _COLUMNS
+        name: tables.column(data, head.index(name), name=name, where=source.name, lines=lines) for name in _COLUMNS
     }
     for name, values in columns.items():
         checks.finite(values, channel=name, where=source.name)

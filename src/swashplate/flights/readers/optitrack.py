@@ -20,9 +20,10 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import frames, mocap, tables
+from swashplate.flights.readers import clocked, frames, mocap, tables
 from swashplate.flights.readers.options import Options, with_mocap_table
 from swashplate.flights.readers.source import Source
+from swashplate.flights.readers.table_layout import even_rows
 
 NAME = "optitrack"
 VERSION = "1"
@@ -94,7 +95,10 @@ def read(source: Source, options: Options) -> Flight:
     names = list(bodies)
     name = names[mocap.choose(names, options.body, where=where)]
     columns = bodies[name]
-    data = [row for row in rows[axes_row + 1 :] if any(row)]
+    told = clocked.Told()
+    under = range(axes_row + 2, len(rows) + 1)
+    # Blank cells at a row's end may be left out: the body was not seen. More cells than heads are another layout.
+    data, lines = even_rows(rows[axes_row + 1 :], under, low=2, high=len(rows[axes_row]), where=where, told=told)
 
     def read_columns(quantity: str, letters: str) -> Array:
         missing = [axis for axis in letters if (quantity, axis) not in columns]
@@ -102,13 +106,12 @@ def read(source: Source, options: Options) -> Flight:
             raise FlightError(
                 f"'{name}' has no column {quantity} {missing[0]}.", where=where, hint="Export rotation and position."
             )
-        line = axes_row + 2
         places = {f"{name} {axis}": columns[quantity, axis] for axis in letters}
         return np.stack(
-            [tables.column(data, at, name=title, where=where, first_line=line) for title, at in places.items()], axis=1
+            [tables.column(data, at, name=title, where=where, lines=lines) for title, at in places.items()], axis=1
         )
 
-    time = tables.column(data, 1, name="Time (Seconds)", where=where, first_line=axes_row + 2)
+    time = tables.column(data, 1, name="Time (Seconds)", where=where, lines=lines)
     kind = (options.rotation or meta.get("rotation type", "Quaternion")).lower()
     notes: tuple[str, ...] = ()
     if kind == "quaternion":
@@ -129,5 +132,13 @@ def read(source: Source, options: Options) -> Flight:
         quaternion=quaternion,
     )
     return mocap.flight(
-        track, source, options, reader=NAME, version=VERSION, world_axes=WORLD_AXES, body_axes=BODY_AXES, notes=notes
+        track,
+        source,
+        options,
+        reader=NAME,
+        version=VERSION,
+        world_axes=WORLD_AXES,
+        body_axes=BODY_AXES,
+        notes=notes,
+        told=told,
     )

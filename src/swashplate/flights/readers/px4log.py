@@ -71,9 +71,9 @@ def read(source: Source, options: Options) -> Flight:
     """
     refuse_mapping(options, "a PX4 log", where=source.name)
     log = dataflash.messages(source.content)
-    notes: list[str] = list(log.notes)
     clock = log.get("TIME") or MessageTable({}, np.zeros(0, np.int64))
-    (first, last), said = clocked.longest_run(clock.place, clock.number("StartTime") / 1e6)
+    (first, last), said = clocked.longest_run([(clock.place, clock.number("StartTime") / 1e6)])
+    told = clocked.Told(list(log.notes), [*log.damage, *filter(None, (said,))])
     clock = clock.rows((clock.place >= first) & (clock.place < last))
     streams: dict[str, xr.Dataset] = {}
     for name, (stream_name, fields) in _MESSAGES.items():
@@ -83,7 +83,7 @@ def read(source: Source, options: Options) -> Flight:
         table = table.rows((table.place > clock.place[0]) & (table.place < last))
         present = {field: place for field, place in fields.items() if field in table.columns}
         columns = {channel: (table.number(field), unit) for field, (channel, unit) in present.items()}
-        made = clocked.made_stream(stream_name, _stamps(table, clock), columns, notes=notes)
+        made = clocked.made_stream(stream_name, _stamps(table, clock), columns, told=told)
         if made is not None:
             streams[stream_name] = made
     if not streams:
@@ -92,13 +92,13 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Copy the log again.",
         )
-    notes += _remarks(log, streams)
+    told.notes += _remarks(log, streams)
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=_firmware(log),
-        notes=tuple(notes),
-        damage=(*log.damage, *filter(None, (said,))),
+        notes=tuple(told.notes),
+        damage=tuple(told.damage),
         parameters=_parameters(log),
         events=_states(log, clock),
     )

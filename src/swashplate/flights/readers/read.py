@@ -11,7 +11,7 @@ from swashplate.errors import FlightError
 from swashplate.flights import datasets
 from swashplate.flights.epoch import rebased
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import analogue, blackbox
+from swashplate.flights.readers import analogue, blackbox, checks
 from swashplate.flights.readers.given_units import with_units
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
@@ -40,15 +40,17 @@ _OURS = (
     "blackbox",
     "ulog",
     "rosbag",
-    "coax56",
+    "mat_table",
     "nanobench",
     "netcdf",
     "growing",
     "optitrack",
     "vicon",
+    "blackbox_csv",
     "delimited",
 )
 _LAST = "delimited"  # nearly any text looks like a plain table
+_TABLES = ("mat_table", _LAST)  # readers that a mapping of columns has a meaning for
 READERS: Registry[Reader] = Registry(
     "readers",
     what="reader of flight logs",
@@ -70,8 +72,8 @@ def read(
     log: int | None = None,
 ) -> Flight:
     """Reads a flight log: ArduPilot DataFlash (`.bin`, `.log`), PX4 ULog (`.ulg`) or `.px4log`, Blackbox of Rotorflight
-    and Betaflight (`.bbl`, `.bfl`), a ROS bag (1 or 2), a CoaX-56 `.mat` record, a NanoBench CSV file, a swashplate
-    netCDF or CSV file, a Vicon or OptiTrack CSV export.
+    and Betaflight (`.bbl`, `.bfl`, or exported as CSV), a ROS bag (1 or 2), MATLAB files of level 5 (`.mat`), tables of
+    text (CSV), a NanoBench CSV file, a swashplate netCDF file, a Vicon or OptiTrack CSV export.
 
     ULog files and ROS bags need `pip install 'swashplate[logs]'`.
 
@@ -81,9 +83,9 @@ def read(
             of a Blackbox file; a file that is called so wins.
         units: units by channel (CSV) or field (`.mat`, "position" of a motion capture file) where the file says none,
             or the wrong ones.
-        mapping: a TOML file, or its content as a dictionary, that says which columns of a CSV file are which channels
-            (`readers/delimited.py`); its table `[mocap]` may hold the next four. With a table `[recorder]` it is the
-            calibration of an analogue recorder (`readers/analogue.py`).
+        mapping: a TOML file, or its content as a dictionary, that says which columns of a table, or which variables of
+            a `.mat`, are which channels (`readers/delimited.py`); its table `[mocap]` may hold the next four. With a
+            table `[recorder]` it is the calibration of an analogue recorder (`readers/analogue.py`).
         body: the tracked body, where a motion capture file has several.
         rotation: how three logged angles are meant: "helical" or "euler_xyz", where the file does not say.
         body_axes: where the tracked body's logged axes point, for example "forward-left-up" (a bag's default).
@@ -114,7 +116,15 @@ def read(
         bad_stamps=bad_stamps,
         log=number if log is None else log,
     )
+    flight = _with_limits(flight)
     return flight if window is None else cut(flight, *window, where=file)
+
+
+def _with_limits(flight: Flight) -> Flight:
+    """The flight, with what lies beyond the schema's limits among the damage (once: a saved flight may say it)."""
+    origin = flight.provenance
+    told = tuple(text for text in checks.beyond_limits(flight) if text not in origin.damage)
+    return replace(flight, provenance=replace(origin, damage=(*origin.damage, *told))) if told else flight
 
 
 def _whole(
@@ -152,14 +162,15 @@ def _whole(
     if analogue.is_calibration(options.mapping):
         return rebased(analogue.read(source, options))
     if "channels" in options.mapping:  # columns are named, so it is a table, whichever reader would know its head
-        if not READERS[_LAST].recognises(source):
+        reader = next((READERS[name] for name in _TABLES if READERS[name].recognises(source)), None)
+        if reader is None:
             raise FlightError(
-                f"is no table of text, and the mapping names columns; it starts with {source.content[:8]!r}.",
+                f"is no table, and the mapping names columns; it starts with {source.content[:8]!r}.",
                 where=source.path,
                 channel="mapping",
                 hint="Leave the mapping out: the log says itself what its channels are.",
             )
-        return rebased(READERS[_LAST].read(source, options))
+        return rebased(reader.read(source, options))
     for name in (*(name for name in READERS if name != _LAST), _LAST):
         reader = READERS[name]
         if reader.recognises(source):
@@ -170,7 +181,7 @@ def _whole(
     raise FlightError(
         f"is no flight log that is known; it starts with {source.content[:8]!r}.",
         where=source.path,
-        hint="Known are ArduPilot (.bin, .log), PX4 (.ulg, .px4log), Blackbox (.bbl), ROS bags, CoaX-56 .mat, "
+        hint="Known are ArduPilot (.bin, .log), PX4 (.ulg, .px4log), Blackbox (.bbl), ROS bags, MATLAB (.mat), "
         "NanoBench CSV, swashplate netCDF (.nc), CSV (columns parted by comma, semicolon or tab), and the exports of "
         "Vicon and OptiTrack.",
     )

@@ -111,14 +111,15 @@ def read(source: Source, options: Options) -> Flight:
     body = frames.axes(options.body_axes or _BODY, where=source.name)
     world = frames.axes(options.world_axes or _WORLD, where=source.name)
     stamps, rows, counts, begin, damage = _collected(source)
-    notes: list[str] = []
+    told = clocked.Told(damage=damage)
+    times, rows = _one_run(stamps, rows, told)
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     for topic, received in rows.items():
         name = re.sub(r"\W+", "_", topic.strip("/")) or "topic"
         columns = _columns(received, name, body=body, world=world)
         named = {c if c not in taken else f"{c}_{name}": value for c, value in columns.items()}
-        made = clocked.made_stream(name, np.asarray(stamps[topic]), named, notes=notes)
+        made = clocked.made_stream(name, times[topic], named, told=told)
         if made is not None and name not in streams:
             streams[name] = made
             taken |= set(map(str, made.data_vars))
@@ -130,19 +131,36 @@ def read(source: Source, options: Options) -> Flight:
             hint="Record poses, odometry, inertial sensors, sticks or servo commands.",
         )
     by_topic = {f"{topic} [{kind}]": n for (topic, kind), n in counts.items()}
-    notes += clocked.unread(by_topic, [f"{topic} [{kind}]" for topic, kind in counts if kind in _TYPES])
-    said = source.provenance(NAME, VERSION, notes=tuple(notes), damage=tuple(damage), epoch=begin * 1e-9)
+    told.notes += clocked.unread(by_topic, [f"{topic} [{kind}]" for topic, kind in counts if kind in _TYPES])
+    said = source.provenance(NAME, VERSION, notes=tuple(told.notes), damage=tuple(told.damage), epoch=begin * 1e-9)
     return Flight(streams, said)
 
 
-Collected = tuple[dict[str, list[float]], dict[str, list[Row]], dict[tuple[str, str], int], int, list[str]]
+Stamps = dict[str, list[tuple[int, float]]]
+"""By topic: place in the bag and stamp [s from the first message] of each message."""
+Collected = tuple[Stamps, dict[str, list[Row]], dict[tuple[str, str], int], int, list[str]]
+
+
+def _one_run(
+    stamps: Stamps, rows: dict[str, list[Row]], told: clocked.Told
+) -> tuple[dict[str, Array], dict[str, list[Row]]]:
+    """Stamps [s] and numbers by topic, of the longest run between clock resets; nodes may have clocks of their own."""
+    places = {topic: np.array([place for place, _ in pairs], dtype=np.int64) for topic, pairs in stamps.items()}
+    times = {topic: np.array([time for _, time in pairs]) for topic, pairs in stamps.items()}
+    (first, last), said = clocked.longest_run([(places[topic], times[topic]) for topic in stamps])
+    if not said:
+        return times, rows
+    told.damage.append(said)
+    kept = {topic: (place >= first) & (place < last) for topic, place in places.items()}
+    cut = {topic: [row for row, keep in zip(rows[topic], kept[topic], strict=True) if keep] for topic in rows}
+    return {topic: times[topic][kept[topic]] for topic in rows if cut[topic]}, {t: c for t, c in cut.items() if c}
 
 
 def _collected(source: Source) -> Collected:
-    """Stamps [s from the first message] and numbers by topic, messages by topic and type, first stamp [ns], damage."""
+    """Stamps and numbers by topic, messages by topic and type, first stamp [ns], damage."""
     anyreader = library("rosbags.highlevel", what="a ROS bag", where=source.name)
     typesys = library("rosbags.typesys", what="a ROS bag", where=source.name)
-    stamps: dict[str, list[float]] = {}
+    stamps: Stamps = {}
     rows: dict[str, list[Row]] = {}
     counts: dict[tuple[str, str], int] = {}
     damage: list[str] = []
@@ -157,10 +175,10 @@ def _collected(source: Source) -> Collected:
                 counts[key] = counts.get(key, 0) + int(connection.msgcount)
             known = [c for c in bag.connections if c.msgtype in _TYPES]
             try:
-                for connection, received, raw in bag.messages(known) if known else ():
+                for place, (connection, received, raw) in enumerate(bag.messages(known) if known else ()):
                     message = bag.deserialize(raw, connection.msgtype)
                     at = _stamp(message, received)
-                    stamps.setdefault(connection.topic, []).append((at - begin) * 1e-9)
+                    stamps.setdefault(connection.topic, []).append((place, (at - begin) * 1e-9))
                     rows.setdefault(connection.topic, []).append(_TYPES[connection.msgtype](message))
             except Exception as error:  # a damaged bag can raise anything in there
                 read_so_far = sum(map(len, rows.values()))

@@ -1,9 +1,15 @@
-"""Rows of cells from text with separators, and numbers from cells, with the place of what does not parse."""
+"""Rows of cells from text with separators, and numbers from cells, with the place of what does not parse.
+
+Decimals may be written with a comma where something else separates the cells: a table in which some cell has such a
+comma and none has a point is read so.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import overload
@@ -13,17 +19,22 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 
+_SAMPLE = 40  # lines by which separator and decimals are told
+_WITH_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+_WITH_POINT = re.compile(r"[+-]?(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_NO_VALUE = frozenset(("", "na", "n/a", "#n/a", "null", "none", "-", "--"))
+
 
 def separator(text: str) -> str:
-    """The separator of some lines: of comma, semicolon and tab the one of which every line has as many.
+    """The separator of some lines: of comma, semicolon and tab the one of which most lines have equally many.
 
-    Where none is so regular it is the one that the lines have most of, and a space where there is none of them.
+    Of two that are as regular it is the one that the lines have most of, and a space where there is none of them.
     Decimals written with a comma are thereby told from commas that separate.
     """
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    counts = {mark: {line.count(mark) for line in lines} for mark in ",;\t"}
-    regular = [mark for mark, widths in counts.items() if len(widths) == 1 and widths != {0}]
-    return max(regular or ",;\t", key=text.count) if any(mark in text for mark in ",;\t") else " "
+    counts = {mark: Counter(n for line in lines if (n := line.count(mark))) for mark in ",;\t"}
+    regular = {mark: max(widths.values()) for mark, widths in counts.items() if widths}
+    return max(regular, key=lambda mark: (regular[mark], text.count(mark))) if regular else " "
 
 
 def rows_of(text: str, *, where: str, delimiter: str | None = None) -> list[list[str]]:
@@ -32,7 +43,7 @@ def rows_of(text: str, *, where: str, delimiter: str | None = None) -> list[list
     Args:
         delimiter: the separator; found in the first lines where None. A space stands for any number of them.
     """
-    chosen = delimiter or separator("\n".join(text.split("\n", 40)[:40]))
+    chosen = delimiter or separator("\n".join(text.split("\n", _SAMPLE)[:_SAMPLE]))
     if chosen == " ":
         return [line.split() for line in text.splitlines()]
     try:
@@ -61,15 +72,17 @@ class NumberRows(Sequence[list[str]]):
 
     Attributes:
         head: the lines before the first row.
-        lines: the rows as they stand in the file.
+        lines: the rows as they stand in the file, decimals with points.
         mark: the separator.
         numbers: shape (rows, columns).
+        commas: whether the file has its decimals with commas.
     """
 
     head: list[str]
     lines: list[str]
     mark: str
     numbers: Array
+    commas: bool = False
 
     @staticmethod
     def of(text: str, *, delimiter: str | None = None) -> NumberRows | None:
@@ -85,17 +98,20 @@ class NumberRows(Sequence[list[str]]):
             head.append(text[begin:end])
             begin = end + 1
         body = text[begin:].replace("\r\n", "\n").rstrip("\n")
-        mark = delimiter or separator("\n".join(text.split("\n", 40)[:40]))
+        mark = delimiter or separator("\n".join(text.split("\n", _SAMPLE)[:_SAMPLE]))
         if mark not in tuple(",;\t") or not _bare_numbers(body):
             return None
-        lines = body.split("\n")
+        commas = mark != "," and "," in body
+        if commas and "." in body:
+            return None
+        lines = (body.replace(",", ".") if commas else body).split("\n")
         try:
             numbers = np.loadtxt(lines, delimiter=mark, comments=None, ndmin=2)
         except ValueError:
             return None
         if len(numbers) < len(lines):  # numpy passes over blank lines
             return None
-        return NumberRows(head, lines, mark, numbers)
+        return NumberRows(head, lines, mark, numbers, commas)
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -123,54 +139,77 @@ def _bare_numbers(text: str) -> bool:
 
 
 def texts(rows: Sequence[Sequence[str]], index: int) -> list[str]:
-    """One column's cells as text, of rows that all have it."""
-    return rows.texts(index) if isinstance(rows, NumberRows) else [row[index] for row in rows]
-
-
-def first_shorter(rows: Sequence[Sequence[str]], width: int) -> int | None:
-    """The first row with fewer cells than `width`; None where there is none."""
+    """One column's cells as text, blank where a row has none."""
     if isinstance(rows, NumberRows):
-        return 0 if rows.numbers.shape[1] < width else None
-    return next((i for i, row in enumerate(rows) if len(row) < width), None)
+        return rows.texts(index)
+    return [row[index] if index < len(row) else "" for row in rows]
+
+
+def with_points(rows: Sequence[list[str]]) -> bool:
+    """Writes decimals with points where the table has commas, in place; whether it has."""
+    cells = [cell for row in rows[:_SAMPLE] for cell in row]
+    commas = any(_WITH_COMMA.fullmatch(cell) for cell in cells)
+    if not commas or any(_WITH_POINT.fullmatch(cell) for cell in cells):
+        return False
+    for row in rows:
+        for i, cell in enumerate(row):
+            if "," in cell and _WITH_COMMA.fullmatch(cell):
+                row[i] = cell.replace(",", ".")
+            elif "." in cell and _WITH_POINT.fullmatch(cell):
+                row[i] = f"{cell} (with a point)"  # a thousand, or a decimal after all: no number that is known
+    return True
 
 
 def number(cell: str) -> float:
-    """A cell as a number, NaN where it is blank.
+    """A cell as a number, NaN where it is blank or says that there is no value.
 
     Raises:
         ValueError: where it is neither.
     """
     if "_" in cell:
         raise ValueError(cell)  # Python reads 1_0 as ten; no log means that
-    return float(cell) if cell else float("nan")
+    return float("nan") if cell.lower() in _NO_VALUE else float(cell)
 
 
-def column(rows: Sequence[Sequence[str]], index: int, *, name: str, where: str, first_line: int) -> Array:
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a number, with point or comma."""
+    if _WITH_COMMA.fullmatch(cell):
+        return True
+    try:
+        return bool(cell) and number(cell) == number(cell)
+    except ValueError:
+        return False
+
+
+def column(rows: Sequence[Sequence[str]], index: int, *, name: str, where: str, lines: Sequence[int]) -> Array:
     """One column as numbers, shape (n,); blank or missing cells are NaN.
 
     Args:
-        first_line: line number of the first row in the file, for the error.
+        lines: line number of each row in the file, for the error.
 
     Raises:
-        FlightError: where a cell is not a number, naming its line.
+        FlightError: where cells are no numbers, naming the first one's line and how many there are.
     """
     if isinstance(rows, NumberRows) and index < rows.numbers.shape[1]:
         return rows.numbers[:, index].copy()
-    cells = [row[index] if index < len(row) else "" for row in rows]
+    cells = texts(rows, index)
     try:
         if "_" not in "".join(cells):  # see `number`
             return np.fromiter(map(float, cells), dtype=np.float64, count=len(cells))
     except ValueError:  # a blank, or what is no number: which one is told below
         pass
-    values = np.empty(len(rows))
+    values, wrong = np.empty(len(cells)), list[int]()
     for i, cell in enumerate(cells):
         try:
             values[i] = number(cell)
         except ValueError:
-            raise FlightError(
-                f"'{cell[:40]}' in line {first_line + i} is not a number.",
-                where=where,
-                channel=name,
-                hint="Correct the cell; decimals are written with a point.",
-            ) from None
+            wrong.append(i)
+    if wrong:
+        more = f" ({len(wrong)} of {len(cells)} cells are none)" if len(wrong) > 1 else ""
+        raise FlightError(
+            f"'{cells[wrong[0]][:40]}' in line {lines[wrong[0]]} is not a number{more}.",
+            where=where,
+            channel=name,
+            hint="Correct the cell; decimals are written with a point, or with a comma in all cells.",
+        )
     return values

@@ -113,12 +113,12 @@ def read(source: Source, options: Options) -> Flight:
     refuse_mapping(options, "a ULog file", where=source.name)
     whole = whole_messages(source.content)
     log = _decoded(whole.content, source.name)
-    notes: list[str] = []
+    told = clocked.Told()
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     first = {data.name: data.data for data in reversed(log.data_list) if data.multi_id == 0}
     for topic in _TOPICS:
-        made = _stream(topic, first.get(topic.name), taken, notes)
+        made = _stream(topic, first.get(topic.name), taken, told)
         if made is not None:
             streams[topic.stream] = made
             taken |= set(map(str, made.data_vars))
@@ -129,18 +129,18 @@ def read(source: Source, options: Options) -> Flight:
             hint="Copy the log again; check the logging profile (SDLOG_PROFILE).",
         )
     commands = {name: np.asarray(d[name].values) for d in streams.values() for name in _MIXER if name in d}
-    notes += checks.constant_notes(commands)
+    told.notes += checks.constant_notes(commands)
     counts = {
         f"{d.name}/{d.multi_id}" if d.multi_id else d.name: len(d.data.get("timestamp", ())) for d in log.data_list
     }
-    notes += clocked.unread(counts, [topic.name for topic in _TOPICS])
+    told.notes += clocked.unread(counts, [topic.name for topic in _TOPICS])
     info = log.msg_info_dict
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=" ".join(str(info[key]) for key in ("sys_name", "ver_hw", "ver_sw") if key in info),
-        notes=tuple(notes),
-        damage=tuple(_damage(whole, log)),
+        notes=tuple(told.notes),
+        damage=(*_damage(whole, log), *told.damage),
         parameters={str(k): float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)},
         events=_events(log, first),
     )
@@ -165,7 +165,7 @@ def _decoded(content: bytes, where: str) -> Any:
 
 
 def _stream(
-    topic: _Topic, data: Mapping[str, NDArray[Any]] | None, taken: set[str], notes: list[str]
+    topic: _Topic, data: Mapping[str, NDArray[Any]] | None, taken: set[str], told: clocked.Told
 ) -> xr.Dataset | None:
     if data is None or "timestamp" not in data:
         return None
@@ -180,7 +180,7 @@ def _stream(
                 values = factor * np.asarray(data[field], dtype=np.float64)
             if unit != "us" or np.any(values > 0.0):  # outputs that nothing is connected to
                 columns[channel] = (values, unit)
-    return clocked.made_stream(topic.stream, time, columns, notes=notes)
+    return clocked.made_stream(topic.stream, time, columns, told=told)
 
 
 def _damage(whole: Whole, log: Any) -> list[str]:

@@ -21,9 +21,10 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import checks, frames, mocap, tables
+from swashplate.flights.readers import checks, clocked, frames, mocap, tables
 from swashplate.flights.readers.options import Options, with_mocap_table
 from swashplate.flights.readers.source import Source
+from swashplate.flights.readers.table_layout import even_rows
 
 NAME = "vicon"
 VERSION = "1"
@@ -124,7 +125,10 @@ def read(source: Source, options: Options) -> Flight:
         raise FlightError(f"the block '{title}' ends in its header.", where=where, hint="Export it again.")
     rate = _rate(rows[start + 1], source)
     names, columns, unit_row = rows[start + 2 : start + _DATA_AFTER]
-    data, first_line = rows[start + _DATA_AFTER : end], start + _DATA_AFTER + 1
+    told = clocked.Told()
+    under = range(start + _DATA_AFTER + 1, end + 1)
+    # Blank cells at a row's end may be left out: the body was not seen. More cells than heads are another layout.
+    data, lines = even_rows(rows[start + _DATA_AFTER : end], under, low=1, high=len(columns), where=where, told=told)
     poses = title in _POSES
     bodies = _bodies(names, columns, first="RX" if poses else "X")
     labels = [label for label, _, _ in bodies]
@@ -139,13 +143,13 @@ def read(source: Source, options: Options) -> Flight:
         raise FlightError(f"the columns {', '.join(missing)} are missing.", where=where, hint="Export the full pose.")
 
     def read_columns(which: Sequence[str]) -> Array:
-        parts = [tables.column(data, wanted[c], name=c, where=where, first_line=first_line) for c in which]
+        parts = [tables.column(data, wanted[c], name=c, where=where, lines=lines) for c in which]
         return np.stack(parts, axis=1)
 
     def unit_of(name: str) -> str:
         return unit_row[wanted[name]] if wanted[name] < len(unit_row) else ""
 
-    frame = tables.column(data, 0, name="Frame", where=where, first_line=first_line)
+    frame = tables.column(data, 0, name="Frame", where=where, lines=lines)
     checks.finite(frame, channel="Frame", where=where)
     position = read_columns(place)
     quaternion = None
@@ -163,5 +167,13 @@ def read(source: Source, options: Options) -> Flight:
     )
     notes = (f"time starts at frame {first:.0f}, counted at {rate:g} Hz",) if frame.size else ()
     return mocap.flight(
-        track, source, options, reader=NAME, version=VERSION, world_axes=WORLD_AXES, body_axes=BODY_AXES, notes=notes
+        track,
+        source,
+        options,
+        reader=NAME,
+        version=VERSION,
+        world_axes=WORLD_AXES,
+        body_axes=BODY_AXES,
+        notes=notes,
+        told=told,
     )

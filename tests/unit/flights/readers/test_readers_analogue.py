@@ -133,3 +133,18 @@ def test_a_unit_that_does_not_fit_and_units_beside_the_calibration(tmp_path: Pat
         _read(tmp_path, CALIBRATION.replace('unit = "deg"', 'unit = "m"'))
     with pytest.raises(FlightError, match="units belong into the calibration"):
         read(tmp_path / "record.csv", mapping=tmp_path / "calibration.toml", units={"phi": "deg"})
+
+
+def test_blank_cells_and_rows_of_another_layout(tmp_path: Path) -> None:
+    rows = [",".join(map(repr, row)) for row in _volts().tolist()]
+    (tmp_path / "calibration.toml").write_text(CALIBRATION)
+
+    def record(lines: list[str]) -> Flight:
+        (tmp_path / "record.csv").write_text("\n".join(["AI1,AI2", *lines]))
+        return read(tmp_path / "record.csv", mapping=tmp_path / "calibration.toml")
+
+    flight = record([*rows[:800], *[f"{row},1" for row in rows[800:]]])
+    assert flight.time("phi").size == 800
+    assert "200 of 1000 rows (20 %) are lost: line 802 has 3 cells" in flight.provenance.damage[0]
+    with pytest.raises(FlightError, match="servo_pitch: has blank cells where other channels have volts"):
+        record([*rows[:500], *[row.partition(",")[0] + "," for row in rows[500:]]])

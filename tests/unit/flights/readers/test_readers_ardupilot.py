@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -197,7 +198,7 @@ def test_a_clock_that_starts_anew_gives_the_longest_run_and_says_so(tmp_path: Pa
         flight = _flight(tmp_path, dataflash(rows))
         assert (flight.start, flight.time("p").size) == (20.0, 800)
         (said,) = flight.provenance.damage
-        assert "the clock starts anew 1 times; only the longest run was read" in said
+        assert "the clock starts anew once; only the longest run was read" in said
 
 
 def test_wild_stamps_cost_only_themselves(tmp_path: Path) -> None:
@@ -207,8 +208,8 @@ def test_wild_stamps_cost_only_themselves(tmp_path: Path) -> None:
         rows[i] = ("RATE", (wild, *rows[i][1][1:]))
     flight = _flight(tmp_path, dataflash(rows))
     assert flight.time("p").size == 800 - 3
-    assert any("rates: 3 of 800 samples left out" in note for note in flight.provenance.notes)
-    assert flight.provenance.damage == ()
+    (said,) = flight.provenance.damage
+    assert said == "rates: 3 of 800 samples (0.375 %) are lost because their time repeats or goes backwards"
 
 
 def test_numbers_that_are_none_are_left_out_and_counted(tmp_path: Path) -> None:
@@ -217,7 +218,7 @@ def test_numbers_that_are_none_are_left_out_and_counted(tmp_path: Path) -> None:
     rows[i] = ("RATE", (*rows[i][1][:2], float("nan"), *rows[i][1][3:]))
     flight = _flight(tmp_path, dataflash(rows))
     assert np.isfinite(flight.values("p")).all()
-    assert any("rates: 1 of 800 samples left out because a number" in note for note in flight.provenance.notes)
+    assert any("rates: 1 of 800 samples (0.125 %) are lost because a number" in t for t in flight.provenance.damage)
 
 
 def test_a_log_without_a_flight_and_needless_options_are_refused(tmp_path: Path) -> None:
@@ -270,3 +271,41 @@ def test_the_autopilots_own_filters_and_a_missing_rate_message_are_said(tmp_path
     assert not any("no RATE message" in note or "INS_ACCEL" in note for note in notes)
     bare = _flight(tmp_path, dataflash([row for row in rows if row[0] != "RATE"]))
     assert any("no RATE message" in note and "LOG_BITMASK" in note for note in bare.provenance.notes)
+
+
+# ---- names of modes --------------------------------------------------------------------------------------------------
+def _modes(folder: Path, said: Sequence[Row], formats: Mapping[str, tuple[int, str, str]] = ARDUPILOT) -> list[str]:
+    rows = [*said, *[("MODE", (1_000_000 * k, number, number, 1)) for k, number in enumerate((0, 5, 9, 11, 19, 99))]]
+    flown = [row for row in ardupilot_rows(start=10.0) if row[0] not in ("MSG", "MODE")]
+    flight = _flight(folder, dataflash([*rows, *flown], formats))
+    return [event.text for event in flight.provenance.events if event.kind == "mode"]
+
+
+@pytest.mark.parametrize(
+    ("firmware", "expected"),
+    [
+        ("ArduCopter V4.7.0-dev (abc)", ["STABILIZE", "LOITER", "LAND", "DRIFT", "AVOID_ADSB", "mode 99"]),
+        ("APM:Copter V3.2.1 (abc)", ["STABILIZE", "LOITER", "LAND", "DRIFT", "AVOID_ADSB", "mode 99"]),
+        ("ArduPlane V4.5.7 (abc)", ["MANUAL", "FBWA", "mode 9", "RTL", "QLOITER", "mode 99"]),
+        ("ArduRover V4.5.7 (abc)", ["MANUAL", "LOITER", "CIRCLE", "RTL", "mode 19", "mode 99"]),
+        ("Rover V4.2.3 (abc)", ["MANUAL", "LOITER", "CIRCLE", "RTL", "mode 19", "mode 99"]),
+        ("ArduSub V4.1.2 (abc)", ["STABILIZE", "mode 5", "SURFACE", "mode 11", "MANUAL", "mode 99"]),
+        ("AntennaTracker V1.1.0 (abc)", ["MANUAL", "mode 5", "mode 9", "mode 11", "mode 19", "mode 99"]),
+        ("Blimp V4.2.0 (abc)", ["mode 0", "mode 5", "mode 9", "mode 11", "mode 19", "mode 99"]),
+        ("no firmware says this", ["mode 0", "mode 5", "mode 9", "mode 11", "mode 19", "mode 99"]),
+    ],
+)
+def test_modes_have_the_names_of_their_own_firmware(tmp_path: Path, firmware: str, expected: list[str]) -> None:
+    assert _modes(tmp_path, [("MSG", (0, firmware))]) == expected
+
+
+def test_the_firmware_is_in_ver_too(tmp_path: Path) -> None:
+    formats = {**ARDUPILOT, "VER": (180, "QZ", "TimeUS,FWS")}
+    assert _modes(tmp_path, [("VER", (0, "ArduPlane V4.5.7 (abc)"))], formats)[:2] == ["MANUAL", "FBWA"]
+
+
+def test_a_log_without_time_stamps_is_refused_with_the_reason(tmp_path: Path) -> None:
+    formats = {"ATT": (72, "cc", "Roll,Pitch"), "MSG": (33, "Z", "Message")}
+    rows: list[Row] = [("MSG", ("ArduCopter V3.0.1",)), *[("ATT", (1.0, 0.01 * k)) for k in range(200)]]
+    with pytest.raises(FlightError, match=r"time: .*no time stamps \(found ATT, .*firmware before 3\.1"):
+        _flight(tmp_path, dataflash(rows, formats))

@@ -158,6 +158,24 @@ def test_iterations_follow_the_intervals(share):
     assert main.notes == ()
 
 
+def test_without_a_line_signed_the_encodings_say_it(tmp_path):
+    """Gyros below zero were read as 4.3e9 deg/s, "problems: none". Times above 2^31 stay what they are."""
+    ramp = np.arange(64)
+    content = made.rotorflight(
+        {"gyroADC[0]": 5 - ramp, "accADC[1]": -ramp, "mixer[1]": -ramp, "motor[0]": -ramp}, start_us=3_000_000_000
+    )
+    line = next(line for line in content.split(b"\n") if line.startswith(b"H Field I signed"))
+    told = sp.read(saved(tmp_path, content))
+    untold = sp.read(saved(tmp_path, content.replace(line + b"\n", b"")))
+    assert untold.streams["blackbox"].identical(told.streams["blackbox"])
+    assert untold.provenance.damage == ()
+    assert np.rad2deg(untold.values("p").min()) == pytest.approx(-58.0)
+    # A header that lies about it is not believed in silence.
+    lie = sp.read(saved(tmp_path, content.replace(line, line.replace(b"1", b"0"))))
+    (said,) = [text for text in lie.provenance.damage if text.startswith("p:")]
+    assert "p: 58 of 64 samples (90.6 %) are impossible: found up to 4.29e+09 deg/s, expected 5.73e+03" in said
+
+
 # --- what a pilot sees ---
 def test_rotorflight_channels_signs_and_units(tmp_path):
     n = 64

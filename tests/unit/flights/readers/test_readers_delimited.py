@@ -57,8 +57,8 @@ def test_a_table_without_spaces_reads_as_one_with_them(tmp_path: Path) -> None:
     bare = read(_file(tmp_path, "time [s],u [m/s],v [m/s]\n" + "\n".join(rows)))
     wide = read(_file(tmp_path, "time [s],u [m/s],v [m/s]\n" + "\n".join(row.replace(",", " , ") for row in rows)))
     assert [bare.values(n).tolist() for n in "uv"] == [wide.values(n).tolist() for n in "uv"]
-    for cell in ("1_0", "five", ""):
-        with pytest.raises(FlightError, match=r"line 3 is not a number|not finite|missing|NaN"):
+    for cell in ("1_0", "five", "1.2.3"):
+        with pytest.raises(FlightError, match=r"line 3 is not a number"):
             read(_file(tmp_path, f"time [s],u [m/s],v [m/s]\n0,1,7\n0.5,{cell},8\n1,3,9\n"))
 
 
@@ -101,10 +101,8 @@ def test_bare_numbers_parted_by_spaces(tmp_path: Path) -> None:
 
 def test_units_as_an_argument(tmp_path: Path) -> None:
     path = _file(tmp_path, "time,phi\n0,90\n1,0\n")
-    # The whole option line is in the message, to be copied.
-    with pytest.raises(
-        UnitError, match=r"(?s)time, phi: have no unit, expected \[s\], \[rad\].*--unit time=s --unit phi=rad"
-    ):
+    # All of it is in the message, with the options to be copied.
+    with pytest.raises(UnitError, match=r"phi: has no unit, expected \[rad\].*time: has no unit.*=rad.*--unit time=s"):
         read(path)
     assert read(path, units={"time": "s", "phi": "deg"}).values("phi")[0] == pytest.approx(np.pi / 2)
 
@@ -118,11 +116,11 @@ def test_a_time_column_by_its_other_names(tmp_path: Path, head: str) -> None:
 
 @pytest.mark.parametrize("named", ["t", "time"])
 def test_the_unit_of_a_column_t_is_found_as_that_of_time(tmp_path: Path, named: str) -> None:
-    path = _file(tmp_path, "t,u [m/s]\n1600000000000,1\n1600000000020,2\n")
-    with pytest.raises(UnitError, match=r"time: has no unit.*--unit time=s"):
+    path = _file(tmp_path, "t,u [m/s]\n1600000000000,1\n1600000000100,2\n")
+    with pytest.raises(UnitError, match=r"time: has no unit.*may be ms \(10 Hz\) or us \(1e\+04 Hz\).*--unit time=s"):
         read(path)
     flight = read(path, units={named: "ms"})
-    assert np.diff(flight.time("u")) == pytest.approx([0.02], abs=1e-12)
+    assert np.diff(flight.time("u")) == pytest.approx([0.1], abs=1e-12)
     assert flight.epoch + flight.start == pytest.approx(1.6e9)
     with pytest.raises(UnitError, match="'m' is a unit of"):
         read(path, units={named: "m"})
@@ -137,7 +135,8 @@ def test_beside_a_column_time_t_is_a_channel(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("head", "asked"), [("T [s]", "'T'"), ("timestamp [s]", "'timestamp'"), ("Time [s],TIME [s]", "'Time' or 'TIME'")]
+    ("head", "asked"),
+    [("T [s],v [m/s]", "'T'"), ("tme [s],v [m/s]", "'tme'"), ("Time [s],TIME [s]", "'Time' or 'TIME'")],
 )
 def test_a_column_that_may_be_time_is_asked_about(tmp_path: Path, head: str, asked: str) -> None:
     """A capital T is a temperature as often, and of two times neither is chosen."""
@@ -174,17 +173,17 @@ BAD_TABLES = {
     "only time": ("time [s],\n0,\n1,\n", "no channel beside time"),
     "no rows": ("time [s],x [m]\n", "time: has no samples"),
     "one sample": ("time [s],x [m]\n0,1\n", "time: has one sample"),
-    "blank cell": ("time [s],x [m]\n0,1\n1,\n2,3\n", "x: 1 of 3 samples are not finite numbers, first at sample 1"),
-    "NaN": ("time [s],x [m]\n0,nan\n1,1\n", "x: 1 of 2 samples"),
+    "infinite": ("time [s],x [m]\n0,1\n1,inf\n2,3\n", "x: 1 of 3 samples are not finite numbers, first at sample 1"),
+    "one number": ("time [s],x [m]\n0,nan\n1,1\n", "x: no channel has two numbers"),
     "text": ("time [s],x [m]\n0,1\n1,abc\n", "x: 'abc' in line 3 is not a number"),
     "underscore": ("time [s],x [m]\n0,1_0\n1,1\n", "'1_0' in line 2"),
-    "cut off": ("time [s],x [m]\n0,1\n1\n", "line 3 has 1 cell, expected 2"),
+    "cut off": ("time [s],x [m]\n0,1\n1\n", r"has one sample.*line 3 has 1 cell, the header 2"),
     "backwards": ("time [s],x [m]\n0,1\n2,1\n1,1\n", "time: time goes backwards at sample 2"),
-    "duplicated": ("time [s],x [m]\n0,1\n0,1\n", "time: time repeats the stamp before it at sample 1"),
+    "duplicated": ("time [s],x [m]\n0,1\n0,2\n", "time: time repeats the stamp before it at sample 1"),
     "doubled name": ("time [s],x [m],x [m]\n0,1,1\n1,1,1\n", "x: the name stands twice"),
-    "nameless": ("time [s],,x [m]\n0,1,1\n1,1,1\n", "column 2 has no name"),
     "prose": ("Dear reader, this is no log.", "there is no time column"),
-    "decimal commas": ("time [s];phi [deg]\n0,0;1,5\n0,01;1,6\n", "time: '0,0' in line 2 .* with a point"),
+    "mixed decimals": ("time [s];phi [deg]\n0,0;1.5\n0,01;1.6\n", "time: '0,0' in line 2 .*with a comma in all cells"),
+    "late point": ("time [s];phi [deg]\n" + "0,5;1,5\n" * 60 + "9,0;1.6\n", r"phi: '1\.6 \(with a point\)' in line 62"),
     "only comments": ("# a, b\n", "holds no table"),
 }
 
@@ -203,7 +202,7 @@ def test_a_bad_table_is_named(tmp_path: Path, text: str, message: str) -> None:
         ({"chanels": {"time": {"column": "t"}}}, r"table \[channels\]"),
         ({"channels": {"time": "t"}}, "time: the mapping says 't'"),
         ({"channels": {"time": {"column": "nope"}}}, "there is no column 'nope'; the file has t, a"),
-        ({"channels": {"time": {"column": "t", "unit": "s"}, "phi": {"column": 9, "unit": "deg"}}}, "expected 9"),
+        ({"channels": {"time": {"column": "t", "unit": "s"}, "phi": {"column": 9, "unit": "deg"}}}, "no column 9"),
         ({"channels": {"time": {"column": "t", "unit": 3}}}, "unit = 3"),
         ({"channels": {"time": {"column": "t", "factor": "x"}}}, "factor = 'x'"),
         ({"channels": {"time": {"column": "t", "unit": "s"}, "phi": {"column": "a"}}}, "phi: has no unit"),

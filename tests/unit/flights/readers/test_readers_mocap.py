@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +87,7 @@ def test_poses_are_found_behind_another_block(tmp_path: Path) -> None:
 def test_occluded_samples_are_dropped_and_counted(tmp_path: Path, lost: str) -> None:
     flight = read(_file(tmp_path, vicon(["1,0,0.1,0,0,1,1,1", lost, "3,0,0.1,0,0,1,1,2"])))
     assert flight.time("x").tolist() == [0.0, 0.02]
-    assert any("1 of 3 samples dropped: 'coax:coax' was not seen" in note for note in flight.provenance.notes)
+    assert flight.provenance.damage == ("1 of 3 samples (33.3 %) are lost: 'coax:coax' was not seen (occlusion)",)
 
 
 BAD_VICON = {
@@ -141,7 +142,7 @@ def test_motive_euler_angles_and_the_newer_header(tmp_path: Path) -> None:
     )
     flight = read(_file(tmp_path, header + "0,0.0,10,0,0,0,1,0\n1,0.01,,,,,,\n2,0.02,0,0,10,0,1,0\n"))
     assert np.rad2deg(_euler(flight)) == pytest.approx(np.array([[10, 0, 0], [0, 10, 0]]), abs=1e-9)
-    assert any("1 of 3 samples dropped" in note for note in flight.provenance.notes)
+    assert any("1 of 3 samples (33.3 %) are lost" in said for said in flight.provenance.damage)
 
 
 BAD_MOTIVE = {
@@ -150,7 +151,7 @@ BAD_MOTIVE = {
     "markers only": (motive([]).replace("Rigid Body,", "Marker,"), "no rigid body"),
     "no length unit": (motive(["0,0,0,0,0,1,0,0,0", "1,1,0,0,0,1,0,0,0"], first="Rotation Type,Quaternion"), "unit ''"),
     "no unit quaternion": (motive(["0,0,0,0,0,3,0,0,0", "1,1,0,0,0,3,0,0,0"]), "norm is off 1 by 2"),
-    "duplicated": (motive(["0,0,0,0,0,1,0,0,0", "1,0,0,0,0,1,0,0,0"]), "repeats the stamp"),
+    "duplicated": (motive(["0,0,0,0,0,1,0,0,0", "1,0,0,0,0,1,1,0,0"]), "repeats the stamp"),
 }
 
 
@@ -188,3 +189,15 @@ def test_a_wrong_table_in_the_mapping(tmp_path: Path) -> None:
         read(path, mapping={"mocap": {"rotation": 3}})
     with pytest.raises(UnitError, match=r"unit 'deg' is a unit of"):
         read(_file(tmp_path, vicon(["1,0,0,0,0,1,1,1", "2,0,0,0,0,1,1,1"])), units={"position": "deg"})
+
+
+@pytest.mark.parametrize("make", [vicon, motive])
+def test_rows_longer_than_the_heads_are_never_read(tmp_path: Path, make: Callable[[list[str]], str]) -> None:
+    """A column more in the middle would turn a rotation into a position."""
+    row = "{k},{k},0,0,0,1,{k},2" if make is vicon else "{k},0.0{k},0,0,0,1,{k},2,3,0,0,0,0"
+    rows = [row.format(k=k) for k in range(1, 7)]
+    whole = read(_file(tmp_path, make(rows)))
+    flight = read(_file(tmp_path, make([*rows[:4], *[f"{line},0" for line in rows[4:]]])))
+    assert flight.values("x").tolist() == whole.values("x").tolist()[:4]
+    assert "2 of 6 rows (33.3 %) are lost" in flight.provenance.damage[0]
+    assert whole.provenance.damage == ()

@@ -89,3 +89,11 @@ def test_numbers_that_are_none_and_times_that_go_back_are_refused(tmp_path: Path
     with pytest.raises(FlightError, match="goes backwards"):
         read(write(tmp_path / "b.csv", made))
     assert read(tmp_path / "b.csv", bad_stamps="drop").time("x").size == N - 1
+
+
+def test_rows_of_another_layout_are_never_read(tmp_path: Path) -> None:
+    lines = write(tmp_path / "a.csv", columns()).read_text().splitlines()
+    (tmp_path / "b.csv").write_text("\n".join([*lines[:21], *[f"7,{line}" for line in lines[21:]], ""]))
+    flight = read(tmp_path / "b.csv")
+    assert flight.time("x").size == 20
+    assert "20 of 40 rows (50 %) are lost: line 22 has" in flight.provenance.damage[0]

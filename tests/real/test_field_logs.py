@@ -1,0 +1,60 @@
+"""Logs as people have them (`field/` of the real data): what each folder's README calls right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from swashplate.errors import FlightError
+
+
+@pytest.fixture
+def field(shared_data: Path) -> Path:
+    return shared_data / "field"
+
+
+# ---- 02: firmware before 3.1 -----------------------------------------------------------------------------------------
+def test_a_log_without_stamps_says_so(field: Path) -> None:
+    with pytest.raises(FlightError, match=r"no time stamps.*firmware before 3\.1") as told:
+        sp.read(field / "02-no-time-old-text-log" / "tradheli_v301.log")
+    assert "LOG_BITMASK" not in str(told.value)
+    assert "Copy" not in str(told.value)
+
+
+# ---- 03: modes of other vehicles -------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("log", "modes"),
+    [
+        ("plane", ["MANUAL", "FBWA", "AUTO", "RTL", "LOITER", "STABILIZE", "QLOITER"]),
+        ("rover", ["MANUAL", "HOLD", "AUTO", "RTL", "GUIDED"]),
+        ("sub", ["MANUAL", "STABILIZE", "ALT_HOLD", "SURFACE", "POSHOLD"]),
+    ],
+)
+def test_modes_of_planes_rovers_and_subs(field: Path, log: str, modes: list[str]) -> None:
+    events = sp.read(field / "03-plane-modes" / f"{log}.bin").provenance.events
+    assert [event.text for event in events if event.kind == "mode"] == modes
+
+
+# ---- 05: stamps in ROS bags ------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("bag", "lost"), [("duplicate", 50.0), ("restart", 50.0), ("disorder", 2.0), ("ok_mcap", 0.0), ("ok_sqlite", 0.0)]
+)
+def test_what_a_bag_loses_is_a_problem_with_its_share(field: Path, bag: str, lost: float) -> None:
+    pytest.importorskip("rosbags")
+    flight = sp.read(field / "05-ros" / bag)
+    assert bool(flight.provenance.damage) == (lost > 0.0)
+    if lost:
+        assert f"({lost:g} %) are lost" in flight.provenance.damage[0]
+        assert flight.provenance.damage[0] in sp.inspect(flight).problems
+
+
+# ---- 19: another firmware's Blackbox ---------------------------------------------------------------------------------
+def test_an_inav_log(field: Path) -> None:
+    flight = sp.read(field / "19-inav" / "inav.bbl")
+    assert {"p", "phi", "theta", "vbat", "navPos_0", "navPos_2"} <= set(flight.channels)
+    assert np.median(flight.values("altitude_baro")) == pytest.approx(1.2)
+    assert flight["vbat"].attrs["units"] == ""
+    assert flight.provenance.damage == ()
