@@ -13,8 +13,6 @@ EXTRA_OF: Mapping[str, str] = {
     "jax": "model",
     "jaxlib": "model",
     "jaxtyping": "model",
-    "diffrax": "model",
-    "equinox": "model",
     "control": "model",
     "matplotlib": "plot",
     "casadi": "model",

@@ -162,7 +162,7 @@ def test_the_extras_that_messages_name_are_the_projects() -> None:
     others = {extra: names for extra, names in extras.items() if extra != "cuda"}
     brought = {name.replace("-", "_"): extra for extra, names in others.items() for name in _plain(names)}
     assert {name: EXTRA_OF[name] for name in brought} == brought
-    assert set(EXTRA_OF) - set(brought) == {"jaxlib", "equinox"}, "those come along with jax and diffrax"
+    assert set(EXTRA_OF) - set(brought) == {"jaxlib"}, "this comes along with jax"
     assert not set(_plain(project["dependencies"])) & set(EXTRA_OF)
     (every,) = extras["all"]
     assert sorted(every[len("swashplate[") : -1].split(",")) == sorted(set(extras) - {"all", "cuda"})

@@ -30,7 +30,7 @@ if __name__ == "__main__":  # the tests' own modules (hfb320, r50, ...) lie in t
 from . import cases  # noqa: F401 (fills CASES)
 from .case import CASES, ENVIRONMENT, FROZEN, RELATIVE, ROOT, SMALL, Case, Values, deviations, floor_of, plain
 
-PACKAGES = ("numpy", "scipy", "jax", "jaxlib", "diffrax", "casadi", "control")
+PACKAGES = ("numpy", "scipy", "jax", "jaxlib", "casadi", "control")
 
 
 def data_folder() -> Path | None:

@@ -14,7 +14,7 @@ import pytest
 import swashplate
 from swashplate.jax_on_demand import jax, jit, jnp
 
-_NEEDING = ("jax", "equinox", "diffrax", "blackjax")
+_NEEDING = ("jax", "blackjax")
 _NAMED = re.compile(rf"^\s*(import\s.*\b|from\s+)({'|'.join(_NEEDING)})\b", re.MULTILINE)
 """A line that may import one of them, in code or in a text."""
 SOURCE = Path(swashplate.__file__).parent
