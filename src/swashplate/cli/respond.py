@@ -47,8 +47,8 @@ def respond(
 ) -> None:
     """Frequency responses of outputs to inputs: conditioned on all inputs, composite over windows, with errors.
 
-    Writes responses.nc, responses.json and report.html to --out. What could not be computed is named with exit code 2;
-    the rest is written and marked.
+    Writes responses.nc, responses.json and report.html to --out. A response that cannot be given is named with its
+    reason. Exit code 2 if none can be given, if a named channel never moves, or if a log is damaged.
     """
     import swashplate as sp
     from swashplate.atomic import write_json

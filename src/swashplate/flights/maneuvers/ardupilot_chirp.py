@@ -30,6 +30,18 @@ AXES: Mapping[int, tuple[str, str]] = {
 }  # fmt: skip
 """SID_AXIS: where the chirp enters, and the unit of its magnitude."""
 
+MOVED: Mapping[int, str] = {
+    axis: channel
+    for channel, axes in (
+        ("mixer_roll", (1, 4, 7, 10, 14, 16, 18)),
+        ("mixer_pitch", (2, 5, 8, 11, 15, 17, 19)),
+        ("mixer_yaw", (3, 6, 9, 12)),
+        ("mixer_collective", (13,)),
+    )
+    for axis in axes
+}
+"""The command that a chirp at SID_AXIS is added to (10 to 13), or reaches first through the loops before it."""
+
 MIXER: Mapping[str, int] = {"roll": 10, "pitch": 11, "yaw": 12, "heave": 13}
 """Injection behind the rate controller: the loop answers least there (Tischler and Remple 2012, sec. 5.8)."""
 

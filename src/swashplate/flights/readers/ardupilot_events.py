@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
+from swashplate.flights.maneuvers.ardupilot_chirp import MOVED, START_DELAY, Chirp
 from swashplate.flights.provenance import Event
 from swashplate.flights.readers.ardupilot_modes import is_firmware, mode_name
 from swashplate.flights.readers.dataflash import Messages, MessageTable
@@ -122,6 +122,7 @@ def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
         chirp = Chirp(axis=int(axis), **numbers)
         start, stop = _on_the_clock(data, chirp, begins[i], last[i])
         details: dict[str, Any] = {**chirp.as_details(), "start": start, "stop": stop, "seen": min(stop, end)}
+        details |= {"channel": MOVED[chirp.axis]} if chirp.axis in MOVED else {}
         words = f"{chirp.axis_name}, {chirp.start_hz:g}-{chirp.stop_hz:g} Hz in {chirp.record:g} s"
         events.append(Event(float(begins[i]), "sweep", words, details))
         reached = _reached(data, begins[i], last[i])

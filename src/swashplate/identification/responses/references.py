@@ -1,66 +1,250 @@
-"""Which part of a reference belongs to which sweep: one signal that sweeps axis after axis is a reference for each."""
+"""What serves as the references of the inputs: their own sweeps only, and which other inputs have to be held still."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Flight
-from swashplate.identification.responses.spectra import Signals
+from swashplate.flights.provenance import Event
+from swashplate.identification.responses.copies import broken_at
+from swashplate.identification.responses.excitations import (
+    Excitation,
+    Told,
+    answering_words,
+    axis_of,
+    channel_of,
+    only_answering,
+    owners_of,
+    times_of,
+)
+from swashplate.identification.responses.own_references import own_references
+from swashplate.identification.responses.spectra import Signals, spectral_matrix
+
+_LINES, _WINDOWS = 40, 8
+"""Frequencies, and windows in a stretch, by which it is seen how far a command follows a recorded reference."""
+_FOLLOWS = 0.3
+"""Share of an unnamed command's power that must follow a recorded reference for it to be this command's."""
+_LEAST = 0.1
+"""Share of a sweep that must lie in a record to count there."""
+_SILENT = 1e-3
+"""Power of an injected signal outside the sweeps that the log tells of, over that within."""
 
 
-def sweeps_of(flights: Sequence[Flight]) -> list[NDArray[np.int64]]:
-    """For every unbroken piece of the flights, which sweep each sample belongs to (-1 for none), shape (n,) each.
+@dataclass(frozen=True)
+class References:
+    """What serves as references.
 
-    By axis, where all logs tell of their sweeps and more than one axis was swept; else every flight is one sweep (one
-    log per swept axis).
+    Attributes:
+        beside: inputs that are not named but were swept: the responses are conditioned on them.
+        columns: for every record, shape (n, n_references).
+        swept: whether each input, named and beside, has a sweep of its own.
+        own: the place among the references of that of each input, where it has one.
+        sweeps: of the inputs, in words.
+        unused: sweeps of commands that are not there, in words.
+        answering: named inputs that only answer the sweeps of others.
+        tracked: whether the sweeps are their own references.
     """
-    told = [[event.details for event in flight.provenance.events if event.kind == "sweep"] for flight in flights]
-    seen = [
-        [d for d in one if "axis" in d and float(d["start"]) < flight.stop and float(d["stop"]) > flight.start]
-        for one, flight in zip(told, flights, strict=True)
-    ]
-    axes = sorted({int(d["axis"]) for one in seen for d in one})
-    labels = []
-    for number, (flight, sweeps) in enumerate(zip(flights, seen, strict=True)):
-        for piece in flight.split():
-            time = piece.time(piece.channels[0])
-            own = np.full(time.size, number, dtype=np.int64)
-            if all(seen) and len(axes) > 1:
-                own[:] = -1
-                for d in sweeps:
-                    own[(time >= float(d["start"])) & (time <= float(d["stop"]))] = axes.index(int(d["axis"]))
-            labels.append(own)
-    return labels
+
+    beside: tuple[str, ...]
+    columns: tuple[Array, ...]
+    swept: tuple[bool, ...]
+    own: Mapping[int, int]
+    sweeps: tuple[str, ...]
+    unused: tuple[str, ...]
+    answering: tuple[str, ...]
+    tracked: bool
+
+    def broken_loops(
+        self, pieces: Sequence[Signals], place: Mapping[str, int], whole: Sequence[str], outputs: Sequence[str]
+    ) -> tuple[str, ...]:
+        """The outputs that are the rest of a named input beside its own reference: loops broken there.
+
+        Args:
+            pieces: records. place: columns by name. whole: the inputs, named and beside. outputs: names.
+        """
+        fed = {name: place[name] for name in outputs}
+        found = [
+            broken_at(pieces, [columns[:, self.own[i]] for columns in self.columns], place[name], fed)
+            for i, name in enumerate(whole[: len(whole) - len(self.beside)])
+            if i in self.own
+        ]
+        return tuple(dict.fromkeys(name for names in found for name in names))
+
+    def words(self, hertz: Array, held: NDArray[np.bool_], outputs: Sequence[str], loops: Sequence[str]) -> list[str]:
+        """What a reader must know of sweeps that the named inputs do not own.
+
+        Args:
+            hertz: frequencies. held: where each input is held still, shape (n_f, n_inputs).
+            outputs: names. loops: those that are loops broken at an input.
+        """
+        aircraft = ", ".join(name for name in outputs if name not in loops)
+        said = []
+        if loops:
+            said.append(
+                f"{', '.join(loops)}: what the input is made of beside its sweep. The response is that of the loop "
+                "broken there; loops of inputs that are not named stay closed."
+            )
+        for name, still in zip(self.beside, held[:, len(self.swept) - len(self.beside) :].T, strict=True):
+            inside = hertz[still] if aircraft else hertz[:0]
+            words = f"'{name}' was swept too."
+            if inside.size:
+                words += f" In the responses of {aircraft} it is held still"
+                words += "." if still.all() else f" from {inside.min():.3g} to {inside.max():.3g} Hz."
+            if inside.size < hertz.size:
+                words += " Elsewhere" if inside.size else " Its stretch is left out, and else"
+                words += " its loop moves it along."
+            said.append(f"{words} Add it to --inputs for the responses to it.")
+        if self.unused:
+            said.append(f"sweeps of commands that are not in these records were not used: {'; '.join(self.unused)}.")
+        return said
 
 
-def reference_columns(
-    sweep: Sequence[NDArray[np.int64]], pieces: Sequence[Signals], first: int, count: int, inputs: tuple[str, ...]
-) -> list[Array]:
-    """The references of each piece; a single one is split by sweep where that gives one per input.
+def references_of(
+    pieces: Sequence[Signals],
+    told: Sequence[Told],
+    commands: Mapping[str, int],
+    named: int,
+    recorded: Mapping[str, int],
+    *,
+    called: Mapping[str, str],
+) -> References | None:
+    """The references of the named inputs and of what was swept beside them; None where nothing serves.
+
+    A recorded reference that is silent outside the log's sweeps is split by them; another one by flight, because one
+    log per axis is how axes are swept. Several recorded references stay as they are.
 
     Args:
-        sweep: from `sweeps_of`, for these pieces.
-        pieces: records; the references begin at column `first`, and are `count`.
-        inputs: names.
+        pieces: records. told: what the log says of each.
+        commands: their columns in the records by name; the first `named` are the inputs that were asked for.
+        recorded: columns of recorded references by name; none where the sweeps themselves serve.
+        called: the log's names of commands that were given others.
 
     Raises:
-        FlightError: fewer references than inputs.
+        FlightError: fewer references than inputs, or sweeps of other commands only.
     """
-    columns = [piece.values[:, first : first + count] for piece in pieces]
-    flown = np.array(sorted({int(k) for labels in sweep for k in np.unique(labels) if k >= 0}))
-    if count == 1 and len(inputs) > 1 and flown.size >= len(inputs):
-        columns = [column * (labels[:, None] == flown) for column, labels in zip(columns, sweep, strict=True)]
-    if columns[0].shape[1] < len(inputs):
+    names, places = list(commands), list(commands.values())
+    inputs = names[:named]
+    groups = [_recorded(pieces, told, places, named, column) for column in recorded.values()]
+    excitations = [one for group in groups for one in group] if recorded else own_references(pieces, told, places)
+    if not excitations:
+        return None
+    owners = owners_of(excitations, names, named, called=called)
+    # Another recorded reference, as a set-point, may move what no sweep does.
+    by_log = not recorded or all(one.channel for one in excitations)
+    answering = only_answering(told, inputs, called=called) if by_log else ()
+    if len(answering) == named:
         raise FlightError(
-            f"{columns[0].shape[1]} reference(s) cannot tell {len(inputs)} inputs apart: {max(flown.size, 1)} sweep(s) "
-            "found.",
-            channel=", ".join(inputs),
+            answering_words(told, answering).removeprefix(f"{', '.join(answering)}: "),
+            channel=", ".join(answering),
+            hint="Name the command that was swept, or fly a sweep of this axis. --direct without --references gives "
+            "what the records show, as it is.",
+        )
+    beside = tuple(name for name in names[named:] if name in owners)
+    whole = (*inputs, *beside)
+    if not recorded and not any(name in owners for name in whole):
+        return None
+    swept = tuple(name in owners for name in whole)
+    columns: list[list[Array]] = []  # for every reference, one a record
+    own: dict[int, int] = {}
+    owned = list(zip(excitations, owners, strict=True))
+    for group, place in zip(groups, recorded.values(), strict=True) if recorded else ((excitations, -1),):
+        if len(recorded) > 1 and not all(one.axis for one in group):
+            columns.append([piece.values[:, place] for piece in pieces])
+            continue
+        for i, name in enumerate(whole):
+            parts = [np.zeros(len(piece.values)) for piece in pieces]
+            mine = [one for one, owner in owned if owner == name and one in group]
+            for one in mine:
+                for k, part in one.references.items():
+                    parts[k] += part[:, names.index(name)]
+            if not mine and not recorded:  # an input without a sweep is its own reference
+                parts = [piece.values[:, places[names.index(name)]] for piece in pieces]
+            if mine or not recorded:
+                own |= {i: len(columns)} if mine else {}
+                columns.append(parts)
+    found = References(
+        beside,
+        tuple(np.stack(parts, axis=1) for parts in zip(*columns, strict=True)),
+        swept,
+        own,
+        tuple(f"{owner}: {one.words}" for one, owner in owned if owner in whole),
+        tuple(f"{one.axis}: {one.words}" for one, owner in owned if owner not in whole),
+        answering,
+        tracked=not recorded,
+    )
+    if len(columns) < len(whole):
+        lacking = ", ".join(f"'{name}'" for name, known in zip(whole, swept, strict=True) if not known)
+        raise FlightError(
+            f"{len(columns)} reference(s) cannot tell {len(whole)} inputs apart"
+            + (f": no sweep of {lacking} was found." if lacking else "."),
+            channel=", ".join(whole),
             hint="Give as many independent references as inputs, or sweeps of each axis, one after the other or in "
             "logs of their own.",
         )
-    return columns
+    return found
+
+
+def _recorded(
+    pieces: Sequence[Signals], told: Sequence[Told], commands: Sequence[int], named: int, column: int
+) -> list[Excitation]:
+    """A recorded reference, split by the log's sweeps where it is one of them, otherwise by flight."""
+    stretches: list[tuple[int, Event, NDArray[np.bool_]]] = []
+    loud = quiet = 0.0
+    for k, (piece, (_, events)) in enumerate(zip(pieces, told, strict=True)):
+        time = piece.start + np.arange(len(piece.values)) * piece.dt
+        rest = np.ones(time.size, dtype=bool)
+        for event in events:
+            start, stop = times_of(event)
+            inside = (time >= start) & (time <= stop)
+            rest &= ~inside
+            if inside.sum() * piece.dt >= _LEAST * (stop - start):
+                stretches.append((k, event, inside))
+        power = piece.values[:, column] ** 2
+        loud, quiet = loud + float(power[~rest].sum()), quiet + float(power[rest].sum())
+    if stretches and quiet <= _SILENT * loud:
+        return [_followed({k: (pieces[k], inside)}, commands, named, column, event) for k, event, inside in stretches]
+    flights: dict[int, dict[int, tuple[Signals, NDArray[np.bool_]]]] = {}
+    for k, (piece, (flight, _)) in enumerate(zip(pieces, told, strict=True)):
+        flights.setdefault(flight, {})[k] = piece, np.ones(len(piece.values), dtype=bool)
+    return [_followed(parts, commands, named, column, None) for parts in flights.values()]
+
+
+def _followed(
+    parts: Mapping[int, tuple[Signals, NDArray[np.bool_]]],
+    commands: Sequence[int],
+    named: int,
+    column: int,
+    event: Event | None,
+) -> Excitation:
+    """A stretch of a recorded reference with what each command has of it, by their cross spectra."""
+    cut = [replace(piece, values=piece.values[inside][:, [*commands, column]]) for piece, inside in parts.values()]
+    window = max(piece.duration for piece in cut) / _WINDOWS
+    omega = 2.0 * np.pi * np.geomspace(2.0 / window, 0.25 / cut[0].dt, _LINES)
+    matrix = spectral_matrix(cut, omega, window=window, overlap=0.75)
+    size = share = np.zeros(len(commands))
+    if matrix is not None:
+        width, g = np.gradient(omega), matrix.values
+        auto = np.diagonal(g, axis1=1, axis2=2).real
+        power = width @ (np.abs(g[:, :-1, -1]) ** 2 / np.maximum(auto[:, -1:], 1e-300))
+        share = power / np.maximum(width @ auto[:, :-1], 1e-300)
+        size = np.sqrt(np.where((share >= _FOLLOWS) | (np.arange(share.size) < named), power, 0.0))
+    records = list(parts.values())
+    (first, begun), (last, _) = records[0], records[-1]
+    start = first.start + int(np.argmax(begun)) * first.dt
+    stop = (start if last is first else last.start) + cut[-1].duration
+    return Excitation(
+        references={
+            k: np.repeat((piece.values[:, column] * inside)[:, None], len(commands), axis=1)
+            for k, (piece, inside) in parts.items()
+        },
+        size=size,
+        share=share,
+        words=f"{start:.1f} to {stop:.1f} s, as recorded",
+        axis="" if event is None else axis_of(event),
+        channel="" if event is None else channel_of(event),
+    )

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.uniform_records import renamed_channels
 from swashplate.flights.consistency import refuse_inconsistent
@@ -26,18 +23,18 @@ from swashplate.identification.core.record_facts import (
 from swashplate.identification.core.sources import hashes, sources_of
 from swashplate.identification.responses import response_warnings
 from swashplate.identification.responses.answers import answer_words
-from swashplate.identification.responses.composite import composite
-from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.identification.responses.input_shares import own_shares
-from swashplate.identification.responses.multi_input import (
-    Conditioned,
-    condition_spectra,
-    random_error,
+from swashplate.identification.responses.copies import (
+    copies_of,
+    copy_words,
+    refuse_copied_references,
+    without_copies,
 )
-from swashplate.identification.responses.own_references import own_references
-from swashplate.identification.responses.references import reference_columns, sweeps_of
-from swashplate.identification.responses.resolution import LONGER, TWICED, blur, first_guess, without
-from swashplate.identification.responses.spectra import Signals, SpectralMatrix, signals, spectral_matrix
+from swashplate.identification.responses.estimate import Beside, Question, estimate_beside
+from swashplate.identification.responses.excitations import answering_words, only_answering, told_sweeps
+from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.responses.references import references_of
+from swashplate.identification.responses.resolution import LONGER, blur
+from swashplate.identification.responses.spectra import signals
 from swashplate.identification.responses.window_lengths import Windows, choose_windows
 
 LINES_PER_DECADE = 50
@@ -47,9 +44,6 @@ SLOW = 1.0 / 3.0
 """Share of a channel's own logging rate up to which it is used: beyond, samples fold and what is between is guessed."""
 SHORTEST = 0.2
 """Pieces shorter than this share of the longest are left out: they would shorten all windows."""
-PERIODS = 4.0
-"""Periods that a window must hold for it to count beside longer ones. The book trusts it from one period on; measured
-on an R-50 in hover, it is off by 3 dB at two periods and by 0.1 dB at four. Only the longest goes down to one."""
 
 
 def respond(
@@ -68,27 +62,31 @@ def respond(
     """Frequency responses of outputs to inputs, all inputs conditioned on each other, composite over windows.
 
     A sweep is its own reference: without a recorded one, every sweep that the logs tell of or that is seen in the
-    inputs is followed along its own frequency, and what follows it serves as the reference (`own_references`). The
+    commands is followed along its own frequency, and what follows it serves as the reference (`own_references`). The
     direct estimate is kept beside it, and where the two differ by more than their errors, a warning says so.
+
+    Each input has its own sweeps only (`excitations`). What was swept but not named is held still where it can be told
+    apart (`estimate_beside`). An output that is a copy of an input has no response to it (`copies`).
 
     Args:
         flights: conditioned to one rate; each unbroken piece is a record.
         inputs, outputs: channel names.
         references: excitations that no loop feeds back (an autopilot's injected sweep): the joint input-output estimate
             is made, and compared with the direct one. One reference that sweeps one axis after the other, in one flight
-            or several, counts as one per axis (`sweeps_of`).
+            or several, counts as one per axis.
         band: lowest and highest frequency [Hz]; by default two periods of the longest window to a tenth of the rate. It
             ends where the slowest channel's own rate does not carry further.
         windows: lengths [s]; by the book's rules where None, with a longer one where those blur a clear response.
         overlap: of neighbouring windows.
-        bystanders: commands left out of `inputs` that may have moved along; by default every other command (unit "1")
-            in the flights. They only warn.
+        bystanders: commands left out of `inputs` that may have been swept or have moved along; by default every other
+            command (unit "1") in the flights.
         lines: frequencies per decade.
         direct: the direct estimate alone, as one needs it where the sweeps are none of a pilot or program.
 
     Raises:
-        FlightError: no channel or no record to work on, or a raw flight whose channels contradict each other; messages
-            name them.
+        FlightError: no channel or no record to work on, inputs that no sweep moved while others were swept, a reference
+            that is a copy of an input or output, or a raw flight whose channels contradict each other; messages name
+            them.
     """
     flights = as_flights(flights)
     inputs, outputs = tuple(inputs), tuple(outputs)
@@ -109,24 +107,30 @@ def respond(
         if not flight.history:  # as read; whatever conditions a flight checks it itself
             refuse_inconsistent(flight)
     others = bystanders_of(flights, (*inputs, *outputs, *references)) if bystanders is None else tuple(bystanders)
-    pieces = signals(flights, (*inputs, *outputs, *references, *others))
-    sweep = sweeps_of(flights)
+    pieces, logged = signals(flights, (*inputs, *outputs, *references, *others)), told_sweeps(flights)
     longest = max(piece.duration for piece in pieces)
     kept = [k for k, piece in enumerate(pieces) if piece.duration >= SHORTEST * longest]
     scraps = [piece.name for k, piece in enumerate(pieces) if k not in kept]
-    tracked = None if references or direct else own_references(flights, pieces, inputs)
-    pieces, sweep = [pieces[k] for k in kept], [sweep[k] for k in kept]
-    n = len(inputs) + len(outputs)
-    own = [replace(piece, values=piece.values[:, :n]) for piece in pieces]
-    if references or tracked:
-        columns = (
-            [tracked.columns[k] for k in kept]
-            if tracked
-            else reference_columns(sweep, pieces, n, len(references), inputs)
-        )
+    pieces, logged = [pieces[k] for k in kept], [logged[k] for k in kept]
+    place = {name: k for k, name in enumerate((*inputs, *outputs, *references, *others))}
+    commands = {name: place[name] for name in (*inputs, *others)}
+    recorded = {name: place[name] for name in references}
+    fed = {name: place[name] for name in (*inputs, *outputs)}
+    refuse_copied_references(pieces, recorded, fed)
+    copies = copies_of(pieces, *({name: place[name] for name in names} for names in (inputs, outputs)))
+    called, moved = renamed_channels(flights, commands), None
+    if references or not direct:
+        moved = references_of(pieces, logged, commands, len(inputs), recorded, called=called)
+    answering = moved.answering if moved else only_answering(logged, inputs, called=called)
+    # What was swept beside the named inputs is held still with them; the named ones are given.
+    whole = (*inputs, *(moved.beside if moved else ()))
+    n = len(whole) + len(outputs)
+    channels = [place[name] for name in (*whole, *outputs)]
+    own = [replace(piece, values=piece.values.take(channels, axis=1)) for piece in pieces]
+    if moved:
         own = [
             replace(piece, values=np.concatenate([piece.values, c], axis=1))
-            for piece, c in zip(own, columns, strict=True)
+            for piece, c in zip(own, moved.columns, strict=True)
         ]
     rate = 1.0 / pieces[0].dt
     highest = min(band[1], 0.499 * rate) if band else rate / 10.0
@@ -141,19 +145,23 @@ def respond(
     chosen = choose_windows([piece.duration for piece in pieces], highest)
     if windows is not None:
         chosen = Windows(tuple(sorted((float(w) for w in windows), reverse=True)), ())
-    question = _Question(inputs, outputs, own[0].values.shape[1] - n, lines, tracked is not None)
+    question = Question(whole, outputs, own[0].values.shape[1] - n, lines, moved is not None and moved.tracked)
     limits = (band[0] if band else None, highest)
-    estimate = _estimate(own, chosen.lengths, overlap, limits, question)
-    half, words = min(piece.duration for piece in pieces) / 2.0, blur(estimate.blurred, estimate.made)
+    loops = moved.broken_loops(pieces, place, whole, outputs) if moved else ()
+    aside = {i: k for i, k in moved.own.items() if i >= len(inputs)} if moved else {}
+    beside = Beside(aside, [outputs.index(name) for name in loops])
+    estimate = estimate_beside(own, chosen.lengths, overlap, limits, question, beside)
+    half = min(piece.duration for piece in pieces) / 2.0
+    words = blur(*(each.select(outputs, inputs) for each in (estimate.blurred, estimate.made)))
     blur_words: list[str] = []
     if words and half >= LONGER * chosen.lengths[0]:
         words = f"windows of up to {chosen.lengths[0]:.3g} s {words}"
         if windows is None:
-            estimate = _estimate(own, (half, *chosen.lengths), overlap, limits, question)
+            estimate = estimate_beside(own, (half, *chosen.lengths), overlap, limits, question, beside)
             blur_words = [f"{words}; one of {half:.3g} s, half the shortest record, was added."]
         else:
             blur_words = [f"{words}: something of it may be left. Longer windows (--windows {half:.3g},...) help."]
-    omega, matrices, notes, blurred, made = estimate
+    omega, matrices, notes, blurred, made, free, held = estimate
     if scraps:
         notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
     if band and band[1] > highest and not slow_words:
@@ -171,30 +179,55 @@ def respond(
     if not question.references and not told:
         answers = answer_words(pieces, inputs, outputs)
         problems += [] if answers and any(map(sweeps, flights)) else answers
-    if question.references:
+    if free is not None:
         # Both as the windows blur them, so that only the loop tells them apart.
-        beside = _composed(matrices, omega, replace(question, references=0), [None] * len(matrices))
-        biased = response_warnings.biased_by_feedback(blurred, beside)
-        warnings += response_warnings.bias_words(blurred, beside, biased)
-        made = replace(made, direct=beside.response, direct_error=beside.error)
-        if tracked:
-            made, words_of_unswept = response_warnings.without_unswept(made, tracked.swept, biased)
+        biased = response_warnings.biased_by_feedback(blurred, free)
+        named = biased[:, :, : len(inputs)]
+        warnings += response_warnings.bias_words(blurred.select(outputs, inputs), free, named)
+        made = replace(made, direct=free.response, direct_error=free.error)
+        if moved and moved.tracked:
+            known = [has or name in answering for has, name in zip(moved.swept, whole, strict=True)]
+            made, words_of_unswept = response_warnings.without_unswept(made, known, biased)
             warnings += words_of_unswept
+    made = without_copies(made, copies)
+    if moved and answering:
+        response = made.response.copy()
+        response[:, :, [whole.index(name) for name in answering]] = np.nan
+        made = replace(made, response=response)
     # The window that was added counts only where its own error says so.
     warnings += response_warnings.few_averages(matrices[len(blur_words) if windows is None else 0 :])
     warnings += blur_words
-    warnings += response_warnings.mixing_words(made)
+    warnings += response_warnings.mixing_words(made, named=len(inputs))
+    silent = response_warnings.still(flights, (*whole, *outputs))
+    silent = (*silent, *whole[len(inputs) :], *(copy.other for copy in copies))
+    lacking = [*copy_words(copies), *response_warnings.correlated(made, dead=silent)]
+    lacking += [answering_words(logged, answering)] if answering else []
+    unswept = [name for name, known in zip(whole, moved.swept, strict=True) if not known] if moved else []
+    lacking += response_warnings.untold(made, dead=(*silent, *unswept))
+    made = made.select(outputs, inputs)
     warnings += response_warnings.lead_words(made)
-    unmoved = response_warnings.still(flights, (*inputs, *outputs))
-    problems += response_warnings.correlated(made, dead=unmoved)
-    warnings += response_warnings.untold(made, dead=unmoved)
-    problems += response_warnings.incoherent(made)
+    lacking += response_warnings.incoherent(made)
+    # A response that cannot be given is an error only where nothing else is given.
+    given = any(made.band(output, name) for output in outputs for name in inputs)
+    warnings, problems = (warnings + lacking, problems) if given else (warnings, problems + lacking)
+    if moved:
+        warnings += moved.words(omega / TWO_PI, held, outputs, loops)
     if not references:
-        axes = len({int(k) for labels in sweep for k in np.unique(labels) if k >= 0})
-        warnings += response_warnings.unused_references(flights, inputs, names=INJECTED, axes=axes)
-    if others and not references and not all(name.startswith(INJECTED) for name in inputs):
+        axes = max(len({event.details["axis"] for one in logged for event in one.sweeps}), len(flights))
+        warnings += response_warnings.unused_references(flights, whole, names=INJECTED, axes=axes)
+    rest = [name for name in others if name not in whole]
+    if rest and not all(name.startswith(INJECTED) for name in inputs):
+        channels = [*channels, *(place[name] for name in rest)]
         warnings += response_warnings.bystander_words(
-            pieces, omega, inputs, outputs, others, window=chosen.lengths[len(chosen.lengths) // 2], overlap=overlap
+            [replace(piece, values=piece.values[:, channels]) for piece in pieces],
+            omega,
+            whole,
+            outputs,
+            rest,
+            named=len(inputs),
+            closed=loops,
+            window=chosen.lengths[len(chosen.lengths) // 2],
+            overlap=overlap,
         )
     return replace(
         made,
@@ -207,7 +240,8 @@ def respond(
             "band_hz": [float(omega[0] / TWO_PI), float(highest)],
             "overlap": overlap,
             "references": list(references),
-            **({"sweeps": list(tracked.sweeps)} if tracked else {}),
+            **({"sweeps": list(moved.sweeps)} if moved and moved.tracked else {}),
+            **({"beside": list(moved.beside)} if moved and moved.beside else {}),
             "averages": [m.averages for m in matrices],
             **({"channels": called} if (called := renamed_channels(flights, (*inputs, *outputs))) else {}),
             **autopilot_gains(flights),
@@ -215,157 +249,3 @@ def respond(
             "means": means(flights, (*inputs, *outputs)),
         },
     )
-
-
-_METHODS = ("direct", "joint")
-
-
-@dataclass(frozen=True)
-class _Question:
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    references: int
-    lines: int
-    tracked: bool = False
-
-
-class _Estimate(NamedTuple):
-    omega: Array
-    matrices: list[SpectralMatrix]
-    notes: list[str]
-    blurred: FrequencyResponse
-    made: FrequencyResponse
-
-
-def _estimate(
-    pieces: Sequence[Signals],
-    lengths: tuple[float, ...],
-    overlap: float,
-    limits: tuple[float | None, float],
-    question: _Question,
-) -> _Estimate:
-    """Responses in two passes, as the windows blur them and sharpened."""
-    # What a loop makes of gusts rules below the sweep: unasked, the book's two periods; asked, down to one.
-    lowest = 2.0 / lengths[0] if limits[0] is None else max(limits[0], 1.0 / lengths[0])
-    highest = limits[1]
-    if lowest >= highest:
-        raise FlightError(
-            f"the records tell nothing below {1.0 / lengths[0]:.3g} Hz, and {highest:.3g} Hz was asked as the "
-            f"highest frequency.",
-            where=", ".join(piece.name for piece in pieces),
-            hint="Give longer records or a higher band.",
-        )
-    omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(question.lines * np.log10(highest / lowest))))
-    matrices, notes = _matrices(pieces, omega, lengths, overlap)
-    shares: list[Array | None] = [None] * len(matrices)
-    if not question.references or question.tracked:
-        shares = own_shares(pieces, matrices, omega, inputs=len(question.inputs), overlap=overlap)
-    blurred = _composed(matrices, omega, question, shares)
-    guess = first_guess(blurred)
-    rest, _ = _matrices(without(pieces, omega, guess), omega, lengths, overlap)
-    sharpened = _composed(matrices, omega, question, shares, guess=guess, rest=rest)
-    return _Estimate(omega, matrices, notes, blurred, sharpened)
-
-
-def _matrices(
-    pieces: Sequence[Signals], omega: Array, lengths: Sequence[float], overlap: float
-) -> tuple[list[SpectralMatrix], list[str]]:
-    matrices: list[SpectralMatrix] = []
-    notes: list[str] = []
-    for length in lengths:
-        periods = PERIODS if matrices else 1.0
-        matrix = spectral_matrix(pieces, omega, window=length, overlap=overlap, periods=periods)
-        if matrix is None:
-            notes.append(f"no record is as long as the window of {length:.3g} s; it was left out.")
-            continue
-        short = [piece.name for piece in pieces if piece.name not in matrix.used]
-        if short:
-            notes.append(f"shorter than the window of {length:.3g} s and left out of it: {', '.join(short)}.")
-        matrices.append(matrix)
-    if not matrices:
-        longest = max(piece.duration for piece in pieces)
-        raise FlightError(
-            f"the longest record has {longest:.3g} s, the shortest window {min(lengths):.3g} s.",
-            where=", ".join(piece.name for piece in pieces),
-            hint="Give shorter windows (--windows) or fly longer; a record should hold two of its longest windows.",
-        )
-    return matrices, notes
-
-
-def _composed(
-    matrices: Sequence[SpectralMatrix],
-    omega: Array,
-    question: _Question,
-    shares: Sequence[Array | None],
-    *,
-    guess: Complex | None = None,
-    rest: Sequence[SpectralMatrix] | None = None,
-) -> FrequencyResponse:
-    """The composite of the conditioned spectra of every window, of what a guess leaves of the outputs where given."""
-    n_in, n = len(question.inputs), len(question.inputs) + len(question.outputs)
-    parts = []
-    for matrix, left, share in zip(matrices, matrices if rest is None else rest, shares, strict=True):
-        whole = None if rest is None else np.diagonal(matrix.values, axis1=1, axis2=2).real[:, n_in:n]
-        parts.append(
-            condition_spectra(
-                left.values[:, : n + question.references, : n + question.references],
-                n_in,
-                averages=matrix.averages,
-                removed=guess,
-                whole=whole,
-                share=share,
-                references=question.references,
-            )
-        )
-    response, coherence, error = _joined(parts, [m.averages for m in matrices], n_in)
-    weight = np.stack([_window_weight(matrix) for matrix in matrices])
-    plain = [m.values for m in matrices]
-    auto = _mean(weight, np.stack([np.diagonal(v, axis1=1, axis2=2).real for v in plain]))
-    gxx = _mean(weight, np.stack([v[:, :n_in, :n_in] for v in plain]))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        between = np.abs(gxx) ** 2 / (auto[:, :n_in, None] * auto[:, None, :n_in])
-    return FrequencyResponse(
-        omega=omega,
-        inputs=question.inputs,
-        outputs=question.outputs,
-        response=response,
-        coherence=coherence,
-        multiple=_mean(weight, np.stack([part.multiple for part in parts])),
-        error=error if rest is None else TWICED * error,
-        input_power=auto[:, :n_in],
-        output_power=auto[:, n_in:n],
-        input_coherence=between.real,
-        method="along sweeps" if question.tracked and question.references else _METHODS[bool(question.references)],
-        windows=tuple(m.window for m in matrices),
-    )
-
-
-def _joined(parts: Sequence[Conditioned], averages: Sequence[float], inputs: int) -> tuple[Complex, Array, Array]:
-    if len(parts) == 1:
-        return parts[0].response, parts[0].coherence, parts[0].error
-    shape = parts[0].response.shape
-    powers = np.stack([np.broadcast_to(part.input_power[:, None, :], shape) for part in parts])
-    powers = np.where(np.isfinite(np.stack([part.response for part in parts])), powers, np.nan)
-    errors = np.stack([part.error for part in parts])
-    gxx, gyy, gxy = composite(
-        powers, np.stack([part.output_power for part in parts]), np.stack([part.cross for part in parts]), errors
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        response, coherence = gxy / gxx, np.abs(gxy) ** 2 / (gxx * gyy)
-        weight = np.where(np.isfinite(powers), np.maximum(errors, 1e-9) ** -4.0, 0.0)
-        many = np.sum(weight * np.reshape(averages, (-1, 1, 1, 1)), axis=0) / np.sum(weight, axis=0)
-    effective = np.maximum(many - (inputs - 1), 1.0)
-    return response, coherence, random_error(coherence, 1.0) / np.sqrt(effective)
-
-
-def _window_weight(matrix: SpectralMatrix) -> Array:
-    """How much one window's matrix counts for figures that belong to no pair, shape (n_f,)."""
-    known = np.isfinite(matrix.values[:, 0, 0])
-    return np.where(known, matrix.averages**2, 0.0)
-
-
-def _mean(weight: Array, values: NDArray[Any]) -> NDArray[Any]:
-    shaped = weight.reshape(weight.shape + (1,) * (values.ndim - 2))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        total = np.sum(np.where(shaped > 0.0, shaped * np.nan_to_num(values), 0.0), axis=0)
-        return np.asarray(total / shaped.sum(axis=0))

@@ -75,8 +75,8 @@ def correlated(pairs: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
         together.setdefault(pair, []).append(_hertz(pairs.omega, lost))
     return [
         f"{_logs(pairs)}: '{one}' and '{other}' move together at {' and '.join(dict.fromkeys(bands))}: less than "
-        f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs independently, "
-        "best in a sweep of each."
+        f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs "
+        "independently, best in a sweep of each."
         for (one, other), bands in together.items()
     ]
 
@@ -120,13 +120,17 @@ def few_averages(matrices: Sequence[SpectralMatrix]) -> list[str]:
     return [f"the longest window fits {fewest:.1f} times into the records, expected at least 5: errors are large."]
 
 
-def mixing_words(pairs: FrequencyResponse) -> list[str]:
-    """Pairs of inputs that moved together, over the whole band or nearly as one in a part of it."""
+def mixing_words(pairs: FrequencyResponse, *, named: int) -> list[str]:
+    """Pairs of inputs that moved together, over the whole band or nearly as one in a part of it.
+
+    Args:
+        pairs: responses to all inputs, those that were asked for first. named: how many these are.
+    """
     words = []
     for i, one in enumerate(pairs.inputs):
-        for j, other in enumerate(pairs.inputs[:i]):
+        for j, other in enumerate(pairs.inputs[: min(i, named)]):
             mixed = np.nan_to_num(pairs.input_coherence[:, i, j])
-            told = np.isfinite(pairs.response[:, :, [i, j]]).any(axis=(1, 2))
+            told = np.all(np.any(np.isfinite(pairs.response[:, :, [i, j]]), axis=1), axis=1)
             mean = float(np.mean(mixed[told])) if told.any() else 0.0
             if mean > MIXED:
                 words.append(
@@ -231,13 +235,16 @@ def bystander_words(
     outputs: Sequence[str],
     others: Sequence[str],
     *,
+    named: int,
+    closed: Sequence[str],
     window: float,
     overlap: float,
 ) -> list[str]:
-    """Commands left out that change the answer: compared in one window, with and without them.
+    """Commands left out that change the answer to a named input: compared in one window, with and without them.
 
     A middle window: enough averages to be sure of a difference, long enough to see the low end. The pieces hold
-    inputs, outputs and the others, in this order.
+    inputs (the `named` first), outputs and the others, in this order. A loop that is broken at an input (the outputs
+    `closed`) has the others closed: there they move along rightly.
     """
     n_in, n_out = len(inputs), len(outputs)
     first = pieces[0].values.shape[1] - len(others)
@@ -256,7 +263,7 @@ def bystander_words(
             # What it adds must be real: its own share, its own effect, and noise that it explains away.
             quieter = (1.0 - both.multiple) < EXPLAINED * (1.0 - alone.multiple)
         for o, output in enumerate(outputs):
-            for i, mover in enumerate(inputs):
+            for i, mover in enumerate(inputs[:named] if output not in closed else ()):
                 h, b = alone.response[:, o, i], both.response[:, o, i]
                 with np.errstate(divide="ignore", invalid="ignore"):
                     apart = np.abs(np.log(h / b))

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
@@ -63,6 +64,12 @@ def signals(flights: Sequence[Flight], names: Sequence[str]) -> list[Signals]:
             hint="Bring all of them to one rate (--rate).",
         )
     return unbroken
+
+
+def runs(inside: NDArray[np.bool_]) -> list[slice]:
+    """The unbroken stretches of samples that are inside, in order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 @dataclass(frozen=True)

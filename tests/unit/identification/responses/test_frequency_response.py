@@ -183,7 +183,7 @@ def test_one_log_that_sweeps_axis_after_axis_has_a_reference_for_each() -> None:
     assert np.median(off) < 0.06
     assert (off < 4.0 * found.error + 0.03).mean() > 0.97
     assert any("--references sid_target" in text for text in respond(sweeps(10, 11), **ask).warnings)
-    with pytest.raises(FlightError, match="1 sweep"):
+    with pytest.raises(FlightError, match="no sweep of 'pitch'"):
         respond(sweeps(10, 10), references=["sid_target"], **ask)
     assert not any("--references" in text for text in respond(sweeps(10, 10), **ask).warnings)
 
@@ -229,8 +229,8 @@ def test_doubled_and_dead_inputs_are_named_and_the_rest_is_kept() -> None:
     y = plant(u, 1.0, 2.0, 0.5) + plant(other, 1.0, 1.0, 0.5)
     flight = made({"stick1": u, "stick2": 0.5 * u, "stick3": other, "stick4": np.zeros(n), "out": y})
     found = respond(flight, inputs=["stick1", "stick2", "stick3", "stick4"], outputs=["out"], band=(0.2, 5.0))
-    text = " ".join(found.problems)
-    assert text.count("'stick1' and 'stick2' move together") == 1
+    assert sum("'stick1' and 'stick2' move together" in text for text in found.warnings) == 1
+    (text,) = found.problems
     assert "'stick4' never moves" in text
     assert np.isnan(found.pair("out", "stick1")[0]).all()
     h = found.pair("out", "stick3")[0]

@@ -13,8 +13,9 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.series import parse
 from swashplate.flights.provenance import Event, Provenance
+from swashplate.identification.responses.excitations import told_sweeps
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.identification.responses.own_references import OwnReferences, own_references
+from swashplate.identification.responses.references import References, references_of
 from swashplate.identification.responses.respond import respond
 from swashplate.identification.responses.response_warnings import bias_words, biased_by_feedback, without_unswept
 from swashplate.identification.responses.spectra import signals
@@ -58,8 +59,10 @@ def truth(omega: np.ndarray) -> np.ndarray:
     return np.asarray((1.0 - keep) / (z - keep))
 
 
-def references(flight: Flight) -> OwnReferences | None:
-    return own_references([flight], signals([flight], (*INPUTS, "roll_rate")), INPUTS)
+def references(flight: Flight) -> References | None:
+    pieces = signals([flight], (*INPUTS, "roll_rate"))
+    commands = {name: k for k, name in enumerate(INPUTS)}
+    return references_of(pieces, told_sweeps([flight]), commands, len(INPUTS), {}, called={})
 
 
 @pytest.fixture(scope="module")
