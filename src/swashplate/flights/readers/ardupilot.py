@@ -132,7 +132,7 @@ def read(source: Source, options: Options) -> Flight:
     _refuse_unstamped(log, source)
     log, end, said = _one_run(log)
     told = story(log, end=end)
-    left = clocked.Told(list(log.notes), [*log.damage, *filter(None, (said,)), *told.damage])
+    left = clocked.Remarks(list(log.notes), [*log.damage, *filter(None, (said,)), *told.damage])
     if "Plane" in told.vehicle:  # its terms are angles of control surfaces, not commands to a mixer
         log = Messages({n: t for n, t in log.tables.items() if n[:3] != "PID"}, log.notes, log.damage)
     streams = _streams(log, told.events, left)
@@ -197,7 +197,7 @@ def _chosen(table: MessageTable, wanted: tuple[tuple[str, ...], int] | None) -> 
     return table.rows(table.number(field) == number)
 
 
-def _streams(log: Messages, events: tuple[Event, ...], told: clocked.Told) -> dict[str, xr.Dataset]:
+def _streams(log: Messages, events: tuple[Event, ...], told: clocked.Remarks) -> dict[str, xr.Dataset]:
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     target_unit = next(

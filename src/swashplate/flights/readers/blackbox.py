@@ -54,7 +54,7 @@ def read(source: Source, options: Options) -> Flight:
     main = main_frames(frames, header)
     fields = Fields(header, header.layouts["I"].names)
     columns = fields.columns(main.columns)
-    told = clocked.Told(list(note), [*_lost(frames), *main.damage])
+    told = clocked.Remarks(list(note), [*_lost(frames), *main.damage])
     streams: dict[str, xr.Dataset] = {}
     made = clocked.made_stream("blackbox", main.time, columns, told=told)
     if made is None:
@@ -176,7 +176,7 @@ def _events(frames: FoundFrames, header: Header, main: Main) -> tuple[Event, ...
     return tuple(sorted(events, key=lambda event: event.time))
 
 
-def _gps(frames: FoundFrames, header: Header, main: Main, told: clocked.Told) -> xr.Dataset | None:
+def _gps(frames: FoundFrames, header: Header, main: Main, told: clocked.Remarks) -> xr.Dataset | None:
     """GPS frames: places count from the home before them, times from the main frame before them."""
     if "G" not in frames.others or not main.clock.size:
         return None

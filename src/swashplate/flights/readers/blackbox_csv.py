@@ -17,7 +17,7 @@ from swashplate.flights.readers.blackbox_header import Header
 from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 from swashplate.flights.readers.table_flight import streams_of
-from swashplate.flights.readers.table_layout import TextTable, read_table
+from swashplate.flights.readers.table_layout import DelimitedTable, read_table
 from swashplate.flights.readers.table_time import Stamps
 from swashplate.flights.schema import is_known
 
@@ -68,13 +68,13 @@ def read(source: Source, options: Options) -> Flight:
         )
     inputs = {channel: values for channel, (values, _) in inside.items() if channel.startswith("mixer_")}
     told.notes += checks.constant_notes(inputs)
-    found = source.provenance(
+    provenance = source.provenance(
         NAME, VERSION, vehicle=fields.firmware, notes=tuple(told.notes), damage=tuple(told.damage)
     )
-    return Flight(streams, found)
+    return Flight(streams, provenance)
 
 
-def _fields(table: TextTable) -> tuple[dict[str, Array], dict[str, str]]:
+def _fields(table: DelimitedTable) -> tuple[dict[str, Array], dict[str, str]]:
     """Numbers by field, and the unit that stands behind its name; fields of words ("IDLE") are passed over."""
     numbers, units, words = dict[str, Array](), dict[str, str](), list[str]()
     for index, cell in enumerate(table.header):
@@ -90,7 +90,7 @@ def _fields(table: TextTable) -> tuple[dict[str, Array], dict[str, str]]:
     return numbers, units
 
 
-def _header(table: TextTable) -> Header:
+def _header(table: DelimitedTable) -> Header:
     """What Explorer wrote above the table, under the names that the log has for it."""
     values = {row[0]: ",".join(row[1:]) for row in table.preface if len(row) > 1}
     firmware = " ".join(values[key] for key in ("firmwareType", "firmwareVersion") if key in values)

@@ -37,7 +37,7 @@ _SEAM = 3.0  # usual steps, and a second at least: a longer pause leaves open wh
 
 
 @dataclass
-class Told:
+class Remarks:
     """What a reader says of a log: `notes` for the user to know, `damage` for what is lost."""
 
     notes: list[str] = field(default_factory=list)
@@ -128,7 +128,7 @@ def usable(
     *,
     where: str,
     bad_stamps: str,
-    told: Told,
+    told: Remarks,
     channel: str = "time",
     tick: float = 1e-6,
     turns: Sequence[float] = (),
@@ -168,11 +168,11 @@ def usable(
     keep[keep] = longest_increasing(time[keep])
     lost = ~keep & ~twice
     if lost.any():
-        some, (bad, found) = share(int(lost.sum()), time.size), _first_bad(time, twice)
+        some, (bad, words) = share(int(lost.sum()), time.size), _first_bad(time, twice)
         said = anew or f"{some} are lost because their time repeats or goes backwards, first at sample {bad}"
         if bad_stamps == "error":
             raise FlightError(
-                f"{found}; {some} can not be used{': the clock starts anew there' * bool(anew)}.",
+                f"{words}; {some} can not be used{': the clock starts anew there' * bool(anew)}.",
                 where=where,
                 channel=channel,
                 hint="Repair the log, or leave these samples out: --drop-bad-stamps (in Python bad_stamps='drop').",
@@ -224,7 +224,7 @@ def longest_run(clocks: Sequence[tuple[NDArray[np.int64], Array]]) -> tuple[tupl
     total, anew, first, last = sum(place.size for place, _ in clocks), 0, 0, _END
     inside = sorted(clocks, key=lambda clock: -clock[0].size)  # fast ones know the place best
     while True:
-        edges = next((found for place, time in inside if (found := resets(place, time)).size), None)
+        edges = next((at for place, time in inside if (at := resets(place, time)).size), None)
         if edges is None:
             break
         bounds = [first, *edges.tolist(), last]
@@ -245,7 +245,9 @@ def converted(values: Array, unit: str) -> tuple[Array, str]:
     return (units.to_inside(values, unit), units.inside_unit(unit)) if unit else (values, "")
 
 
-def made_stream(name: str, time: Array, columns: Mapping[str, tuple[Array, str]], *, told: Told) -> xr.Dataset | None:
+def made_stream(
+    name: str, time: Array, columns: Mapping[str, tuple[Array, str]], *, told: Remarks
+) -> xr.Dataset | None:
     """A stream from what a log holds; None where fewer than two samples can be used.
 
     Args:

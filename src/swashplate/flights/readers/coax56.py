@@ -21,6 +21,7 @@ from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, clocked, frames, mat
+from swashplate.flights.readers.faults import Faults
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import QUATERNION
@@ -121,10 +122,13 @@ def read(variables: Mapping[str, Any], source: Source, options: Options) -> Flig
         FlightError, UnitError: naming the file, the field, what was found and what to do.
     """
     fields = _fields(variables["Data"], source)
+    faults = Faults(source.name)
     for name, values in fields.items():
-        checks.finite(values, channel=f"Data.{name}", where=source.name)
+        with faults.gathered():
+            checks.finite(values, channel=f"Data.{name}", where=source.name)
+    faults.refuse()
     fields = _in_inside_units(fields, source, options)
-    told = clocked.Told()
+    told = clocked.Remarks()
     time, keep = clocked.usable(
         fields["time"][:, 0],
         fields.values(),

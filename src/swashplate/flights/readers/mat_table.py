@@ -17,7 +17,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers import coax56, mat, table_time
-from swashplate.flights.readers.clocked import Told
+from swashplate.flights.readers.clocked import Remarks
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.readers.table_flight import flight_of
@@ -34,7 +34,7 @@ class MatTable:
     """Arrays of one length as a table's columns.
 
     Attributes:
-        where, header, lines, told, aliases: as in `Table`.
+        where, header, lines, told, aliases: as in `ColumnTable`.
         columns: numbers by column, shape (n,) each.
     """
 
@@ -43,7 +43,7 @@ class MatTable:
     columns: Sequence[Array]
     aliases: Mapping[str, int]
     units: Sequence[str] = ()
-    told: Told = field(default_factory=Told)
+    told: Remarks = field(default_factory=Remarks)
 
     def __len__(self) -> int:
         return len(self.columns[0]) if self.columns else 0
@@ -92,7 +92,7 @@ def read(source: Source, options: Options) -> Flight:
 
 
 def _table(variables: Mapping[str, Any], source: Source, options: Options) -> MatTable:
-    told = Told()
+    told = Remarks()
     arrays: dict[str, Array] = {}
     strange: list[str] = []
     for path, value in _flat(variables):

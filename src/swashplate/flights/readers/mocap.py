@@ -61,7 +61,7 @@ def flight(
     world_axes: str,
     body_axes: str,
     notes: tuple[str, ...],
-    told: clocked.Told,
+    told: clocked.Remarks,
 ) -> Flight:
     """A tracked body as a flight with the stream "motion": x y z [m, NED] and qw qx qy qz (FRD to NED).
 

@@ -18,6 +18,7 @@ from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, clocked, frames, tables
+from swashplate.flights.readers.faults import Faults
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.readers.table_layout import even_rows
@@ -71,7 +72,7 @@ def read(source: Source, options: Options) -> Flight:
     """
     if options.units:
         raise UnitError("units are known for this file and cannot be given.", where=source.name, channel="units")
-    told = clocked.Told()
+    told = clocked.Remarks()
     columns = _columns(source, told)
     time, keep = clocked.usable(
         columns["t"], columns.values(), where=source.name, bad_stamps=options.bad_stamps, told=told, channel="t"
@@ -111,7 +112,7 @@ def read(source: Source, options: Options) -> Flight:
     )
 
 
-def _columns(source: Source, told: clocked.Told) -> dict[str, Array]:
+def _columns(source: Source, told: clocked.Remarks) -> dict[str, Array]:
     """The columns that are used, as numbers, every one finite."""
     rows = [row for row in tables.rows_of(source.text or "", where=source.name, delimiter=",") if any(row)]
     head = rows[0] if rows else []
@@ -127,11 +128,13 @@ def _columns(source: Source, told: clocked.Told) -> dict[str, Array]:
     data, lines = even_rows(
         rows[1:], range(2, len(rows) + 1), low=wide, high=wide, where=source.name, told=told, again=[head]
     )
-    columns = {
-        name: tables.column(data, head.index(name), name=name, where=source.name, lines=lines) for name in _COLUMNS
-    }
-    for name, values in columns.items():
-        checks.finite(values, channel=name, where=source.name)
+    columns, faults = dict[str, Array](), Faults(source.name)
+    for name in _COLUMNS:
+        with faults.gathered():
+            values = tables.column(data, head.index(name), name=name, where=source.name, lines=lines)
+            checks.finite(values, channel=name, where=source.name)
+            columns[name] = values
+    faults.refuse()
     return columns
 
 

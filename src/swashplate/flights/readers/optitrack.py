@@ -95,7 +95,7 @@ def read(source: Source, options: Options) -> Flight:
     names = list(bodies)
     name = names[mocap.choose(names, options.body, where=where)]
     columns = bodies[name]
-    told = clocked.Told()
+    told = clocked.Remarks()
     under = range(axes_row + 2, len(rows) + 1)
     # Blank cells at a row's end may be left out: the body was not seen. More cells than heads are another layout.
     data, lines = even_rows(rows[axes_row + 1 :], under, low=2, high=len(rows[axes_row]), where=where, told=told)

@@ -73,7 +73,7 @@ def read(source: Source, options: Options) -> Flight:
     log = dataflash.messages(source.content)
     clock = log.get("TIME") or MessageTable({}, np.zeros(0, np.int64))
     (first, last), said = clocked.longest_run([(clock.place, clock.number("StartTime") / 1e6)])
-    told = clocked.Told(list(log.notes), [*log.damage, *filter(None, (said,))])
+    told = clocked.Remarks(list(log.notes), [*log.damage, *filter(None, (said,))])
     clock = clock.rows((clock.place >= first) & (clock.place < last))
     streams: dict[str, xr.Dataset] = {}
     for name, (stream_name, fields) in _MESSAGES.items():

@@ -111,7 +111,7 @@ def read(source: Source, options: Options) -> Flight:
     body = frames.axes(options.body_axes or _BODY, where=source.name)
     world = frames.axes(options.world_axes or _WORLD, where=source.name)
     stamps, rows, counts, begin, damage = _collected(source)
-    told = clocked.Told(damage=damage)
+    told = clocked.Remarks(damage=damage)
     times, rows = _one_run(stamps, rows, told)
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
@@ -142,7 +142,7 @@ Collected = tuple[Stamps, dict[str, list[Row]], dict[tuple[str, str], int], int,
 
 
 def _one_run(
-    stamps: Stamps, rows: dict[str, list[Row]], told: clocked.Told
+    stamps: Stamps, rows: dict[str, list[Row]], told: clocked.Remarks
 ) -> tuple[dict[str, Array], dict[str, list[Row]]]:
     """Stamps [s] and numbers by topic, of the longest run between clock resets; nodes may have clocks of their own."""
     places = {topic: np.array([place for place, _ in pairs], dtype=np.int64) for topic, pairs in stamps.items()}

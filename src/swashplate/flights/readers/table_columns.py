@@ -17,7 +17,7 @@ from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.readers.faults import Faults
 from swashplate.flights.readers.options import Options
-from swashplate.flights.readers.table_layout import Table
+from swashplate.flights.readers.table_layout import ColumnTable
 from swashplate.flights.schema import CHANNELS, channel, is_known
 
 _CELL = re.compile(
@@ -42,7 +42,7 @@ class Column:
     date: int | None = None
 
 
-def named_columns(table: Table) -> list[tuple[str, str | None]]:
+def named_columns(table: ColumnTable) -> list[tuple[str, str | None]]:
     """Name and unit (None: not said) of each column of the header."""
     parts = [match for cell in table.header if (match := _PART.fullmatch(cell))]
     stems = {stem for stem in {m["stem"] for m in parts} if {m["number"] for m in parts if m["stem"] == stem} != {"1"}}
@@ -60,7 +60,7 @@ def named_columns(table: Table) -> list[tuple[str, str | None]]:
     return named
 
 
-def from_header(table: Table, faults: Faults) -> dict[str, Column]:
+def from_header(table: ColumnTable, faults: Faults) -> dict[str, Column]:
     """A column for each name of the header; one without a name is passed over, and said."""
     columns: dict[str, Column] = {}
     for index, (name, unit) in enumerate(named_columns(table)):
@@ -78,7 +78,7 @@ def from_header(table: Table, faults: Faults) -> dict[str, Column]:
     return columns
 
 
-def from_mapping(options: Options, table: Table, faults: Faults) -> dict[str, Column]:
+def from_mapping(options: Options, table: ColumnTable, faults: Faults) -> dict[str, Column]:
     """The columns that a mapping names, by channel.
 
     Raises:
@@ -110,7 +110,7 @@ def _mapped(
     entry: object,
     places: Mapping[str, int],
     named: Sequence[tuple[str, str | None]],
-    table: Table,
+    table: ColumnTable,
     where: str,
 ) -> Column:
     if not isinstance(entry, Mapping) or set(entry) - _COLUMN_KEYS or "column" not in entry:
@@ -122,8 +122,8 @@ def _mapped(
         )
     asked = entry["column"]
     pair = isinstance(asked, list) and len(asked) == 2 and name == "time"
-    found = [_index(each, places, table) for each in (asked if pair else [asked])]
-    if None in found:
+    indices = [_index(each, places, table) for each in (asked if pair else [asked])]
+    if None in indices:
         listed = ", ".join(table.header) or f"no header and {table.width} columns"
         raise FlightError(
             f"there is no column {asked!r}; the file has {listed}.",
@@ -131,7 +131,7 @@ def _mapped(
             channel=name,
             hint="Correct the mapping; columns may also be numbers from 1, and time a pair: ['Date', 'Time'].",
         )
-    index = [i for i in found if i is not None]
+    index = [i for i in indices if i is not None]
     unit = entry.get("unit", named[index[-1]][1] if index[-1] < len(named) else None)
     if unit is not None and not isinstance(unit, str):
         raise UnitError(f"unit = {unit!r} in the mapping is not text.", where=where, channel=name)
@@ -139,7 +139,7 @@ def _mapped(
     return Column(index[-1], unit, factor, offset, date=index[0] if pair else None)
 
 
-def _index(asked: object, places: Mapping[str, int], table: Table) -> int | None:
+def _index(asked: object, places: Mapping[str, int], table: ColumnTable) -> int | None:
     """The column's index; None where there is none."""
     if isinstance(asked, int) and not isinstance(asked, bool):
         return asked - 1 if 1 <= asked <= table.width else None

@@ -17,12 +17,12 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, clocked, table_columns, table_time, tables
-from swashplate.flights.readers.clocked import Told, share
+from swashplate.flights.readers.clocked import Remarks, share
 from swashplate.flights.readers.faults import Faults
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.readers.table_columns import Column
-from swashplate.flights.readers.table_layout import Table
+from swashplate.flights.readers.table_layout import ColumnTable
 from swashplate.flights.readers.table_time import Stamps
 from swashplate.flights.schema import LOGGED_UNIT, is_known
 from swashplate.registry import nearest
@@ -44,7 +44,7 @@ class _Chosen:
     lost: bool = False
 
 
-def flight_of(table: Table, source: Source, options: Options, *, reader: str, version: str) -> Flight:
+def flight_of(table: ColumnTable, source: Source, options: Options, *, reader: str, version: str) -> Flight:
     """A table as a flight.
 
     Args:
@@ -74,12 +74,14 @@ def flight_of(table: Table, source: Source, options: Options, *, reader: str, ve
                 data[name].attrs[LOGGED_UNIT] = units[name]
     told.notes += table_columns.near_misses(list(channels))
     told.notes += checks.constant_notes({n: v[np.isfinite(v)] for n, v in channels.items()})
-    found = source.provenance(reader, version, notes=tuple(told.notes), damage=tuple(told.damage), epoch=stamps.zero)
-    return Flight(streams, found)
+    provenance = source.provenance(
+        reader, version, notes=tuple(told.notes), damage=tuple(told.damage), epoch=stamps.zero
+    )
+    return Flight(streams, provenance)
 
 
 # ---- which columns, in which units -----------------------------------------------------------------------------------
-def _chosen(table: Table, options: Options, faults: Faults) -> _Chosen:
+def _chosen(table: ColumnTable, options: Options, faults: Faults) -> _Chosen:
     """What the header or the mapping names; a mapping that says nothing of time leaves it to the header."""
     own = table_columns.from_header(table, Faults(table.where) if options.mapping else faults)
     name = table_time.time_name(own) or ""
@@ -105,7 +107,7 @@ def _given_units(options: Options, chosen: _Chosen) -> dict[str, str]:
     return given
 
 
-def _check_given(given: Mapping[str, str], chosen: _Chosen, table: Table, faults: Faults) -> None:
+def _check_given(given: Mapping[str, str], chosen: _Chosen, table: ColumnTable, faults: Faults) -> None:
     there = [*(["time"] if chosen.time is not None else []), *chosen.channels]
     unknown = set(given) - set(there)
     if unknown:
@@ -119,7 +121,9 @@ def _check_given(given: Mapping[str, str], chosen: _Chosen, table: Table, faults
         )
 
 
-def _stamps(table: Table, chosen: _Chosen, given: Mapping[str, str], options: Options, faults: Faults) -> Stamps | None:
+def _stamps(
+    table: ColumnTable, chosen: _Chosen, given: Mapping[str, str], options: Options, faults: Faults
+) -> Stamps | None:
     """The times of the rows; None where that is a fault."""
     rate = options.mapping.get("rate")
     with faults.gathered():
@@ -144,7 +148,7 @@ def _stamps(table: Table, chosen: _Chosen, given: Mapping[str, str], options: Op
 
 # ---- numbers ---------------------------------------------------------------------------------------------------------
 def _numbers(
-    table: Table, columns: Mapping[str, Column], units: Mapping[str, str | None], faults: Faults, *, mapped: bool
+    table: ColumnTable, columns: Mapping[str, Column], units: Mapping[str, str | None], faults: Faults, *, mapped: bool
 ) -> tuple[dict[str, Array], dict[str, str]]:
     """Values inside, NaN where a cell is blank, and their units, by channel; columns of text are passed over."""
     channels, labels, text, blank = dict[str, Array](), dict[str, str](), list[str](), list[str]()
@@ -179,7 +183,13 @@ def _numbers(
 
 # ---- streams ---------------------------------------------------------------------------------------------------------
 def streams_of(
-    stamps: Stamps, channels: Mapping[str, Array], labels: Mapping[str, str], *, where: str, bad_stamps: str, told: Told
+    stamps: Stamps,
+    channels: Mapping[str, Array],
+    labels: Mapping[str, str],
+    *,
+    where: str,
+    bad_stamps: str,
+    told: Remarks,
 ) -> dict[str, xr.Dataset]:
     """The streams of a table's channels: "log", and "log_2", ... for those with other blanks.
 
@@ -218,7 +228,7 @@ def streams_of(
     return streams
 
 
-def _together(values: Mapping[str, Array], told: Told) -> list[tuple[list[str], clocked.Mask]]:
+def _together(values: Mapping[str, Array], told: Remarks) -> list[tuple[list[str], clocked.Mask]]:
     """Channels that go into one stream, and the rows in which they have numbers, the fullest first."""
     finite = {name: np.isfinite(column) for name, column in values.items()}
     n = next(iter(finite.values())).size
@@ -242,7 +252,7 @@ def _together(values: Mapping[str, Array], told: Told) -> list[tuple[list[str], 
     return [*first, *sorted(apart, key=lambda group: -int(group[1].sum()))]
 
 
-def _tell_blanks(names: list[str], time: Array, there: clocked.Mask, told: Told) -> None:
+def _tell_blanks(names: list[str], time: Array, there: clocked.Mask, told: Remarks) -> None:
     """What many blank cells mean: a rate of its own, or samples that are missing."""
     count = int((~there).sum())
     step, usual = float(np.median(np.diff(time[there]))), float(np.median(np.diff(time)))

@@ -21,14 +21,14 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights import epoch, units
 from swashplate.flights.readers import tables
-from swashplate.flights.readers.clocked import Told, share
+from swashplate.flights.readers.clocked import Remarks, share
 
 Rows = Sequence[Sequence[str]]
 
 _NUMERIC = frozenset("0123456789-+.")  # with these begins no name
 
 
-class Table(Protocol):
+class ColumnTable(Protocol):
     """Columns by number, wherever they come from."""
 
     @property
@@ -48,7 +48,7 @@ class Table(Protocol):
         """What the file calls each row, for messages."""
 
     @property
-    def told(self) -> Told:
+    def told(self) -> Remarks:
         """What was left out."""
 
     @property
@@ -69,11 +69,11 @@ class Table(Protocol):
 
 
 @dataclass(frozen=True)
-class TextTable:
+class DelimitedTable:
     """A table of text, with rows that fit its header.
 
     Attributes:
-        where, header, units, lines, told: as in `Table`.
+        where, header, units, lines, told: as in `ColumnTable`.
         rows: cells of the data.
         preface: the rows before the header.
     """
@@ -84,7 +84,7 @@ class TextTable:
     rows: Rows
     lines: Sequence[int]
     preface: Rows = ()
-    told: Told = field(default_factory=Told)
+    told: Remarks = field(default_factory=Remarks)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -120,7 +120,7 @@ class _Head:
     cells: Sequence[str] = ()
 
 
-def read_table(text: str, *, where: str, mapping: Mapping[str, Any]) -> TextTable:
+def read_table(text: str, *, where: str, mapping: Mapping[str, Any]) -> DelimitedTable:
     """The table in a text.
 
     Args:
@@ -133,7 +133,7 @@ def read_table(text: str, *, where: str, mapping: Mapping[str, Any]) -> TextTabl
     if delimiter is not None and not (isinstance(delimiter, str) and len(delimiter) == 1):
         raise FlightError(f"delimiter = {delimiter!r} in the mapping is not one character.", where=where)
     headed = mapping.get("header", True) is not False
-    told = Told()
+    told = Remarks()
     quick = tables.NumberRows.of(text, delimiter=delimiter)
     if quick is not None:
         top = tables.rows_of("\n".join(quick.head), where=where, delimiter=quick.mark)
@@ -167,13 +167,15 @@ def read_table(text: str, *, where: str, mapping: Mapping[str, Any]) -> TextTabl
     return _told(head, rows[: head.data], kept, lines, where, told, commas)
 
 
-def _told(head: _Head, top: Rows, rows: Rows, lines: Sequence[int], where: str, told: Told, commas: bool) -> TextTable:
+def _told(
+    head: _Head, top: Rows, rows: Rows, lines: Sequence[int], where: str, told: Remarks, commas: bool
+) -> DelimitedTable:
     own = (head.names, head.units)
     preface = [row for i, row in enumerate(top) if any(row) and not _is_comment(row) and i not in own]
     if commas:
         told.notes.append("decimals are written with commas")
     given = top[head.units] if head.units >= 0 else ()
-    return TextTable(where, head.cells, given, rows, lines, preface, told)
+    return DelimitedTable(where, head.cells, given, rows, lines, preface, told)
 
 
 def _is_comment(row: Sequence[str]) -> bool:
@@ -252,7 +254,7 @@ def even_rows(
     low: int,
     high: int,
     where: str,
-    told: Told,
+    told: Remarks,
     again: Sequence[Sequence[str]] = (),
 ) -> tuple[Rows, Sequence[int]]:
     """The rows that fit the header, and their lines.
@@ -302,9 +304,9 @@ def even_rows(
         )
     if end < len(data):
         i = data[end]
-        found = f"{_cells(cells[i])}, the header {wanted}" if not fits(i) else "other names"
+        why = f"{_cells(cells[i])}, the header {wanted}" if not fits(i) else "other names"
         told.damage.append(
-            f"{share(len(data) - end, len(data), 'rows')} are lost: line {lines[i]} has {found}, so the columns have "
+            f"{share(len(data) - end, len(data), 'rows')} are lost: line {lines[i]} has {why}, so the columns have "
             "changed there, and only the rows before it were read"
         )
     if repeats:

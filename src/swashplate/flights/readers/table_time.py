@@ -21,7 +21,7 @@ from swashplate.flights import epoch, units
 from swashplate.flights.readers import checks
 from swashplate.flights.readers.clocked import DAY
 from swashplate.flights.readers.table_columns import Column
-from swashplate.flights.readers.table_layout import Table
+from swashplate.flights.readers.table_layout import ColumnTable
 
 # In the order in which a header is asked for them; "T" is a temperature.
 _PLAIN = ("time", "t")
@@ -88,7 +88,7 @@ def date_beside(name: str, columns: Mapping[str, Column]) -> int | None:
     return next((column.index for each, column in columns.items() if each.lower() == "date" and each != name), None)
 
 
-def stamps(table: Table, place: Column, unit: str | None) -> Stamps:
+def stamps(table: ColumnTable, place: Column, unit: str | None) -> Stamps:
     """The stamps of a table.
 
     Args:
@@ -112,11 +112,11 @@ def stamps(table: Table, place: Column, unit: str | None) -> Stamps:
 
 
 def _parsed(
-    table: Table, cells: Sequence[str], parse: Callable[[str], Decimal | None], what: str, example: str
+    table: ColumnTable, cells: Sequence[str], parse: Callable[[str], Decimal | None], what: str, example: str
 ) -> tuple[Array, float]:
     """Times [s], NaN where a cell is blank, and time zero [s], of cells of one form."""
-    found = [parse(cell) if cell else None for cell in cells]
-    wrong = [i for i, (cell, value) in enumerate(zip(cells, found, strict=True)) if cell and value is None]
+    values = [parse(cell) if cell else None for cell in cells]
+    wrong = [i for i, (cell, value) in enumerate(zip(cells, values, strict=True)) if cell and value is None]
     if wrong:
         raise FlightError(
             f"'{cells[wrong[0]][:40]}' in line {table.lines[wrong[0]]} is no {what}, as the first stamp is.",
@@ -124,8 +124,8 @@ def _parsed(
             channel="time",
             hint=f"Write all stamps in one way, as {example}.",
         )
-    times, zero = epoch.small([value for value in found if value is not None])
-    return _spread(times, [value is not None for value in found]), float(zero)
+    times, zero = epoch.small([value for value in values if value is not None])
+    return _spread(times, [value is not None for value in values]), float(zero)
 
 
 def _spread(times: Array, there: Sequence[bool]) -> Array:
@@ -135,7 +135,7 @@ def _spread(times: Array, there: Sequence[bool]) -> Array:
     return out
 
 
-def _counted(table: Table, place: Column, unit: str | None) -> Stamps:
+def _counted(table: ColumnTable, place: Column, unit: str | None) -> Stamps:
     """Stamps that are numbers in a unit."""
     raw = table.numbers(place.index, name="time")
     blank = np.isnan(raw)
@@ -163,7 +163,7 @@ def _counted(table: Table, place: Column, unit: str | None) -> Stamps:
     return Stamps(_spread(times, (~blank).tolist()), float(first + zero), tick)
 
 
-def _unit_of(raw: Array, unit: str | None, table: Table) -> str:
+def _unit_of(raw: Array, unit: str | None, table: ColumnTable) -> str:
     """The unit of a time column's numbers: as given, by the calendar for Unix time, or by the rate of the samples."""
     if unit is not None and unit.strip().lower() in _UNIX:
         size = float(np.median(np.abs(raw))) if raw.size else 0.0

@@ -113,7 +113,7 @@ def read(source: Source, options: Options) -> Flight:
     refuse_mapping(options, "a ULog file", where=source.name)
     whole = whole_messages(source.content)
     log = _decoded(whole.content, source.name)
-    told = clocked.Told()
+    told = clocked.Remarks()
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     first = {data.name: data.data for data in reversed(log.data_list) if data.multi_id == 0}
@@ -165,7 +165,7 @@ def _decoded(content: bytes, where: str) -> Any:
 
 
 def _stream(
-    topic: _Topic, data: Mapping[str, NDArray[Any]] | None, taken: set[str], told: clocked.Told
+    topic: _Topic, data: Mapping[str, NDArray[Any]] | None, taken: set[str], told: clocked.Remarks
 ) -> xr.Dataset | None:
     if data is None or "timestamp" not in data:
         return None

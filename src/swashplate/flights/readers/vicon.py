@@ -125,7 +125,7 @@ def read(source: Source, options: Options) -> Flight:
         raise FlightError(f"the block '{title}' ends in its header.", where=where, hint="Export it again.")
     rate = _rate(rows[start + 1], source)
     names, columns, unit_row = rows[start + 2 : start + _DATA_AFTER]
-    told = clocked.Told()
+    told = clocked.Remarks()
     under = range(start + _DATA_AFTER + 1, end + 1)
     # Blank cells at a row's end may be left out: the body was not seen. More cells than heads are another layout.
     data, lines = even_rows(rows[start + _DATA_AFTER : end], under, low=1, high=len(columns), where=where, told=told)

@@ -7,7 +7,7 @@ import pytest
 
 from swashplate.errors import FlightError
 from swashplate.flights.readers import clocked
-from swashplate.flights.readers.clocked import DAY, TURN, Told, longest_run, made_stream, unturned, usable
+from swashplate.flights.readers.clocked import DAY, TURN, Remarks, longest_run, made_stream, unturned, usable
 
 MICRO = TURN * 1e-6
 RATE = 250.0
@@ -15,7 +15,7 @@ STEADY = np.arange(2000) / RATE
 
 
 def _usable(time, *columns, bad_stamps="drop", **more):
-    told = Told()
+    told = Remarks()
     kept, mask = usable(time, columns, where="log.csv", bad_stamps=bad_stamps, told=told, **more)
     return kept, mask, told
 
@@ -115,11 +115,11 @@ def test_a_good_clock_is_told_nothing_of():
     kept, mask, told = _usable(STEADY + 1e3, STEADY, bad_stamps="error")
     assert mask.all()
     assert kept == pytest.approx(STEADY + 1e3)
-    assert told == Told()
+    assert told == Remarks()
 
 
 def test_streams_of_containers_follow_the_same_rule():
-    told = Told()
+    told = Remarks()
     values = np.arange(4000.0)
     values[7] = np.nan
     made = made_stream("imu", np.repeat(STEADY, 2), {"p": (values, "rad/s")}, told=told)
@@ -129,7 +129,7 @@ def test_streams_of_containers_follow_the_same_rule():
         "imu: 1 of 4000 samples (0.025 %) are lost because a number is missing or not finite",
         "imu: 1999 of 3999 samples (50 %) are lost because their time repeats or goes backwards",
     ]
-    told = Told()
+    told = Remarks()
     made_stream("imu", np.repeat(STEADY, 2), {"p": (np.repeat(STEADY, 2), "rad/s")}, told=told)
     assert told.damage == []
     assert "copies" in told.notes[0]

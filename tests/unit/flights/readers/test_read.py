@@ -52,7 +52,7 @@ def test_a_body_rate_of_1e5_degrees_a_second_is_never_true(tmp_path: Path) -> No
     path = _table(tmp_path, "p [deg/s]", 1e5 * np.sin(np.arange(50)))
     (said,) = sp.read(path).provenance.damage
     assert "deg/s, expected 5.73e+03 deg/s at most (roll rate)" in said
-    # Told once, although the saved flight remembers it and is checked when it is read.
+    # Remarks once, although the saved flight remembers it and is checked when it is read.
     saved = sp.read(path).save(tmp_path / "log.nc")
     assert sp.read(saved).provenance.damage == (said,)
     assert said in sp.inspect(sp.read(saved)).problems

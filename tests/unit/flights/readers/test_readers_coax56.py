@@ -223,3 +223,11 @@ def _peak_of_refusal(path: Path, message: str) -> int:
         return tracemalloc.get_traced_memory()[1] - read_once
     finally:
         tracemalloc.stop()
+
+
+def test_all_fields_with_damaged_numbers_are_named_at_once(tmp_path: Path) -> None:
+    fields = coax_record()
+    position, inputs = fields["position"].copy(), fields["inputs"].copy()
+    position[1, 3], inputs[0, 5] = np.nan, np.inf
+    with pytest.raises(FlightError, match=r"2 faults: \(1\) Data\.position: 1 of 12 .*\(2\) Data\.inputs: 1 of 12"):
+        read(write_coax(tmp_path / "a.mat", position=position, inputs=inputs))

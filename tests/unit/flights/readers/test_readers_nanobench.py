@@ -97,3 +97,10 @@ def test_rows_of_another_layout_are_never_read(tmp_path: Path) -> None:
     flight = read(tmp_path / "b.csv")
     assert flight.time("x").size == 20
     assert "20 of 40 rows (50 %) are lost: line 22 has" in flight.provenance.damage[0]
+
+
+def test_all_columns_that_are_wrong_are_named_at_once(tmp_path: Path) -> None:
+    made = columns()
+    made["px"][3], made["imu_gyro_z"][5] = np.nan, np.inf
+    with pytest.raises(FlightError, match=r"2 faults: \(1\) px: 1 of 40 samples .*\(2\) imu_gyro_z: 1 of 40"):
+        read(write(tmp_path / "a.csv", made))

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from swashplate.errors import FlightError
-from swashplate.flights.readers.table_layout import TextTable, read_table
+from swashplate.flights.readers.table_layout import DelimitedTable, read_table
 
 ROWS = [f"{k / 100:.2f},{k},{2 * k}" for k in range(50)]
 HEAD = "time [s],p,q"
 
 
-def _table(lines, **mapping) -> TextTable:
+def _table(lines, **mapping) -> DelimitedTable:
     return read_table("\n".join([*lines, ""]), where="log.csv", mapping=mapping)
 
 
-def _columns(table: TextTable):
+def _columns(table: DelimitedTable):
     return [table.numbers(i, name="x").tolist() for i in range(table.width)]
 
 
