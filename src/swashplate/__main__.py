@@ -19,10 +19,11 @@ def main() -> NoReturn:
     gc.set_threshold(50_000, 20, 20)  # cells of a large table are no cycles: looking for some took a fifth of reading
     try:
         from swashplate.cli.app import main as run
-    except KeyboardInterrupt:
+
+        run()
+    except KeyboardInterrupt:  # while the verbs are loaded, or the command line is read
         print("Stopped. Nothing was left half-written.", file=sys.stderr)
         sys.exit(130)
-    run()
 
 
 if __name__ == "__main__":

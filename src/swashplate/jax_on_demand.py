@@ -15,6 +15,13 @@ from threading import RLock
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from swashplate.errors import SwashError
+
+try:
+    import resource
+except ImportError:  # Windows knows no such limits
+    resource = None
+
 _SETTINGS: dict[str, object] = {}
 _LOCK = RLock()
 
@@ -38,6 +45,7 @@ class _OnDemand(ModuleType):
     """A module that is imported when something of it is asked for."""
 
     def __getattr__(self, name: str) -> Any:
+        _refuse_little_memory()
         module = importlib.import_module(self.__name__)
         _catch_up()
         value = getattr(module, name)
@@ -47,11 +55,30 @@ class _OnDemand(ModuleType):
 
 def _catch_up() -> Any:
     """JAX, whole also where another thread is still loading it, with all that it had to be told."""
+    _refuse_little_memory()
     loaded = importlib.import_module("jax")
     with _LOCK:
         while _SETTINGS:
             loaded.config.update(*_SETTINGS.popitem())
     return loaded
+
+
+def _refuse_little_memory() -> None:
+    """With less memory than this JAX's compiler ends the process without a word: a segmentation fault.
+
+    Raises:
+        SwashError: where a limit of the system leaves too little; what else runs on the machine is not looked at.
+    """
+    if "jax" in sys.modules or resource is None:
+        return
+    for kind, least, command in ((resource.RLIMIT_AS, 2.0e9, "ulimit -v"), (resource.RLIMIT_DATA, 0.5e9, "ulimit -d")):
+        limit = resource.getrlimit(kind)[0]
+        if limit != resource.RLIM_INFINITY and limit < least:
+            raise SwashError(
+                f"this process may have {limit / 1e9:.2g} GB of memory ({command}), and JAX, which compiles the "
+                f"equations, needs {least / 1e9:g} GB, on a machine with many cores more.",
+                hint=f"Raise the limit: {command} unlimited.",
+            )
 
 
 if TYPE_CHECKING:

@@ -6,8 +6,10 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+from swashplate.visible import visible
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
@@ -52,11 +54,12 @@ class TextTable:
         """Its lines, and whether each is a heading, within `width` columns (None: however wide)."""
         if self.title:
             yield from ((False, line) for line in self.title.split("\n"))
-        for number, block in enumerate(self._blocks(width)):
+        shown = replace(self, head=_visible(self.head), rows=[_visible(row) for row in self.rows])
+        for number, block in enumerate(shown._blocks(width)):
             if number:
                 yield False, ""
-            for k, row in enumerate((self.head, *self.rows)):
-                for line in self._row(row, block):
+            for k, row in enumerate((shown.head, *shown.rows)):
+                for line in shown._row(row, block):
                     yield k == 0, line
 
     def text(self, width: int | None) -> str:
@@ -97,6 +100,10 @@ class TextTable:
                 for cell, (i, w) in zip(cells, block, strict=True)
             )  # fmt: skip
             yield _GAP.join(line).rstrip()
+
+
+def _visible(row: Sequence[str]) -> list[str]:
+    return [visible(cell) for cell in row]
 
 
 def _total(block: Numbered) -> int:

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 import swashplate as sp
 from swashplate import __main__ as entry
+from swashplate.cli import app as app_module
 from swashplate.cli.app import app
 from swashplate.cli.console import console
 from swashplate.flights import inspect as inspect_module
@@ -145,6 +146,20 @@ def test_an_interrupt_while_loading_is_words_too(
 
     monkeypatch.delitem(sys.modules, "swashplate.cli.app", raising=False)
     monkeypatch.setattr(sys, "meta_path", [Interrupting(), *sys.meta_path])
+    with pytest.raises(SystemExit) as ended:
+        entry.main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "Stopped. Nothing was left half-written.\n"
+
+
+def test_an_interrupt_while_the_command_line_is_made_is_words_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(**_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(app_module, "app", interrupted)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # those of this process stay
     with pytest.raises(SystemExit) as ended:
         entry.main()
     assert ended.value.code == 130

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
+import resource
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -117,3 +120,28 @@ def test_a_function_is_compiled_once_and_keeps_its_name() -> None:
     assert traced == [2]
     assert twice._cache_size() == 1
     assert (twice.__name__, twice.__doc__) == ("twice", "Doubled.")
+
+
+@pytest.mark.parametrize(("kind", "enough"), [(resource.RLIMIT_AS, 2.0e9), (resource.RLIMIT_DATA, 0.5e9)])
+def test_too_little_memory_is_told_and_enough_is_enough(kind: int, enough: float) -> None:
+    """The compiler would end the process with a segmentation fault (0.5 of what is enough), and does not with it."""
+    code = (
+        "import os, resource, sys\nkind, limit = map(int, sys.argv[1:])\n"
+        "if hasattr(os, 'sched_setaffinity'):\n"  # every core's threads need some more
+        "    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:2])\n"
+        "resource.setrlimit(kind, (limit, resource.getrlimit(kind)[1]))\n"
+        "from swashplate.__main__ import main\n"
+        "sys.argv[1:] = 'simulate --vehicle coax --maneuver hover:0.1s -o x.nc -q'.split()\nmain()"
+    )
+
+    def run(limit: float, folder: str) -> subprocess.CompletedProcess[str]:
+        words = [sys.executable, "-c", code, str(int(kind)), str(int(limit))]
+        return subprocess.run(words, capture_output=True, text=True, check=False, cwd=folder)
+
+    with tempfile.TemporaryDirectory() as folder:
+        little = run(0.5 * enough, folder)
+        assert (little.returncode, os.listdir(folder)) == (2, [])
+        assert little.stderr.count("\n") == 1
+        assert f"needs {enough / 1e9:g} GB" in little.stderr
+        more = run(1.05 * enough, folder)
+        assert (more.returncode, os.listdir(folder)) == (0, ["x.nc"]), more.stderr

@@ -44,6 +44,7 @@ from swashplate.cli import (
     vehicles,
 )
 from swashplate.cli.guard import Guarded
+from swashplate.cli.terminal import over
 
 app = typer.Typer(
     name="swash",
@@ -128,6 +129,7 @@ def _open_closed_streams() -> None:
 def main() -> NoReturn:
     """The console script. A polite kill ends as an interrupt does: temporary files are removed."""
     _open_closed_streams()
+    sys.stdout, sys.stderr = over(sys.stdout), over(sys.stderr)
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # the compiler's remarks to its own developers
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # the terminal is closed; `nohup` ignores that

@@ -10,8 +10,10 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from swashplate import progress_lines
+from swashplate.cli.terminal import below
 from swashplate.json_text import as_json, plain
 from swashplate.text_table import screen_width
+from swashplate.visible import visible
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -81,7 +83,9 @@ class Progress:
         with self._lock:
             if self._timer.finished.is_set():  # closed while rich was loading
                 return
-            bar = Bar(SpinnerColumn(), *columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True)
+            bar = Bar(
+                SpinnerColumn(), *columns, TimeElapsedColumn(), console=Console(file=below(sys.stderr)), transient=True
+            )
             bar.add_task(**self._latest)
             bar.start()
             self._bar = bar
@@ -91,7 +95,7 @@ class Progress:
         if self._tells:
             print(progress_lines.line(progress_lines.Told(what, done, total)), file=sys.stderr, flush=True)
         with self._lock:
-            self._latest = {"description": what, "completed": done, "total": total, "note": note}
+            self._latest = {"description": visible(what), "completed": done, "total": total, "note": visible(note)}
             if self._bar is not None:
                 self._bar.update(self._bar.task_ids[0], **self._latest)
             self._tell_stage()

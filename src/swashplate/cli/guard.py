@@ -16,6 +16,7 @@ from swashplate.cli.spelling import spelled
 from swashplate.cli.typed_first import refuse_wrong_names
 from swashplate.errors import SwashError
 from swashplate.extras import EXTRA_OF, missing
+from swashplate.visible import visible
 
 _LONGEST = 200  # characters of a foreign error that are shown
 _LONGEST_LINE = 1_900  # of a whole message: file names may have thousands
@@ -44,7 +45,7 @@ def complain(message: str) -> None:
     """One line of error on standard error; red where there is a terminal and nobody asked for no colour."""
     colour = False if os.environ.get("NO_COLOR") else None  # no-color.org: set and not empty
     typer.secho("Error: ", fg="red", bold=True, err=True, nl=False, color=colour)
-    line = " ".join(message.split())
+    line = visible(" ".join(message.split()))
     typer.echo(line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE - 6]} [...]", err=True)
 
 
