@@ -141,11 +141,11 @@ def refuse_turned_commands(
         told, _, misfit = sign_of(omega[seen], h, integrations=1)
         if told == -sense:
             raise ControllerError(
-                f"a positive {command} command makes {output} {_SIGNED[told]}, expected {_SIGNED[sense]} (one sign is "
-                f"{misfit[0]:.2f} rad off, the other {misfit[1]:.2f}): no gains are given.",
+                f"a positive {command} command makes {output} {_SIGNED[told]}, expected {_SIGNED[sense]} (with the "
+                f"sign turned it is {misfit[0]:.2f} rad off, as it is {misfit[1]:.2f}): no gains are given.",
                 where=where,
                 channel=command,
-                hint="Turn the output in the servo mapping (reversed), or look at the model's sign of this input.",
+                hint="Look at the sign of its travel in the servo mapping, and at the model's sign of this input.",
             )
 
 

@@ -70,7 +70,7 @@ def suggest(
     trials = _trials(wanted, forms, responses, seed=seed, tell=tell)
     best = _pick(trials)
     if best.unstable:
-        low = 2.0 * best.unstable / TWO_PI
+        low = float(2.0 * best.unstable / TWO_PI)
         stable: list[TriedStructure] = []
         if responses.method != "joint" and all(t.omega[-1] >= _WIDE * TWO_PI * low for t in wanted):
             ends = (low, _highest(wanted))

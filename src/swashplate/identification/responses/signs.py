@@ -78,11 +78,14 @@ class ResponseSign:
         """What was found, in a sentence's part."""
         if not self.low < self.high:
             return f"it has no coherent band above {_LOWEST / TWO_PI:g} Hz"
-        band, (better, worse) = f"{self.low:.2g}-{self.high:.2g} Hz", self.misfit
-        told = f"one sign is {better:.2f} rad off the response of an aircraft over {band}, the other {worse:.2f} rad"
+        band, (better, worse) = f"over {self.low:.2g}-{self.high:.2g} Hz", self.misfit
+        both = f"{better:.2f} and {worse:.2f} rad off"
         if better > _FOLLOWS:
-            return f"no aircraft responds like this, {told}; a controller's answer may"
-        return told if self.told else f"the band is too narrow to tell, {told}"
+            return f"{band} neither sign follows an aircraft's response ({both}); a controller's answer looks like this"
+        if not self.told:
+            return f"{band} both signs follow ({both}): the band is too narrow to tell"
+        turned, kept = (better, worse) if self.wrong else (worse, better)
+        return f"{band} it is {turned:.2f} rad off an aircraft's response with the sign turned, {kept:.2f} rad as it is"
 
 
 def sign_of(
@@ -179,6 +182,7 @@ def sign_problems(pairs: FrequencyResponse, flight: Flight, *, called: Mapping[s
             words.append(
                 f"{sign.output} / {sign.input} has the wrong sign: a positive {sign.input} makes {sign.output} "
                 f"{_SIGNED[sign.told]}, expected {_SIGNED[sign.expected]} ({sign.words}). {remedy} If it is "
-                f"{sign.output} that counts the other way, turn the unit of that channel instead."
+                f"{sign.output} that counts the other way, turn the unit of that channel instead. If nothing but the "
+                f"controller moved {sign.input}, no sign mends it."
             )
     return words
