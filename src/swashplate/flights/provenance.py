@@ -10,6 +10,14 @@ from typing import Any
 LATEST = 1e20
 """Seconds; nanoseconds since 1970 that are taken for seconds stay below."""
 
+_FIRMWARES: Mapping[str, str] = {
+    "ardupilot": "ArduPilot",
+    "blackbox": "unnamed (Blackbox)",
+    "ulog": "PX4",
+    "px4log": "PX4",
+}
+"""What the format of a log tells of its autopilot, by reader."""
+
 
 @dataclass(frozen=True)
 class Event:
@@ -39,6 +47,7 @@ class Provenance:
         reader_version: its version.
         simulated: True where no aircraft flew.
         vehicle: the vehicle as the log or the user names it.
+        firmware: the autopilot's, as the log names it ("ArduCopter V4.5.7"); "" where it does not.
         notes: what a reader found wrong and what the user must know.
         damage: what is broken in the file itself (cut off, lost bytes, clock resets); the rest of it was read.
         parameters: an autopilot's settings as the log begins; changes in flight are events.
@@ -53,11 +62,17 @@ class Provenance:
     reader_version: str = ""
     simulated: bool = False
     vehicle: str = ""
+    firmware: str = ""
     notes: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     epoch: float = 0.0
+
+    @property
+    def autopilot(self) -> str:
+        """The firmware that wrote the log, as far as it or its format tells; "" where no autopilot wrote it."""
+        return self.firmware or _FIRMWARES.get(self.reader, "")
 
     def parameter(self, name: str, *, at: float = math.inf) -> float | None:
         """An autopilot's setting at a time [s], at the end of the log if none is given; None where it is not logged."""

@@ -148,6 +148,7 @@ def read(source: Source, options: Options) -> Flight:
         NAME,
         VERSION,
         vehicle=told.vehicle,
+        firmware=told.firmware,
         notes=tuple(left.notes),
         damage=tuple(left.damage),
         parameters=told.parameters,

@@ -34,13 +34,14 @@ class Story:
     """What the log says beside its measurements.
 
     Attributes:
-        vehicle: firmware and frame, as the log names them ("" where it does not).
+        vehicle: firmware and frame, as the log names them ("" where it does not). firmware: that alone.
         parameters: as first reported.
         events: in order of time.
         damage: what the story shows to be missing: a flight or a sweep that does not end.
     """
 
     vehicle: str
+    firmware: str
     parameters: dict[str, float]
     events: tuple[Event, ...]
     damage: tuple[str, ...]
@@ -187,4 +188,4 @@ def story(messages: Messages, *, end: float) -> Story:
     if arming and arming[-1].kind == "armed":
         damage.append(f"the log is cut off: it ends at {end:.2f} s with the motors armed since {arming[-1].time:.2f} s")
     events = sorted((*changes, *texts, *_modes(messages, firmware), *arming, *sweeps), key=lambda event: event.time)
-    return Story(_vehicle(firmware, texts), parameters, tuple(events), tuple(damage))
+    return Story(_vehicle(firmware, texts), firmware, parameters, tuple(events), tuple(damage))

@@ -75,6 +75,7 @@ def read(source: Source, options: Options) -> Flight:
         NAME,
         VERSION,
         vehicle=" ".join(filter(None, (header.values.get("Craft name", ""), fields.firmware))),
+        firmware=fields.called,
         notes=tuple(told.notes),
         damage=tuple(told.damage),
         parameters=_parameters(header, own=fields.rotorflight),

@@ -14,7 +14,7 @@ from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.identification.core.record_facts import (
     INJECTED,
-    autopilot_gains,
+    autopilot_facts,
     bystanders_of,
     means,
     slowest_of,
@@ -32,8 +32,10 @@ from swashplate.identification.responses.copies import (
 from swashplate.identification.responses.estimate import Beside, Question, estimate_beside
 from swashplate.identification.responses.excitations import answering_words, only_answering, told_sweeps
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.responses.moved_from_outside import excitation_of, moved_inputs
 from swashplate.identification.responses.references import references_of
 from swashplate.identification.responses.resolution import LONGER, blur
+from swashplate.identification.responses.signs import sign_problems
 from swashplate.identification.responses.spectra import signals
 from swashplate.identification.responses.window_lengths import Windows, choose_windows
 
@@ -176,9 +178,12 @@ def respond(
         for name in response_warnings.still(flights, references)
     ]
     told = any(event.kind == "sweep" for flight in flights for event in flight.provenance.events)
+    answers: list[str] = []
     if not question.references and not told:
         answers = answer_words(pieces, inputs, outputs)
-        problems += [] if answers and any(map(sweeps, flights)) else answers
+        answers = [] if answers and any(map(sweeps, flights)) else answers
+        problems += answers
+    excitation = excitation_of(inputs, references=references, swept=moved.swept if moved else (), answers=answers)
     if free is not None:
         # Both as the windows blur them, so that only the loop tells them apart.
         biased = response_warnings.biased_by_feedback(blurred, free)
@@ -212,6 +217,8 @@ def respond(
     warnings, problems = (warnings + lacking, problems) if given else (warnings, problems + lacking)
     if moved:
         warnings += moved.words(omega / TWO_PI, held, outputs, loops)
+    channels_of = renamed_channels(flights, (*inputs, *outputs))
+    problems += sign_problems(made.select(outputs, moved_inputs(excitation)), flights[0], called=channels_of)
     if not references:
         axes = max(len({event.details["axis"] for one in logged for event in one.sweeps}), len(flights))
         warnings += response_warnings.unused_references(flights, whole, names=INJECTED, axes=axes)
@@ -243,8 +250,9 @@ def respond(
             **({"sweeps": list(moved.sweeps)} if moved and moved.tracked else {}),
             **({"beside": list(moved.beside)} if moved and moved.beside else {}),
             "averages": [m.averages for m in matrices],
-            **({"channels": called} if (called := renamed_channels(flights, (*inputs, *outputs))) else {}),
-            **autopilot_gains(flights),
+            **({"channels": channels_of} if channels_of else {}),
+            "excitation": excitation,
+            **autopilot_facts(flights),
             "hashes": hashes(flights),
             "means": means(flights, (*inputs, *outputs)),
         },
