@@ -17,11 +17,11 @@ from collections.abc import Mapping, Sequence
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.rate_gain_names import gain_text, untuned
 from swashplate.errors import ControllerError
+from swashplate.flights.excitation import OUTSIDE
 from swashplate.identification.frequency.handling import ResponseMargins
 from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.identification.frequency.response_cost import ACCEPTABLE
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.identification.responses.moved_from_outside import OUTSIDE
 from swashplate.identification.responses.signs import response_sign, sign_of
 from swashplate.identification.time.feedback import UNMOVED
 from swashplate.models.card import Card

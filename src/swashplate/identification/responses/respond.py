@@ -8,21 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.errors import FlightError
-from swashplate.flights.conditioning.uniform_records import renamed_channels
+from swashplate.flights.conditioning.uniform_records import renamed_channels, slowest_of
 from swashplate.flights.consistency import refuse_inconsistent
+from swashplate.flights.excitation import excitations, of_inputs
 from swashplate.flights.flight import Flight, as_flights
-from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.identification.core.record_facts import (
     INJECTED,
     autopilot_facts,
     bystanders_of,
     means,
-    slowest_of,
     unit_of,
 )
 from swashplate.identification.core.sources import hashes, sources_of
 from swashplate.identification.responses import response_warnings
-from swashplate.identification.responses.answers import answer_words
 from swashplate.identification.responses.copies import (
     copies_of,
     copy_words,
@@ -32,7 +30,6 @@ from swashplate.identification.responses.copies import (
 from swashplate.identification.responses.estimate import Beside, Question, estimate_beside
 from swashplate.identification.responses.excitations import answering_words, only_answering, told_sweeps
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.identification.responses.moved_from_outside import excitation_of, moved_inputs
 from swashplate.identification.responses.references import references_of
 from swashplate.identification.responses.resolution import LONGER, blur
 from swashplate.identification.responses.signs import sign_problems
@@ -123,6 +120,8 @@ def respond(
     called, moved = renamed_channels(flights, commands), None
     if references or not direct:
         moved = references_of(pieces, logged, commands, len(inputs), recorded, called=called)
+    swept = [name for name, seen in zip(inputs, moved.swept, strict=False) if seen] if moved else []
+    excitation = of_inputs(excitations(flights, inputs, outputs=outputs, references=references, swept=swept))
     answering = moved.answering if moved else only_answering(logged, inputs, called=called)
     # What was swept beside the named inputs is held still with them; the named ones are given.
     whole = (*inputs, *(moved.beside if moved else ()))
@@ -177,13 +176,10 @@ def respond(
         f"reference '{name}' never moves: nothing was injected, so the joint estimate has no number."
         for name in response_warnings.still(flights, references)
     ]
-    told = any(event.kind == "sweep" for flight in flights for event in flight.provenance.events)
-    answers: list[str] = []
-    if not question.references and not told:
-        answers = answer_words(pieces, inputs, outputs)
-        answers = [] if answers and any(map(sweeps, flights)) else answers
-        problems += answers
-    excitation = excitation_of(inputs, references=references, swept=moved.swept if moved else (), answers=answers)
+    # Of inputs that no sweep moved while others were swept, `answering_words` tell.
+    asked = {name: one for name, one in excitation.items() if name not in answering}
+    problems += response_warnings.answers(asked)
+    warnings += response_warnings.unsure(asked)
     if free is not None:
         # Both as the windows blur them, so that only the loop tells them apart.
         biased = response_warnings.biased_by_feedback(blurred, free)
@@ -218,7 +214,9 @@ def respond(
     if moved:
         warnings += moved.words(omega / TWO_PI, held, outputs, loops)
     channels_of = renamed_channels(flights, (*inputs, *outputs))
-    problems += sign_problems(made.select(outputs, moved_inputs(excitation)), flights[0], called=channels_of)
+    problems += sign_problems(
+        made.select(outputs, tuple(name for name in inputs if excitation[name].outside)), flights[0], called=channels_of
+    )
     if not references:
         axes = max(len({event.details["axis"] for one in logged for event in one.sweeps}), len(flights))
         warnings += response_warnings.unused_references(flights, whole, names=INJECTED, axes=axes)
@@ -251,7 +249,7 @@ def respond(
             **({"beside": list(moved.beside)} if moved and moved.beside else {}),
             "averages": [m.averages for m in matrices],
             **({"channels": channels_of} if channels_of else {}),
-            "excitation": excitation,
+            "excitation": {name: {"kind": one.kind, "words": one.words} for name, one in excitation.items()},
             **autopilot_facts(flights),
             "hashes": hashes(flights),
             "means": means(flights, (*inputs, *outputs)),
