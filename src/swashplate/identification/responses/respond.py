@@ -37,6 +37,7 @@ from swashplate.identification.responses.multi_input import (
 from swashplate.identification.responses.own_references import own_references
 from swashplate.identification.responses.references import reference_columns, sweeps_of
 from swashplate.identification.responses.resolution import LONGER, TWICED, blur, first_guess, without
+from swashplate.identification.responses.shared_errors import SharedErrors
 from swashplate.identification.responses.spectra import Signals, SpectralMatrix, signals, spectral_matrix
 from swashplate.identification.responses.window_lengths import Windows, choose_windows
 
@@ -337,6 +338,11 @@ def _composed(
         input_coherence=between.real,
         method="along sweeps" if question.tracked and question.references else _METHODS[bool(question.references)],
         windows=tuple(m.window for m in matrices),
+        shared=SharedErrors.of(
+            _mean(weight, np.stack([part.noise for part in parts])),
+            _mean(weight, np.stack([part.inverse for part in parts])),
+            _mean(weight, np.stack([np.full(omega.size, m.window) for m in matrices])),
+        ),
     )
 
 
