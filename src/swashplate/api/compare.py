@@ -29,7 +29,7 @@ def compare(
     """Put cases side by side, or fly models along one flight.
 
     Without flights by what the cases are, each against the first: frequency responses (coherent bands, mismatch J,
-    difference in random errors), fits (parameters with Cramer-Rao bounds, difference in standard deviations, modes),
+    difference in random errors), fits (parameters with standard deviations, difference in standard deviations, modes),
     models (modes, responses over each other; vehicles in hover). Fits beside models are compared as models.
 
     With flights models follow the recorded inputs, as with MATLAB's `compare`: start states, constant shifts of the

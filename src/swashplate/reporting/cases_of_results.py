@@ -15,7 +15,7 @@ from swashplate.reporting.structure import Cell, Table
 
 
 def compare_estimates(cases: Mapping[str, Result[Any, Any]]) -> CaseParts:
-    """Values and Cramer-Rao bounds by parameter; differences from the first in standard deviations of the difference.
+    """Values and standard deviations by parameter; differences from the first in standard deviations of the difference.
 
     The sigma of a difference is that of independent fits, sqrt(s1^2 + s2^2); fits to the same data are not, and that
     is said. The corrected bound is taken where a fit has one.

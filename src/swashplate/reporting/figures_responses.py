@@ -46,7 +46,7 @@ _COLORS = (MODEL, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 
 
 def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answers | None = None) -> Figure:
-    """Magnitude, phase and coherence of one pair with +-2 random errors; a model with +-2 Cramér-Rao bounds beside it.
+    """Magnitude, phase and coherence of one pair with +-2 random errors; a model with +-2 sigma beside it.
 
     Args:
         responses: measured.
@@ -92,7 +92,7 @@ def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answer
         ]
         keys.insert(1, Key("model", MODEL, "dash"))
         if np.isfinite(model.gain).all():
-            keys.append(Key("±2 Cramér-Rao bounds", _BOUND, "band"))
+            keys.append(Key("±2 σ of the model", _BOUND, "band"))
     band_found = responses.band(output, input)
     told = (
         "no coherent band" if band_found is None else f"coherent from {_hz(band_found[0])} to {_hz(band_found[1])} Hz"

@@ -108,7 +108,7 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         rows.append(
             (
                 "Accuracy",
-                f"Cramér-Rao ≤ {CR_TARGET:g} %, insensitivity ≤ {I_TARGET:g} %: {text}.",
+                f"σ ≤ {CR_TARGET:g} %, insensitivity ≤ {I_TARGET:g} %: {text}.",
                 "caution" if weak else "good",
             )
         )

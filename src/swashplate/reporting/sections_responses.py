@@ -70,7 +70,7 @@ def tone(cost: float) -> str:
 
 
 def weak(p: Estimate) -> bool:
-    """Whether a parameter misses its target for the Cramér-Rao bound or the insensitivity."""
+    """Whether a parameter misses its target for the standard deviation or the insensitivity."""
     return p.sigma_percent > CR_TARGET or p.insensitivity_percent > I_TARGET
 
 
@@ -80,7 +80,7 @@ def _percent(value: float, limit: float) -> Cell:
 
 
 def parameter_table(parameters: Sequence[Estimate]) -> Table:
-    """Every number with its Cramér-Rao bound and insensitivity, coloured by the targets."""
+    """Every number with its standard deviation and insensitivity, coloured by the targets."""
     rows = []
     for p in parameters:
         moving = not p.fixed and not p.tie
@@ -98,11 +98,12 @@ def parameter_table(parameters: Sequence[Estimate]) -> Table:
         )
     return Table(
         "Parameters",
-        ("parameter", "unit", "start", "identified", "Cramér-Rao", "insensitivity", "remarks"),
+        ("parameter", "unit", "start", "identified", "σ", "insensitivity", "remarks"),
         tuple(rows),
-        note=f"Targets: Cramér-Rao {CR_TARGET:g} %, insensitivity {I_TARGET:g} % of the value; beyond twice of it a "
-        "number cannot be estimated from these responses. J is not a likelihood: the true scatter is about √2·σ (dB) "
-        "times the bound (see the proof page for what was measured).",
+        note="σ: standard deviation, the random errors of the responses carried through the fit. Errors go together, "
+        "because gusts move all outputs at once; a response that is missed by more than its errors counts with its "
+        f"misfit. Insensitivity: σ, were all other numbers known. Targets: {CR_TARGET:g} % and {I_TARGET:g} % of the "
+        "value; beyond twice of it a number cannot be estimated from these responses.",
     )
 
 
@@ -148,7 +149,7 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
 def _mode_table(modes: Sequence[ModeAccuracy]) -> Table:
     return Table(
         "Modes of the identified model",
-        ("eigenvalue [1/s]", "frequency [rad/s]", "CR %", "damping", "CR", ""),
+        ("eigenvalue [1/s]", "frequency [rad/s]", "σ %", "damping", "σ", ""),
         tuple(
             (
                 Cell(f"{m.eigenvalue.real:.4g}" + (f" ± {m.eigenvalue.imag:.4g} j" if m.eigenvalue.imag else "")),
@@ -160,7 +161,7 @@ def _mode_table(modes: Sequence[ModeAccuracy]) -> Table:
             )
             for m in modes
         ),
-        note="The parameters' Cramér-Rao bounds and correlations, carried to the modes.",
+        note="The parameters' standard deviations and correlations, carried to the modes.",
     )
 
 
@@ -171,7 +172,7 @@ def time_fit_section(fit: Result[StateSpaceModel, TimeDetails]) -> Section:
             Cell(p.name),
             Cell(unit_words(p.unit)),
             Cell(value_words(p.start), number=True),
-            Cell(value_words(p.value, p.sigma), number=True, strong=True),
+            Cell(value_words(p.value, p.best_sigma), number=True, strong=True),
             _percent(p.sigma_percent, CR_TARGET),
             Cell("at its bound" if p.at_bound else "", tone="bad" if p.at_bound else "plain"),
         )
@@ -338,8 +339,8 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
             "The rate loop on the identified model",
             ("axis", "", "suggested", "flown"),
             judged,
-            note="If the loop crosses several times, the smallest margin counts. ± follows from the Cramér-Rao "
-            "bounds of the model's parameters. The controller's filters (FLTT, FLTE, FLTD; cutoff) are included. "
+            note="If the loop crosses several times, the smallest margin counts. ± follows from the standard "
+            "deviations of the model's parameters. The controller's filters (FLTT, FLTE, FLTD; cutoff) are included. "
             f"The demand steps at once: {firmware}'s own shaping is not included.",
         ),
     )
@@ -390,6 +391,6 @@ def handling_section(m: ResponseMaterial) -> Section | None:
         "the frequencies of 45° phase margin and 6 dB gain margin; phase delay by a coherence-weighted line "
         "from ω180 to twice of it. Its boundaries are for manned helicopters: for a small one scale "
         "frequencies with the square root of the size (Froude). ± of the flight: random error; of the model: what "
-        "the Cramér-Rao bounds of its parameters make of it.",
+        "the standard deviations of its parameters make of it.",
     )
     return Section("handling", "Handling qualities", (table,), folded=True)

@@ -31,7 +31,7 @@ FALSE_ALARM = 1e-3
 """Chance that the noise alone refutes a right model, over all records, outputs and bands together."""
 
 SIGMAS = 3.0
-"""Cramér-Rao bounds of its parameters by which a model's answer may be off."""
+"""Standard deviations of its parameters by which a model's answer may be off."""
 
 DOUBTED = 2.0
 """By so much bounds may be too narrow: a parameter refutes a model only beyond as many times `SIGMAS` of them."""
@@ -279,7 +279,7 @@ class _Seen:
         return np.asarray((flat - self._constants @ (self._constants.T @ flat)).reshape(values.shape))
 
     def moved(self, grid: Array, slopes: Complex, noise: NoiseLevel, step: float) -> Complex:
-        """Lines of what one Cramér-Rao bound of each parameter makes, (n_lines, n_outputs, n_parameters)."""
+        """Lines of what one standard deviation of each parameter makes, (n_lines, n_outputs, n_parameters)."""
         hertz = np.fft.rfftfreq(len(self._inputs), step)
         used = np.any(noise.bands[self._record], axis=0)
         omega = np.asarray(2.0 * np.pi * hertz[used], dtype=np.float64)
@@ -294,7 +294,7 @@ class _Seen:
 
 
 def own_bounds(model: StateSpaceModel, outputs: Sequence[str], grid: Array) -> tuple[tuple[str, ...], Complex]:
-    """What one Cramér-Rao bound of each free parameter that has any does to the responses at `grid` [rad/s].
+    """What one standard deviation of each free parameter that has any does to the responses at `grid` [rad/s].
 
     Returns:
         Their names, and (n, n_outputs, n_parameters, n_inputs).

@@ -25,7 +25,7 @@ GROWTH, LEAST_GROWTH = 0.05, 0.5
 """J_ave may grow by this share, or by this much, in the whole reduction."""
 
 MOVED = 3.0
-"""Cramér-Rao bounds by which a mode inside the band may move."""
+"""Standard deviations by which a mode inside the band may move."""
 
 FAR = 0.3
 """Share of its frequency by which a mode may move, however little its bounds tell (or one bound, if that is more)."""
@@ -34,7 +34,7 @@ _HARDLY = 0.01
 """Share of its frequency up to which a move of a mode is not worth a word."""
 
 HOPELESS = 100.0
-"""Percent of Cramér-Rao bound above which a parameter that cannot be dropped is held at its start, if that does."""
+"""Standard deviation in percent above which a parameter that cannot be dropped is held at its start, if that does."""
 
 
 def reduce(
@@ -45,7 +45,7 @@ def reduce(
 ) -> StateSpaceFit:
     """The fit with what the responses do not tell taken out (Tischler and Remple 2012, ch. 13).
 
-    The most insensitive parameter above 10 % first, then the one with the largest Cramér-Rao bound above 20 %; refit;
+    The most insensitive parameter above 10 % first, then the one with the largest standard deviation above 20 %; refit;
     a drop stands if J_ave has hardly grown since the start, no mode inside the band has gone or moved beyond its
     bounds, and the hold-out is followed as well as before; otherwise the parameter is put back and not tried again.
 
@@ -176,5 +176,5 @@ def _candidate(fit: StateSpaceFit, tried: set[str]) -> tuple[str, str] | None:
     vague = [p for p in moving if p.sigma_percent > CR_TARGET]
     if vague:
         worst = max(vague, key=lambda p: p.sigma_percent)
-        return worst.name, f"Cramér-Rao bound {worst.sigma_percent:.0f} %"
+        return worst.name, f"standard deviation {worst.sigma_percent:.0f} %"
     return None

@@ -17,7 +17,7 @@ from swashplate.models.linear.state_space import StateSpaceModel
 
 
 def bounds_of(model: StateSpaceModel) -> dict[str, float]:
-    """Standard deviations (Cramér-Rao bounds) of the free parameters that the model's file carries.
+    """Standard deviations of the free parameters that the model's file carries.
 
     Raises:
         ControllerError: where it carries none.
@@ -25,7 +25,7 @@ def bounds_of(model: StateSpaceModel) -> dict[str, float]:
     bounds = {n: p.cramer_rao for n in model.free if np.isfinite((p := model.parameters[n]).cramer_rao)}
     if not bounds:
         raise ControllerError(
-            "no number of the file has a Cramér-Rao bound.",
+            "no number of the file has a standard deviation (cramer_rao).",
             where=model.name,
             channel="--tolerances",
             hint="Take a model of `swash fit-ss` or `swash fit-time`, or say what varies: --vary Xu=5%.",

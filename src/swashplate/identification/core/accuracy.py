@@ -11,16 +11,28 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.parameter_row import Row
-from swashplate.identification.core.result import Direction
+from swashplate.identification.core.result import Direction, Estimate
 
 _BLIND = 1.0
 """A direction whose standard deviation exceeds this many scales is named as one that the data hardly see."""
 
-_LEAST_FREE = 0.05
-"""Part of a line's error that is taken to be left in its residual at least."""
-
 _NO_INFORMATION = 1e-9
 """Data information per squared scale below which a parameter without a prior cannot be estimated at all."""
+
+
+_LISTED = 6
+"""Numbers that a warning names."""
+
+
+def sign_words(estimates: Sequence[Estimate]) -> list[str]:
+    """Which free numbers lie within two standard deviations of zero, in words: neither their sign nor their size is
+    known."""
+    open_ = [e for e in estimates if e.free and np.isfinite(e.best_sigma) and abs(e.value) < 2.0 * e.best_sigma]
+    if not open_:
+        return []
+    named = ", ".join(f"{e.name} {e.value:.3g} ± {2.0 * e.best_sigma:.2g}" for e in open_[:_LISTED])
+    more = f" and {len(open_) - _LISTED} more" if len(open_) > _LISTED else ""
+    return [f"the data do not tell the sign of {named}{more} (two standard deviations): do not use these numbers."]
 
 
 def refuse_unseen(row: Row, information: Array, *, where: str) -> None:
@@ -87,29 +99,6 @@ def information_beyond(covariance: Array, prior: Array) -> Array:
     """The information in a covariance (p, p) that the priors (p, p) had not; nothing where they had more."""
     stretch, turn = np.linalg.eigh(np.linalg.pinv(covariance, hermitian=True) - prior)
     return np.asarray((turn * np.maximum(stretch, 0.0)) @ turn.T)
-
-
-def sandwich(plain: Array, residuals: Sequence[Array], slopes: Sequence[Array], *, lags: int) -> Array:
-    """Covariance by what the residuals are, whatever their size and their size over frequency: M^-1 B M^-1.
-
-    B sums the products of the scores S_t' v_t over lines up to `lags` apart, tapered linearly (White 1980; Newey and
-    West 1987). Each residual counts as if the line had been left out of the fit, v / (1 - S M^-1 S'): a line that the
-    fit runs through says nothing of its own error (MacKinnon and White 1985).
-
-    Args:
-        plain: M^-1 = inv(sum S' S), shape (p, p), scaled.
-        residuals: per block of neighbouring lines, weighted, shape (n, m). slopes: their derivatives, (n, m, p).
-        lags: lines that may be correlated; few beside n.
-    """
-    middle = np.zeros_like(plain)
-    for residual, slope in zip(residuals, slopes, strict=True):
-        leverage = np.einsum("nmp,pq,nmq->nm", slope, plain, slope)
-        left_out = residual / np.maximum(1.0 - leverage, _LEAST_FREE)
-        scores = np.einsum("nm,nmp->np", left_out, slope)
-        for lag in range(min(lags, len(scores) - 1) + 1):
-            product = scores[: len(scores) - lag].T @ scores[lag:] * (1.0 - lag / (lags + 1.0))
-            middle += product if lag == 0 else product + product.T
-    return np.asarray(plain @ middle @ plain)
 
 
 def _taken(sensitivity: Array, plain: Array) -> tuple[Array, Array]:

@@ -40,7 +40,8 @@ class Estimate:
         name, unit: as in the model.
         start: the model's value before the fit.
         value: the estimate.
-        sigma: Cramér-Rao bound sqrt(inv(H)_ii), prior included [same unit].
+        sigma: standard deviation: the Cramér-Rao bound sqrt(inv(H)_ii) of a likelihood, prior included; of a fit to
+            responses what their errors make of it [same unit].
         sigma_corrected: the bound corrected for coloured residuals (Morelli and Klein 1997), NaN where the method has
             none.
         insensitivity: 1/sqrt(H_ii), were all others known [same unit].
@@ -82,7 +83,7 @@ class Estimate:
 
     @property
     def sigma_percent(self) -> float:
-        return 100.0 * self.sigma / abs(self.value) if self.value else float("inf")
+        return 100.0 * self.best_sigma / abs(self.value) if self.value else float("inf")
 
     @property
     def insensitivity_percent(self) -> float:
@@ -345,8 +346,7 @@ class Result(Shown, Generic[Model, Details]):
     def columns(self) -> list[tuple[str, list[str]]]:
         """Headings and cells of the table of estimates."""
         every = self.estimates
-        # The targets for fits to responses (20 %, 10 %) are set for the plain bound.
-        sigma = {e.name: e.sigma if self.costs else e.best_sigma for e in every}
+        sigma = {e.name: e.best_sigma for e in every}
         return [
             ("parameter", [e.name for e in every]),
             ("start", [f"{e.start:.5g}" for e in every]),

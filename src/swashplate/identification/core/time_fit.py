@@ -274,6 +274,7 @@ def _words(parameters: Sequence[Estimate], optimum: Optimum) -> tuple[str, ...]:
     vague = [p.name for p in parameters if not p.sigma_percent <= VAGUE]
     if vague:
         words.append(f"standard deviation above {VAGUE:g} %: {', '.join(vague)}; the records hardly tell them.")
+    words += accuracy.sign_words(parameters)
     stopped = [p.name for p in parameters if p.at_bound]
     if stopped:
         words.append(f"ended on a bound: {', '.join(stopped)}.")

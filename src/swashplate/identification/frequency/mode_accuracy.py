@@ -28,7 +28,7 @@ class ModeAccuracy:
     Attributes:
         eigenvalue: with the positive imaginary part [1/s].
         frequency: its modulus [rad/s]. damping: ratio; 1 for a real mode that fades, -1 for one that grows.
-        frequency_bound, damping_bound: Cramér-Rao bounds; infinite where a parameter behind them is not told.
+        frequency_bound, damping_bound: standard deviations; infinite where a parameter behind them is not told.
         inside: whether the mode lies above the lowest fitted frequency.
     """
 
@@ -62,7 +62,7 @@ def mode_accuracy(
 
     Args:
         model: with its numbers.
-        bounds: Cramér-Rao bounds of the free parameters, in the order of `correlation` (n, n).
+        bounds: standard deviations of the free parameters, in the order of `correlation` (n, n).
         lowest: fitted frequency [rad/s].
     """
     a = model.explicit()[0]

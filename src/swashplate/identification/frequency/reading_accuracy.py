@@ -1,4 +1,4 @@
-"""How far a number that is read off a fitted model moves with the Cramér-Rao bounds of the model's parameters."""
+"""How far a number that is read off a fitted model moves with the standard deviations of the model's parameters."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Answers:
 
     Attributes:
         omega: [rad/s]. response: H(j omega), shape (n,).
-        gain, phase: what the Cramér-Rao bounds make of log|H| and of the phase [rad], shape (n,).
+        gain, phase: what the standard deviations of the parameters make of log|H| and of the phase [rad], shape (n,).
     """
 
     omega: Array
@@ -52,9 +52,8 @@ def spread(fit: Fitted, output: str, input: str, omega: Array, read: Callable[[C
     """Numbers read off one response of a fitted model, and what the parameters' bounds make of them.
 
     With a square root L of the bounds' covariance (correlations included) every column moves all parameters together,
-    and the response by its logarithm's slopes; the squares of what each does add up. As the bounds themselves these
-    figures order, they are no standard deviations (Tischler and Remple 2012, ch. 12). NaN where a number vanishes on
-    the way.
+    and the response by its logarithm's slopes; the squares of what each does add up. NaN where a number vanishes on the
+    way.
 
     Args:
         fit: a transfer-function or state-space fit.

@@ -14,10 +14,9 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
-from swashplate.identification.core.accuracy import blind_directions, sandwich
 from swashplate.identification.core.parameter_row import Row
-from swashplate.identification.core.result import Direction
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
+from swashplate.identification.responses.shared_errors import ErrorParts
 
 POINTS = 20
 """Frequencies per response, spread evenly in log frequency."""
@@ -31,8 +30,8 @@ ACCEPTABLE, INDISTINGUISHABLE = 100.0, 50.0
 SIGMAS = 3.0
 """Errors by which a response that was not seen may exceed its estimate."""
 
-_DB = 20.0 / np.log(10.0)
-_DEG = 180.0 / np.pi
+DB, DEG = 20.0 / np.log(10.0), 180.0 / np.pi
+"""What real and imaginary part of a logarithm are in dB and degrees."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +45,7 @@ class Target:
         coherence: partial coherence there, shape (n,).
         ceiling: True where nothing coherent was seen, and `measured` is what the response cannot exceed.
         error: relative random error there, shape (n,); None where it is not known.
+        shared: what this error has in common with those of other points; None where it is not known.
     """
 
     output: str
@@ -55,6 +55,7 @@ class Target:
     coherence: Array
     ceiling: bool = False
     error: Array | None = None
+    shared: ErrorParts | None = None
 
     @property
     def name(self) -> str:
@@ -63,8 +64,14 @@ class Target:
     def above(self, omega: float) -> Target:
         """The part from a frequency [rad/s] on."""
         k = self.omega >= omega
-        error = None if self.error is None else self.error[k]
-        return replace(self, omega=self.omega[k], measured=self.measured[k], coherence=self.coherence[k], error=error)
+        return replace(
+            self,
+            omega=self.omega[k],
+            measured=self.measured[k],
+            coherence=self.coherence[k],
+            error=None if self.error is None else self.error[k],
+            shared=None if self.shared is None else self.shared.among(k),
+        )
 
     @property
     def weights(self) -> tuple[Array, Array]:
@@ -95,7 +102,7 @@ class ResponseComparison:
     def residuals(self) -> Array:
         """Measured less model [dB, deg], shape (n, 2)."""
         error = -log_error(self.model, self.target.measured)
-        return np.stack([_DB * error.real, _DEG * error.imag], axis=1)
+        return np.stack([DB * error.real, DEG * error.imag], axis=1)
 
 
 def target(
@@ -130,7 +137,10 @@ def target(
     at = np.geomspace(omega[0], omega[-1], points)
     log_at = np.interp(np.log(at), np.log(omega), log.real) + 1j * np.interp(np.log(at), np.log(omega), log.imag)
     seen, sure = (np.interp(np.log(at), np.log(omega), column[known]) for column in (coherence, error))
-    return Target(output, input, at, np.exp(log_at), seen, error=sure)
+    shared = None
+    if responses.shared is not None:
+        shared = responses.shared.at(at, responses.omega, *responses.place(output, input))
+    return Target(output, input, at, np.exp(log_at), seen, error=sure, shared=shared)
 
 
 def ceiling(
@@ -176,9 +186,9 @@ def cost_of(model: Complex, wanted: Target) -> float:
     """J of one response; of a ceiling, what stands above it."""
     gain, phase = wanted.weights
     if wanted.ceiling:
-        return float(np.sum((gain * _DB * _excess(model, wanted)) ** 2))
+        return float(np.sum((gain * DB * _excess(model, wanted)) ** 2))
     error = log_error(model, wanted.measured)
-    return float(np.sum((gain * _DB * error.real) ** 2) + np.sum((phase * _DEG * error.imag) ** 2))
+    return float(np.sum((gain * DB * error.real) ** 2) + np.sum((phase * DEG * error.imag) ** 2))
 
 
 def _excess(model: Complex, wanted: Target) -> Array:
@@ -242,13 +252,13 @@ class ResponseCost:
             gain, phase = wanted.weights
             if wanted.ceiling:
                 excess = _excess(model, wanted)
-                above = np.where(excess > 0.0, gain * _DB, 0.0)
-                rows.append(gain * _DB * excess)
+                above = np.where(excess > 0.0, gain * DB, 0.0)
+                rows.append(gain * DB * excess)
                 derivatives.append(above[:, None] * np.where(excess[:, None] > 0.0, slope.real, 0.0))
                 continue
             error = log_error(model, wanted.measured)
-            rows += [gain * _DB * error.real, phase * _DEG * error.imag]
-            derivatives += [(gain * _DB)[:, None] * slope.real, (phase * _DEG)[:, None] * slope.imag]
+            rows += [gain * DB * error.real, phase * DEG * error.imag]
+            derivatives += [(gain * DB)[:, None] * slope.real, (phase * DEG)[:, None] * slope.imag]
         return np.concatenate(rows), np.concatenate(derivatives) * self.row.scale
 
 
@@ -259,59 +269,3 @@ _HOPELESS = 10.0 * ACCEPTABLE
 def followed(numbers: Array, costs: Sequence[float]) -> bool:
     """Whether a fit may be used: finite numbers, and at least one response that the model goes along with."""
     return bool(np.all(np.isfinite(numbers))) and min(costs) <= _HOPELESS
-
-
-NEIGHBOURS = 1
-"""Points of a response that may err together: they are a tenth of a decade apart, and windows blur less than that."""
-
-
-def accuracy_of_fit(cost: ResponseCost, row: Array) -> tuple[Array, tuple[Direction, ...]]:
-    """What the errors themselves say of a fit: covariance, and combinations that the responses hardly see.
-
-    The plain bound takes J for a likelihood. This one takes the errors as they are, the misfit of the model included,
-    and allows for neighbouring lines that err together; errors of different responses are taken as independent.
-
-    Returns:
-        Covariance in the parameters' units, shape (p, p), NaN where a parameter leaves no trace; and the directions.
-    """
-    residual, slopes = cost.residuals(row)
-    size, names = len(cost.row.entries), [entry.name for entry in cost.row.entries]
-    information = slopes.T @ slopes
-    if np.any(np.diag(information) <= 0.0) or not np.all(np.isfinite(slopes)):
-        return np.full((size, size), np.nan), ()
-    blocks, at = [], 0
-    for wanted in cost.targets:
-        n = wanted.omega.size
-        if not wanted.ceiling:
-            both = slice(at, at + n), slice(at + n, at + 2 * n)
-            blocks.append((np.stack([residual[b] for b in both], 1), np.stack([slopes[b] for b in both], 1)))
-        at += n if wanted.ceiling else 2 * n
-    residuals, derivatives = [b[0] for b in blocks], [b[1] for b in blocks]
-    spread = np.sqrt(np.diag(information))
-    plain = np.linalg.pinv(information / np.outer(spread, spread), hermitian=True) / np.outer(spread, spread)
-    covariance = sandwich(plain, residuals, derivatives, lags=NEIGHBOURS) * np.outer(cost.row.scale, cost.row.scale)
-    noise = max(float(np.mean(np.concatenate([r.ravel() for r in residuals]) ** 2)), 1e-300)
-    return covariance, blind_directions(names, information / noise)
-
-
-def accuracy_of(slopes: Array) -> tuple[Array, Array, Array]:
-    """Cramér-Rao bounds, insensitivities and correlation from the residuals' slopes.
-
-    With the Hessian H = 2 S'S of J (Gauss-Newton): CR_i = sqrt(inv(H)_ii), I_i = 1/sqrt(H_ii) (Tischler and Remple
-    2012, ch. 12; the plain value, CIFER prints twice of it). A parameter that leaves no trace gets infinite figures.
-
-    Args:
-        slopes: derivatives of the weighted errors, shape (n, n_parameters), in the parameters' units.
-    """
-    hessian = 2.0 * slopes.T @ slopes
-    diagonal = np.diag(hessian)
-    size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    with np.errstate(divide="ignore"):
-        insensitivity = np.where(diagonal > 0.0, 1.0 / size, np.inf)
-    normal = hessian / np.outer(size, size)
-    values, vectors = np.linalg.eigh(normal)
-    inverse = (vectors / np.maximum(values, 1e-12)) @ vectors.T
-    spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    cramer_rao = np.where(diagonal > 0.0, spread / size, np.inf)
-    correlation = inverse / np.outer(np.maximum(spread, 1e-300), np.maximum(spread, 1e-300))
-    return cramer_rao, insensitivity, correlation

@@ -65,7 +65,7 @@ class Contender:
 
     @property
     def vaguest(self) -> tuple[str, float]:
-        """The parameter with the largest Cramér-Rao bound, and that bound [%]."""
+        """The parameter with the largest standard deviation, and that [%]."""
         moving = [p for p in self.fit.estimates if not p.fixed and not p.tie]
         worst = max(moving, key=lambda p: p.sigma_percent if np.isfinite(p.sigma_percent) else np.inf)
         return worst.name, worst.sigma_percent

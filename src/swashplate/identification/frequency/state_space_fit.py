@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.frequency.composed_start import from_core
+from swashplate.identification.frequency.fit_accuracy import accuracy_of_fit
 from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.linear_start import other_starts
 from swashplate.identification.frequency.mode_accuracy import mode_accuracy
@@ -22,8 +23,6 @@ from swashplate.identification.frequency.response_cost import (
     NOT_FOLLOWED,
     ResponseComparison,
     Target,
-    accuracy_of,
-    accuracy_of_fit,
     followed,
 )
 from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit
@@ -139,36 +138,21 @@ def fit_targets(
         start, targets, ceilings, starts=starts, iterations=iterations, seed=seed, progress=progress
     )
     numbers = optimum.row * cost.row.scale
-    _, slopes = cost.residuals(optimum.row)
-    cramer_rao, insensitivity, correlation = accuracy_of(slopes / cost.row.scale)
-    fitted = model.with_values(dict(zip(model.free, map(float, numbers), strict=True)))
-    fitted = replace(
-        fitted,
-        parameters={
-            name: replace(
-                p,
-                cramer_rao=float(cramer_rao[model.free.index(name)]),
-                insensitivity=float(insensitivity[model.free.index(name)]),
-            )
-            if name in model.free
-            else p
-            for name, p in fitted.parameters.items()
-        },
+    accuracy = accuracy_of_fit(cost, optimum.row)
+    told = zip(model.free, map(float, accuracy.sigma), map(float, accuracy.insensitivity), strict=True)
+    fitted = model.with_values(dict(zip(model.free, map(float, numbers), strict=True))).with_bounds(
+        {name: (sigma, alone) for name, sigma, alone in told}
     )
-    corrected, directions = accuracy_of_fit(cost, optimum.row)
-    wider = np.sqrt(np.diag(corrected))
     every = cost.each(optimum.row)
     costs = tuple(every[: len(targets)])
-    place = {name: i for i, name in enumerate(model.free)}
     estimates = tuple(
         Estimate(
             name=name,
             unit=p.unit,
             start=model.parameters[name].value,
             value=p.value,
-            sigma=p.cramer_rao if name in place else np.nan,
-            sigma_corrected=float(wider[place[name]]) if name in place else np.nan,
-            insensitivity=p.insensitivity if name in place else np.nan,
+            sigma=p.cramer_rao if p.free else np.nan,
+            insensitivity=p.insensitivity if p.free else np.nan,
             tie=p.tie.text if p.tie is not None else "",
             fixed=not p.free and p.tie is None,
             at_bound=name in optimum.at_bound,
@@ -177,13 +161,15 @@ def fit_targets(
     )
     warnings += unit_words(model)
     warnings += misfit_words(fitted, targets)
-    warnings += words(targets, costs, estimates, correlation, at_bound=optimum.at_bound, converged=optimum.converged)
+    warnings += words(
+        targets, costs, estimates, accuracy.correlation, at_bound=optimum.at_bound, converged=optimum.converged
+    )
+    warnings += accuracy.warnings
     below = {c.name for c, above in zip(kept, every[len(targets) :], strict=True) if above <= ACCEPTABLE}
     over = [c.name for c in ceilings if c.name not in below]
     if over:
         warnings.append(f"the model answers where the flight shows nothing: {', '.join(over)}.")
     answers, _ = cost.evaluate(optimum.row)
-    covariance = correlation * np.outer(cramer_rao, cramer_rao)
     failed = not followed(numbers, costs)
     problems += [NOT_FOLLOWED] if failed else []
     return Result(
@@ -192,18 +178,18 @@ def fit_targets(
         start=model,
         estimates=estimates,
         names=model.free,
-        covariance=covariance,
-        covariance_corrected=corrected,
-        directions=directions,
+        covariance=accuracy.covariance,
+        covariance_corrected=np.full_like(accuracy.covariance, np.nan),
+        directions=accuracy.directions,
         failed=failed,
-        correlation=correlation,
+        correlation=accuracy.correlation,
         details=StateSpaceDetails(
             left_out=left_out,
             ceilings=tuple(ceilings),
             modes=mode_accuracy(
                 fitted,
-                dict(zip(model.free, map(float, cramer_rao), strict=True)),
-                correlation,
+                dict(zip(model.free, map(float, accuracy.sigma), strict=True)),
+                accuracy.correlation,
                 lowest=min(float(t.omega[0]) for t in targets),
             ),
         ),

@@ -77,4 +77,4 @@ StateSpaceFit = Result[StateSpaceModel, StateSpaceDetails]
 def _mode_words(mode: ModeAccuracy) -> str:
     head = f"  mode {mode.frequency:>9.4g} rad/s, damping {mode.damping:>6.3f}"
     place = "" if mode.inside else "  below the band"
-    return f"{head}   CR {percent(mode.frequency_percent, width=6)} %, {mode.damping_bound:.3f}{place}"
+    return f"{head}   σ {percent(mode.frequency_percent, width=6)} %, {mode.damping_bound:.3f}{place}"

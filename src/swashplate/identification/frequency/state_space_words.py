@@ -8,11 +8,13 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.identification.core import stopping
+from swashplate.identification.core.accuracy import sign_words
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, Target
 
 CR_TARGET, I_TARGET = 20.0, 10.0
-"""Percent of the value that a Cramér-Rao bound and an insensitivity should not exceed (Tischler and Remple 2012)."""
+"""Percent of the value that a standard deviation and an insensitivity should not exceed (Tischler and Remple 2012, of
+the Cramér-Rao bound)."""
 
 ONE = 0.995
 """Correlation of two parameters above which the responses tell one number of the two."""
@@ -44,7 +46,8 @@ def words(
     if blind:
         warnings.append(f"insensitivity above {I_TARGET:g} %: {', '.join(blind)}.")
     if vague:
-        warnings.append(f"Cramér-Rao bound above {CR_TARGET:g} %: {', '.join(vague)}.")
+        warnings.append(f"standard deviation above {CR_TARGET:g} %: {', '.join(vague)}.")
+    warnings += sign_words(moving)
     pairs = _one_of_two(moving, correlation)
     if pairs:
         warnings.append(

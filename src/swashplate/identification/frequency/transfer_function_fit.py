@@ -13,16 +13,16 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
 from swashplate.flights.base_units import gain_unit
 from swashplate.flights.schema import channel
+from swashplate.identification.core.accuracy import sign_words
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.scoring import Optimum, minimise
+from swashplate.identification.frequency.fit_accuracy import accuracy_of_fit
 from swashplate.identification.frequency.response_cost import (
     NOT_FOLLOWED,
     ResponseComparison,
     ResponseCost,
     Target,
-    accuracy_of,
-    accuracy_of_fit,
     cost_of,
     followed,
     target,
@@ -214,10 +214,7 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
     optimum, cost = min(ends, key=lambda end: end[0].cost)
     fitted = dict(zip(free, optimum.row * cost.row.scale, strict=True))
     values = spread | fitted
-    _, slopes = cost.residuals(optimum.row)
-    bounds = accuracy_of(slopes / cost.row.scale)
-    corrected, directions = accuracy_of_fit(cost, optimum.row)
-    wider = np.sqrt(np.diag(corrected))
+    accuracy = accuracy_of_fit(cost, optimum.row)
     place = {name: i for i, name in enumerate(free)}
     estimates = tuple(
         Estimate(name, _unit(name), values[name], values[name], fixed=True)
@@ -227,9 +224,8 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
             _unit(name),
             cost.row.entries[place[name]].start,
             float(values[name]),
-            sigma=float(bounds[0][place[name]]),
-            sigma_corrected=float(wider[place[name]]),
-            insensitivity=float(bounds[1][place[name]]),
+            sigma=float(accuracy.sigma[place[name]]),
+            insensitivity=float(accuracy.insensitivity[place[name]]),
             at_bound=name in optimum.at_bound,
         )
         for name in names
@@ -238,7 +234,6 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
     responses = [model.response(t.omega) for model, t in zip(made, targets, strict=True)]
     costs = tuple(cost_of(h, t) for h, t in zip(responses, targets, strict=True))
     first = {n: cost.row.entries[place[n]].start for n in free}
-    covariance = bounds[2] * np.outer(bounds[0], bounds[0])
     failed = not followed(optimum.row, costs)
     return Result(
         method="frequency responses",
@@ -246,16 +241,16 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
         start=models({**spread, **first}),
         estimates=estimates,
         names=tuple(free),
-        covariance=covariance,
-        covariance_corrected=corrected,
-        directions=directions,
+        covariance=accuracy.covariance,
+        covariance_corrected=np.full_like(accuracy.covariance, np.nan),
+        directions=accuracy.directions,
         failed=failed,
-        correlation=bounds[2],
+        correlation=accuracy.correlation,
         details=TransferFunctionDetails(form),
         history=optimum.history,
         converged=optimum.converged,
         problems=(NOT_FOLLOWED,) if failed else (),
-        warnings=_words(made, costs, estimates),
+        warnings=(*_words(made, costs, estimates), *accuracy.warnings),
         comparisons=tuple(ResponseComparison(t, h, c) for t, h, c in zip(targets, responses, costs, strict=True)),
         settings={"form": form.text, "fixed": dict(spread), "seed": seed},
     )
@@ -271,7 +266,8 @@ def _words(
     ]
     vague = [p.name for p in parameters if not p.fixed and p.sigma_percent > 20.0]
     if vague:
-        words.append(f"Cramér-Rao bound above 20 %: {', '.join(vague)}; fewer parameters may do.")
+        words.append(f"standard deviation above 20 %: {', '.join(vague)}; fewer parameters may do.")
+    words += sign_words(parameters)
     bound = [p.name for p in parameters if p.at_bound]
     if bound:
         words.append(f"ended on a bound: {', '.join(bound)}.")

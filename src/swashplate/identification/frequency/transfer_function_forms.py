@@ -17,7 +17,7 @@ from swashplate.identification.responses.frequency_response import TWO_PI, Frequ
 from swashplate.models.linear.transfer_function import USUAL, Form
 
 UNTOLD = 100.0
-"""Percent of Cramér-Rao bound above which a parameter speaks against its form."""
+"""Standard deviation in percent above which a parameter speaks against its form."""
 _WIDE = 4.0
 """Highest over lowest frequency that must be left above an unstable mode for a form to be fitted there."""
 _STILL = 1e-9
@@ -54,10 +54,10 @@ def suggest(
 ) -> tuple[TriedStructure, tuple[TriedStructure, ...]]:
     """The usual structures tried, and the one with the fewest parameters that costs hardly more than the best.
 
-    What has parameters on their bounds, or with Cramér-Rao bounds above 100 %, is not suggested while anything else is
-    there; a delay that is zero is left out instead. Hardly: J within 10 of, or within 1.5 times, the least J of these
-    (the pair of Tischler and Remple's "acceptable" and "indistinguishable" lies a factor of two apart). `tell` hears
-    how many structures of how many are done.
+    What has parameters on their bounds, standard deviations above 100 %, or a growing mode beyond the band, is not
+    suggested while anything else is there; a delay that is zero is left out instead. Hardly: J within 10 of, or within
+    1.5 times, the least J of these (the pair of Tischler and Remple's "acceptable" and "indistinguishable" lies a
+    factor of two apart). `tell` hears how many structures of how many are done.
 
     An unstable one is suggested only where no stable one costs hardly more. A loop's answer to gusts, below a sweep,
     looks like an unstable aircraft: where no recorded reference rules it out and a stable form is acceptable from twice
@@ -110,7 +110,8 @@ def _trials(
             tell(k, len(forms))
         trial = _tried(wanted, form, responses, seed=seed)
         delays = {name for name in trial.fit.names if name.split(" ")[0] == "tau"}
-        if trial.unsound and {p.name for p in _vague(trial.fit)} <= delays:
+        vague = {p.name for p in _vague(trial.fit)}
+        if vague and vague <= delays:
             trial = _tried(wanted, replace(form, delay=False), responses, seed=seed)
         trials.append(trial)
     return sorted(trials, key=lambda trial: (trial.parameters, trial.cost))
@@ -135,7 +136,15 @@ def _said(trial: TriedStructure, words: str) -> TriedStructure:
 
 def _tried(wanted: Sequence[Target], form: Form, responses: FrequencyResponse, *, seed: int) -> TriedStructure:
     fit = as_told(fit_form(wanted, form, fixed={}, seed=seed), responses)
-    return TriedStructure(form, len(fit.estimates), fit.cost, fit, "; ".join(map(_vague_words, _vague(fit))))
+    against = [*map(_vague_words, _vague(fit)), *_beyond(fit)]
+    return TriedStructure(form, len(fit.estimates), fit.cost, fit, "; ".join(against))
+
+
+def _beyond(fit: TransferFunctionFit) -> list[str]:
+    """Growing modes that are faster than all that was fitted: they shape what is slower, and were never seen."""
+    top = max(float(t.omega[-1]) for t in fit.targets)
+    fast = [pole for pole in fit.solution[0].poles if pole.real > 0.0 and abs(pole) > top]
+    return [f"an unstable mode of {abs(fast[0]):.3g} rad/s lies beyond the band"] if fast else []
 
 
 def _vague(fit: TransferFunctionFit) -> list[Estimate]:
@@ -146,4 +155,4 @@ def _vague(fit: TransferFunctionFit) -> list[Estimate]:
 def _vague_words(p: Estimate) -> str:
     if p.at_bound:
         return f"{p.name} is on its bound"
-    return f"{p.name} is not told (CR {percent(p.sigma_percent).strip()} %)"
+    return f"{p.name} is not told (standard deviation {percent(p.sigma_percent).strip()} %)"

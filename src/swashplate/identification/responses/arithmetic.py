@@ -16,6 +16,7 @@ import numpy as np
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
 from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.responses.shared_errors import SharedErrors
 from swashplate.registry import listed, nearest
 
 Operation = Literal["product", "ratio", "inverse", "negative", "closed", "broken"]
@@ -179,4 +180,15 @@ def _made(
         settings={"operation": operation, "of": told},
         direct=None,
         direct_error=None,
+        shared=_shared(first, second, omega),
     )
+
+
+def _shared(first: FrequencyResponse, second: FrequencyResponse | None, omega: Array) -> SharedErrors | None:
+    """How the errors of neighbouring lines go together: as in the one of the shorter windows."""
+    known = [one for one in (first, second) if one is not None]
+    windows = [np.interp(omega, one.omega, one.shared.window) for one in known if one.shared is not None]
+    if len(windows) < len(known):
+        return None
+    alone = np.ones((omega.size, 1, 1), dtype=np.complex128)
+    return SharedErrors(alone, alone, np.minimum.reduce(windows))

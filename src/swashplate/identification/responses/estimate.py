@@ -16,6 +16,7 @@ from swashplate.identification.responses.frequency_response import TWO_PI, Frequ
 from swashplate.identification.responses.input_shares import own_shares
 from swashplate.identification.responses.multi_input import Conditioned, condition_spectra, random_error
 from swashplate.identification.responses.resolution import TWICED, first_guess, without
+from swashplate.identification.responses.shared_errors import SharedErrors
 from swashplate.identification.responses.spectra import Signals, SpectralMatrix, runs, spectral_matrix
 
 PERIODS = 4.0
@@ -272,6 +273,11 @@ def composed(
         input_coherence=between.real,
         method="along sweeps" if question.tracked and question.references else _METHODS[bool(question.references)],
         windows=tuple(m.window for m in matrices),
+        shared=SharedErrors.of(
+            _mean(weight, np.stack([part.noise for part in parts])),
+            _mean(weight, np.stack([part.inverse for part in parts])),
+            _mean(weight, np.stack([np.full(omega.size, m.window) for m in matrices])),
+        ),
     )
 
 

@@ -15,6 +15,7 @@ from swashplate.errors import IdentificationError
 from swashplate.extras import library
 from swashplate.identification.core.sources import DataSource, sources_named
 from swashplate.identification.responses import response_file
+from swashplate.identification.responses.shared_errors import SharedErrors
 from swashplate.meant import taking_names
 from swashplate.public import resolve
 from swashplate.registry import listed, nearest
@@ -48,6 +49,7 @@ class FrequencyResponse:
         settings: what was asked.
         direct, direct_error: beside a joint estimate or one along sweeps, the direct one and its random error, both as
             the windows blur them, shape as `response`; None with the direct estimate itself.
+        shared: how the errors go together; None where it is not known.
     """
 
     omega: Array
@@ -70,6 +72,7 @@ class FrequencyResponse:
     settings: Mapping[str, Any] = field(default_factory=dict)
     direct: Complex | None = None
     direct_error: Array | None = None
+    shared: SharedErrors | None = None
 
     @property
     def data(self) -> tuple[DataSource, ...]:
@@ -131,6 +134,7 @@ class FrequencyResponse:
             output_units=tuple(self.output_units[j] for j in o) if self.output_units else (),
             direct=None if self.direct is None else self.direct[pairs],
             direct_error=None if self.direct_error is None else self.direct_error[pairs],
+            shared=None if self.shared is None else self.shared.select(o, i),
         )
 
     # ---- other programs ----------------------------------------------------------------------------------------

@@ -28,6 +28,9 @@ class Conditioned:
         cross: conditioned cross spectrum, same shape.
         own_share: share of each input's power that no other input explains, shape (n_f, n_inputs).
         error: random error of the magnitude (relative) and of the phase [rad], shape as `response`.
+        noise: spectral matrix of what the inputs leave of the outputs, shape (n_f, n_outputs, n_outputs).
+        inverse: of the inputs' spectral matrix, shape (n_f, n_inputs, n_inputs): errors of responses of one output to
+            several inputs go together as its entries do.
     """
 
     response: Complex
@@ -38,6 +41,8 @@ class Conditioned:
     cross: Complex
     own_share: Array
     error: Array
+    noise: Complex
+    inverse: Complex
 
 
 WEAK = 0.2
@@ -86,8 +91,9 @@ def condition_spectra(
     h = inverse @ gxy  # (n_f, n_inputs, n_outputs)
     explained = np.einsum("fio,fio->fo", gxy.conj(), h).real
     noise = np.maximum(gyy - explained, 0.0)
+    left = _unexplained(measured[:, :n, :n], h)
     if references:
-        noise = _unexplained(measured[:, :n, :n], h) * _freedom(averages, inputs)
+        noise = np.maximum(np.diagonal(left, axis1=1, axis2=2).real, 0.0) * _freedom(averages, inputs)
         untold = np.maximum(np.diagonal(measured[:, :inputs, :inputs], axis1=1, axis2=2).real - auto, 0.0)
         a = np.diagonal(inverse, axis1=1, axis2=2).real
         strong = random_error(1.0 / (1.0 + untold * a), averages - (inputs - 1)) < WEAK
@@ -110,20 +116,21 @@ def condition_spectra(
         cross=np.asarray(cross, dtype=np.complex128),
         own_share=own,
         error=random_error(coherence, averages - (inputs - 1)),
+        noise=left,
+        inverse=inverse,
     )
 
 
-def _unexplained(spectra: Complex, h: Complex) -> Array:
-    """Spectra of what responses leave of the outputs with the inputs as they are, shape (n_f, n_outputs).
+def _unexplained(spectra: Complex, h: Complex) -> Complex:
+    """Spectral matrix of what responses leave of the outputs with the inputs as they are, (n_f, n_outputs, n_outputs).
 
     Args:
         spectra: channels in the order inputs, outputs. h: shape (n_f, n_inputs, n_outputs).
     """
     n = h.shape[1]
-    gyy = np.diagonal(spectra[:, n:, n:], axis1=1, axis2=2).real
-    across = np.einsum("fio,fio->fo", spectra[:, :n, n:].conj(), h).real
-    made = np.einsum("fio,fij,fjo->fo", h.conj(), spectra[:, :n, :n], h).real
-    return np.asarray(np.maximum(gyy - 2.0 * across + made, 0.0))
+    across = h.conj().transpose(0, 2, 1) @ spectra[:, :n, n:]
+    made = h.conj().transpose(0, 2, 1) @ spectra[:, :n, :n] @ h
+    return np.asarray(spectra[:, n:, n:] - across - across.conj().transpose(0, 2, 1) + made)
 
 
 def _freedom(averages: float, inputs: int) -> float:

@@ -18,6 +18,7 @@ from swashplate import documents
 from swashplate.atomic import write_bytes
 from swashplate.errors import FlightError
 from swashplate.flights import hdf5
+from swashplate.identification.responses.shared_errors import SharedErrors
 
 SCHEMA = 1
 _PAIR = ("frequency", "output", "input")
@@ -29,6 +30,7 @@ _ARRAYS = {
     "output_power": ("frequency", "output"),
     "input_coherence": ("frequency", "input", "input_2"),
 }
+_SHARED = {"noise": ("frequency", "output", "output_2"), "inverse": ("frequency", "input", "input_2")}
 
 
 class _Words(msgspec.Struct):
@@ -61,6 +63,12 @@ def save(fields: Mapping[str, Any], path: Path) -> Path:
         direct = {"direct_real": fields["direct"].real, "direct_imag": fields["direct"].imag}
         variables |= {name: (_PAIR, values) for name, values in direct.items()}
         variables["direct_error"] = (_PAIR, fields["direct_error"])
+    if fields["shared"] is not None:
+        shared = fields["shared"]
+        variables["window"] = (("frequency",), shared.window, {"units": "s"})
+        for name, dims in _SHARED.items():
+            values = getattr(shared, name)
+            variables |= {f"shared_{name}_real": (dims, values.real), f"shared_{name}_imag": (dims, values.imag)}
     coordinates = {
         "frequency": ("frequency", fields["omega"], {"units": "rad/s"}),
         "output": list(fields["outputs"]),
@@ -96,6 +104,10 @@ def load(path: Path) -> dict[str, Any]:
         if "direct_real" in data:
             beside["direct"] = data["direct_real"].values + 1j * data["direct_imag"].values
             beside["direct_error"] = np.asarray(data["direct_error"].values, dtype=np.float64)
+        together: dict[str, Any] = {}
+        if "window" in data:
+            together = {n: data[f"shared_{n}_real"].values + 1j * data[f"shared_{n}_imag"].values for n in _SHARED}
+            together["window"] = np.asarray(data["window"].values, dtype=np.float64)
         inputs, outputs = (tuple(map(str, data[name].values)) for name in ("input", "output"))
         omega = np.asarray(data["frequency"].values, dtype=np.float64)
     except FlightError:
@@ -108,12 +120,15 @@ def load(path: Path) -> dict[str, Any]:
         ) from error
     if schema > SCHEMA:
         raise FlightError(f"has schema {schema}; this swashplate knows up to {SCHEMA}.", where=path, hint="Update it.")
-    sizes = {"frequency": omega.size, "output": len(outputs), "input": len(inputs), "input_2": len(inputs)}
-    for name, values in {"response_real": response, **arrays, **beside}.items():
-        expected = tuple(sizes[dimension] for dimension in _ARRAYS.get(name, _PAIR))
+    sizes = {"frequency": omega.size, "output": len(outputs), "input": len(inputs)}
+    shapes = _ARRAYS | _SHARED | {"window": ("frequency",)}
+    for name, values in {"response_real": response, **arrays, **beside, **together}.items():
+        expected = tuple(sizes[dimension.removesuffix("_2")] for dimension in shapes.get(name, _PAIR))
         if values.shape != expected:
             raise FlightError(f"has shape {values.shape}, expected {expected}.", where=path, channel=name)
     if not np.all(np.isfinite(omega)) or not np.all(np.diff(omega, prepend=0.0) > 0.0):
         raise FlightError("does not rise from above zero.", where=path, channel="frequency")
+    if together:
+        beside["shared"] = SharedErrors(**together)
     channels = {"omega": omega, "inputs": inputs, "outputs": outputs}
     return {**channels, "response": response, **arrays, **beside, **msgspec.structs.asdict(words)}

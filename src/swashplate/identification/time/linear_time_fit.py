@@ -148,7 +148,9 @@ def linear_result(
     """A solved likelihood of a model's records as a result; arguments as `vehicle_result` has them."""
     result = result_of(
         solved,
-        model=lambda estimates: model.with_values({n: estimates[n].value for n in model.free}),
+        model=lambda estimates: model.with_values({n: estimates[n].value for n in model.free}).with_bounds(
+            {n: (estimates[n].best_sigma, estimates[n].insensitivity) for n in model.free}
+        ),
         start=model,
         units=[model.parameters[n].unit for n in model.free],
         ties=[],

@@ -41,7 +41,8 @@ class ModelParameter:
         tie: what it is tied to, None where it stands for itself.
         dropped: value that it takes when a reduction drops it.
         note: anything a reader must know.
-        cramer_rao, insensitivity: of an identified value, in its unit (NaN before a fit).
+        cramer_rao: standard deviation of an identified value, as its fit bounds it; insensitivity: the same, were all
+            others known (in its unit, NaN before a fit).
     """
 
     name: str
@@ -145,6 +146,21 @@ class StateSpaceModel:
         tied = {n: float(v) for n, v in made.numbers().items() if made.parameters[n].tie is not None}
         return replace(
             made, parameters={**made.parameters, **{n: replace(made.parameters[n], value=v) for n, v in tied.items()}}
+        )
+
+    def with_bounds(self, told: Mapping[str, tuple[float, float]]) -> StateSpaceModel:
+        """A copy whose parameters carry what a fit told of them, and nothing of earlier fits.
+
+        Args:
+            told: standard deviation and insensitivity by name [the parameter's unit].
+        """
+        nothing = (np.nan, np.nan)
+        return replace(
+            self,
+            parameters={
+                n: replace(p, cramer_rao=told.get(n, nothing)[0], insensitivity=told.get(n, nothing)[1])
+                for n, p in self.parameters.items()
+            },
         )
 
     @property
@@ -371,7 +387,7 @@ class StateSpaceModel:
 
     def __repr__(self) -> str:
         head = f"{self.name}: {len(self.states)} states, inputs {', '.join(self.inputs)}"
-        lines = [head, f"  {'parameter':<14}{'value':>12}{'CR %':>8}{'I %':>8}  unit"]
+        lines = [head, f"  {'parameter':<14}{'value':>12}{'sigma %':>8}{'I %':>8}  unit"]
         for p in self.parameters.values():
             size = abs(p.value) or 1.0
             known = np.isfinite(p.cramer_rao)

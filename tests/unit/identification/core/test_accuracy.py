@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -9,6 +11,7 @@ from scipy.signal import lfilter
 from swashplate.errors import IdentificationError
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.parameter_row import Entry, Row
+from swashplate.identification.core.result import Estimate
 
 
 def _row(count: int, *, sigma: float = np.inf) -> Row:
@@ -152,27 +155,19 @@ def test_a_parameter_without_a_trace_is_refused_and_one_with_a_prior_is_not() ->
     accuracy.refuse_unseen(_row(2, sigma=1.0), information, where="a.mat")
 
 
-def test_the_sandwich_is_the_scatter_of_errors_of_any_size_and_colour() -> None:
-    """A straight line through 400 experiments whose errors grow along the axis and go together over neighbours."""
-    rng = np.random.default_rng(7)
-    n, times = 240, 400
-    axis = np.linspace(0.0, 1.0, n)
-    slope = np.stack([np.ones(n), axis], axis=1)
-    plain = np.linalg.inv(slope.T @ slope)
-    size = 0.02 + 0.2 * axis**2
-    errors = size[:, None] * _first_order(rng, (n, times), 0.25)
-    scatter = np.std(plain @ slope.T @ errors, axis=1)
-    residuals = errors - slope @ (plain @ slope.T @ errors)
-    told = [
-        np.sqrt(np.diag(accuracy.sandwich(plain, [v[:, None]], [slope[:, None, :]], lags=4))) for v in residuals.T[:60]
+def test_numbers_within_two_standard_deviations_of_zero_are_named_and_no_others() -> None:
+    """A slow derivative of the wrong sign (+0.025 for -0.04) with its honest bound; a delay that is told; held ones."""
+    estimates = [
+        Estimate("Xu", "1/s", -0.05, 0.025, sigma=0.04),
+        Estimate("Zw", "1/s", -0.5, -0.61, sigma=0.5, sigma_corrected=0.05),
+        Estimate("tau", "s", 0.03, 0.03, sigma=0.001),
+        Estimate("U0", "m/s", 0.0, 0.0, fixed=True),
+        Estimate("Lv", "1", 0.0, 0.1, sigma=float("inf")),
     ]
-    np.testing.assert_allclose(np.mean(told, axis=0), scatter, rtol=0.15)
-    usual = np.sqrt(np.diag(plain) * np.mean(residuals**2))
-    assert np.abs(np.log(usual[1] / scatter[1])) > 0.3  # one size and no colour: it would not do
-
-
-def test_blocks_of_the_sandwich_know_nothing_of_each_other() -> None:
-    rng = np.random.default_rng(8)
-    v, slope, plain = rng.standard_normal((50, 1)), rng.standard_normal((50, 1, 2)), 1e-3 * np.eye(2)
-    both = accuracy.sandwich(plain, [v, v], [slope, slope], lags=3)
-    np.testing.assert_allclose(both, 2.0 * accuracy.sandwich(plain, [v], [slope], lags=3))
+    assert accuracy.sign_words(estimates) == [
+        "the data do not tell the sign of Xu 0.025 ± 0.08 (two standard deviations): do not use these numbers."
+    ]
+    assert accuracy.sign_words([e for e in estimates if e.name != "Xu"]) == []
+    many = [replace(estimates[0], name=f"X{k}") for k in range(8)]
+    assert "X5" in accuracy.sign_words(many)[0]
+    assert "and 2 more" in accuracy.sign_words(many)[0]

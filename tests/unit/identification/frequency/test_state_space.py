@@ -181,9 +181,9 @@ def test_fit_finds_the_truth_and_comes_back_from_its_file(tmp_path: Path) -> Non
     page = sp.report(again, exact(rotor()), path=tmp_path / "report.html").read_text(encoding="utf-8")
     assert "J_ave" in page
     drawn = again.draw_values(500, seed=1)
-    assert np.std(drawn["tau_f"]) == pytest.approx(fit["tau_f"].sigma_corrected, rel=0.15)
-    plain = again.draw_values(500, seed=1, corrected=False)
-    assert np.std(plain["tau_f"]) == pytest.approx(fit["tau_f"].sigma, rel=0.15)
+    assert np.std(drawn["tau_f"]) == pytest.approx(fit["tau_f"].sigma, rel=0.15)
+    one_kind = again.draw_values(500, seed=1, corrected=False)
+    np.testing.assert_array_equal(one_kind["tau_f"], drawn["tau_f"])
     assert not fit.failed
     assert fit.model.structure == fit.solution
     same = sp.identify(structure("rotor_body"), exact(rotor()))
@@ -201,23 +201,17 @@ def test_a_model_that_follows_no_response_has_failed() -> None:
         fit.draw_values(3, seed=1)
 
 
-def test_cramer_rao_is_what_noise_scatters() -> None:
-    """White errors of s nepers on points of their own: scatter / CR = sqrt(2) * (s in dB), T&R's remark made exact.
-
-    Phase errors of the same size weigh 0.01745 (57.3 / 8.686)^2 = 0.76 of the gain's, so the factor is a little less.
-    """
+@pytest.mark.parametrize("noise", [0.02, 0.03, 0.09])
+def test_the_bound_is_what_noise_scatters_however_large_it_is(noise: float) -> None:
+    """White errors on points of their own; the responses say 0.03, and what a fit leaves says what they are."""
     true = structure("heave").with_values({"Zw": -2.0, "Zcol": -27.0, "tau_collective": 0.05})
-    found, bounds, corrected = [], [], []
+    found, bounds = [], []
     for seed in range(60):
-        fit = fit_state_space(true, _at_points(true, noise=0.03, seed=seed), starts=1)
-        corrected.append([fit[n].sigma_corrected for n in fit.names])
+        fit = fit_state_space(true, _at_points(true, noise=noise, seed=seed), starts=1)
         found.append([fit.solution.parameters[n].value for n in fit.names])
         bounds.append([fit.solution.parameters[n].cramer_rao for n in fit.names])
-    factor = np.std(found, axis=0) / np.mean(bounds, axis=0) / (np.sqrt(2.0) * 0.03 * 20 / np.log(10))
-    assert np.all((factor > 0.7) & (factor < 1.3)), factor
-    # The corrected bound knows how large the errors are: it is the scatter itself.
-    ratio = np.std(found, axis=0) / np.mean(corrected, axis=0)
-    assert np.all((ratio > 0.7) & (ratio < 1.4)), ratio
+    ratio = np.std(found, axis=0) / np.mean(bounds, axis=0)
+    assert np.all((ratio > 0.75) & (ratio < 1.3)), ratio
 
 
 def _at_points(model: StateSpaceModel, *, noise: float, seed: int) -> FrequencyResponse:
