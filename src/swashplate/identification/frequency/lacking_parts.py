@@ -79,7 +79,7 @@ def lacking_words(model: StateSpaceModel, missed: Sequence[str]) -> str:
     """
     parts = parts_in(model)
     known = {*INPUTS, *TWINS}
-    if not any(PARTS[name].core for name in parts) or not known >= set(model.inputs):
+    if not any(name in PARTS and PARTS[name].core for name in parts) or not known >= set(model.inputs):
         return ""
     pairs = [(o, i) for o, _, i in (name.partition(" / ") for name in missed)]
     lacking = candidates(parts, pairs)

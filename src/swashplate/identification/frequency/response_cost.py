@@ -200,6 +200,9 @@ def _excess(model: Complex, wanted: Target) -> Array:
 Evaluate = Callable[[Array], tuple[list[Complex], list[Complex]]]
 """Parameters to the model's responses per target (n,) and the derivatives of their logarithms (n, n_parameters)."""
 
+Answer = Callable[[Array], list[Complex]]
+"""Parameters to the model's responses per target (n,) alone."""
+
 
 class ResponseCost:
     """Half the sum of J over all targets and ceilings, in the form that `scoring.minimise` wants (Gauss-Newton).
@@ -207,16 +210,17 @@ class ResponseCost:
     Args:
         row: the parameters that move.
         targets: what to fit.
-        evaluate: the model.
+        evaluate: the model. answer: the same without derivatives, where that is quicker.
     """
 
-    def __init__(self, row: Row, targets: Sequence[Target], evaluate: Evaluate) -> None:
+    def __init__(self, row: Row, targets: Sequence[Target], evaluate: Evaluate, answer: Answer | None = None) -> None:
         if not targets:
             raise IdentificationError(
                 "there is no response to fit: none keeps a coherence of 0.6 over a band.",
                 hint="Look at the responses; fly a better sweep, or lower --coherence and do not trust the result.",
             )
         self._row, self.targets, self._evaluate = row, tuple(targets), evaluate
+        self._answer = answer or (lambda numbers: evaluate(numbers)[0])
 
     @property
     def row(self) -> Row:
@@ -234,7 +238,7 @@ class ResponseCost:
 
     def each(self, row: Array) -> list[float]:
         """J of each target."""
-        models, _ = self._evaluate(np.asarray(row * self.row.scale))
+        models = self._answer(np.asarray(row * self.row.scale))
         return [
             cost_of(model, wanted) if np.all(np.isfinite(model)) else np.inf
             for model, wanted in zip(models, self.targets, strict=True)
@@ -259,6 +263,39 @@ class ResponseCost:
             error = log_error(model, wanted.measured)
             rows += [gain * DB * error.real, phase * DEG * error.imag]
             derivatives += [(gain * DB)[:, None] * slope.real, (phase * DEG)[:, None] * slope.imag]
+        return np.concatenate(rows), np.concatenate(derivatives) * self.row.scale
+
+
+class RelativeCost(ResponseCost):
+    """The same to first order, of relative errors instead of their logarithms: the way down from a far start.
+
+    A response cannot change its sign in logarithms: it would have to pass through zero, which is infinitely far away,
+    or through half a turn of phase, from where the cost falls either way. Many a wrong end is such a response. Relative
+    errors pass through zero like anything else. They are no fit: they care more for what is too large than for what is
+    too small.
+
+    Args:
+        row, targets: as for the logarithms; without ceilings.
+        evaluate: the model, with the derivatives of the responses themselves.
+    """
+
+    def each(self, row: Array) -> list[float]:
+        """What each target adds, twice."""
+        costs = []
+        for model, wanted in zip(self._answer(np.asarray(row * self.row.scale)), self.targets, strict=True):
+            gain, phase = wanted.weights
+            error = model / wanted.measured - 1.0
+            costs.append(float(np.sum((gain * _DB * error.real) ** 2 + (phase * _DEG * error.imag) ** 2)))
+        return [cost if np.isfinite(cost) else np.inf for cost in costs]
+
+    def residuals(self, row: Array) -> tuple[Array, Array]:
+        """Weighted relative errors of all targets, real then imaginary part, and their slopes over the scaled row."""
+        rows, derivatives = [], []
+        for model, slope, wanted in zip(*self.evaluate(row), self.targets, strict=True):
+            gain, phase = wanted.weights
+            error, by = model / wanted.measured - 1.0, slope / wanted.measured[:, None]
+            rows += [gain * _DB * error.real, phase * _DEG * error.imag]
+            derivatives += [(gain * _DB)[:, None] * by.real, (phase * _DEG)[:, None] * by.imag]
         return np.concatenate(rows), np.concatenate(derivatives) * self.row.scale
 
 

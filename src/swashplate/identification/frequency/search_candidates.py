@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from swashplate.errors import IdentificationError
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.models.linear.composition import PREFIX, nonsense
+from swashplate.models.linear.composition import PREFIX, in_order, nonsense
 from swashplate.models.linear.state_space_file import structure
-from swashplate.models.linear.structure_parts import INPUTS, PARTS
+from swashplate.models.linear.structure_parts import DERIVATIVES, INPUTS, PARTS, derivative_of
 
 _CYCLIC, _MOVING = {"lateral", "longitudinal"}, {"u", "v", "ax", "ay"}
 _TURNING = {"p", "q", "phi", "theta"}
 
-GROUPS: Mapping[str, tuple[str, ...]] = {
-    "rotor": ("bar", "hub", "gyroscopic", "forces"),
-    "heave": ("inflow", "lead", "droop"),
-    "yaw": ("torque", "gyro"),
-    "actuators": ("actuators",),
-    "quasi-steady": ("coupled",),
-}
-"""Parts that show in the same responses; of one group, one is added at a time."""
-
-_ALIKE = ("inflow", "lead", "droop", "torque")
+_ALIKE = ("inflow", "lead", "droop", "governor", "torque")
 """Parts of which one can take the place of another in part."""
+
+_PAIRS = ("forces", "hub", "gyroscopic")
+"""Parts that are nothing but derivatives."""
+
+_ROWS = {"phi": "p", "theta": "q", "ax": "u", "ay": "v", "az": "w"}
+"""Which equation makes an output that is none of its states."""
 
 WIDEST = "compose:body"
 """A composed structure with every channel that one can have."""
@@ -31,8 +28,8 @@ WIDEST = "compose:body"
 
 def parameter_names() -> set[str]:
     """Parameters that any composed structure can have."""
-    wide = ("body+coupled+inflow+torque+droop+gyro+actuators", "body+flap+bar+forces+hub+gyroscopic+lead")
-    return {name for text in wide for name in structure(PREFIX + text).parameters}
+    wide = ("body+coupled+inflow+torque+governor+gyro+actuators", "body+flap+bar+forces+hub+gyroscopic+lead")
+    return {name for text in wide for name in structure(PREFIX + text).parameters} | set(DERIVATIVES)
 
 
 def cores(responses: FrequencyResponse) -> list[tuple[str, ...]]:
@@ -74,34 +71,69 @@ def _renaming(inputs: Sequence[str]) -> str:
     return f"--rename {','.join(f'{ours}={name}' for ours, name in told.items()) or 'lateral=CHANNEL'}"
 
 
-def additions(parts: Sequence[str], responses: FrequencyResponse, *, every: bool) -> list[list[str]]:
-    """Parts that can be added, by group.
+def offered(responses: FrequencyResponse) -> tuple[str, ...]:
+    """Parts with states of their own that the channels can show, and whose worth slopes can foresee.
 
-    Args:
-        parts: that are there. responses: measured. every: whether many numbers are worth a try too ("coupled").
+    `inflow` is not among them, which `lead` stands for at first (`preferred`), nor are actuators, whose lag is at first
+    a delay like any other.
     """
     inputs, outputs = set(responses.inputs), set(responses.outputs)
+    heave = "collective" in inputs and bool(outputs & {"w", "az"})
     shown = {
-        "rotor": bool(inputs & _CYCLIC),
-        "heave": "collective" in inputs and bool(outputs & {"w", "az"}),
-        "yaw": "r" in outputs and bool(inputs & {"pedal", "collective"}),
-        "actuators": True,
-        "quasi-steady": every,
+        "bar": bool(inputs & _CYCLIC),
+        "lead": heave,
+        "droop": heave,
+        "governor": heave,
+        "torque": "collective" in inputs and "r" in outputs,
+        "gyro": "pedal" in inputs and "r" in outputs,
     }
-    needs = {"torque": {"collective"}, "gyro": {"pedal"}}
-    groups = [
-        [n for n in names if n not in parts and not nonsense([*parts, n]) and needs.get(n, set()) <= inputs]
-        for group, names in GROUPS.items()
-        if shown[group]
-    ]
-    return [group for group in groups if group]
+    return tuple(name for name, seen in shown.items() if seen)
+
+
+def preferred(parts: Iterable[str]) -> list[str]:
+    """The same with an inflow of physical numbers for a lead-lag that may stand for one."""
+    return ["inflow" if name == "lead" else name for name in parts]
+
+
+def named(parts: Iterable[str]) -> list[str]:
+    """The same with derivatives that are a part together by that part's name."""
+    given = set(parts)
+    for name in _PAIRS:
+        own = {text for terms in PARTS[name].equations.values() for text in terms.values()}
+        if own <= given:
+            given = (given - own) | {name}
+    return list(in_order(given))
+
+
+def joining(parts: Sequence[str], silent: Iterable[tuple[str, str]]) -> list[str]:
+    """Derivatives that make a structure answer where it is silent: of the rotor's tilt by cyclic, of others at once.
+
+    Args:
+        parts: that are there. silent: output and input of the responses that are zero.
+    """
+    flaps = any("a" in PARTS[name].states for name in parts if name in PARTS)
+    tilt = {"longitudinal": "a", "lateral": "b"} if flaps else {}
+    made = (derivative_of(_ROWS.get(output, output), tilt.get(name, name)) for output, name in silent)
+    return list(dict.fromkeys(made))
+
+
+def contains(parts: Sequence[str], others: Sequence[str]) -> bool:
+    """Whether a structure of some parts holds one of others, which it answers as with some of its numbers."""
+    wide = {*parts, *(["flap_decoupled"] if "flap" in parts else [])}
+    wide |= {
+        text for name in parts if name in _PAIRS for terms in PARTS[name].equations.values() for text in terms.values()
+    }
+    return set(parts) != set(others) and set(others) <= wide
 
 
 def without(parts: Sequence[str]) -> dict[str, list[str]]:
-    """What is left when a part is taken out, by that part; a coupled rotor becomes a decoupled one."""
+    """What is left when a part is taken out, by that part; a coupled rotor becomes a decoupled one.
+
+    Derivatives of their own are not taken out here.
+    """
     smaller: dict[str, list[str]] = {}
     for name in parts:
-        if PARTS[name].core:
+        if name not in PARTS or PARTS[name].core:
             continue
         kept = [p for p in parts if p != name]
         if name == "flap":
@@ -112,10 +144,16 @@ def without(parts: Sequence[str]) -> dict[str, list[str]]:
 
 
 def exchanges(parts: Sequence[str], responses: FrequencyResponse) -> list[list[str]]:
-    """Structures with one part exchanged for another that shows in the same responses (inflow, lead, droop, torque)."""
-    exchanged = []
-    for old in (p for p in parts if p in _ALIKE):
-        kept = [p for p in parts if p != old]
-        for group in additions(kept, responses, every=False):
-            exchanged += [[*kept, new] for new in group if new in _ALIKE and new != old]
-    return exchanged
+    """Structures that slopes do not foresee: one part for another that shows in the same responses (inflow, engine), a
+    coupled rotor for a decoupled one, actuators."""
+    ours = {*offered(responses), *(["inflow"] if "lead" in offered(responses) else [])}
+    exchanged = [
+        [p for p in parts if p != old] + [new] for old in parts for new in _ALIKE if old in _ALIKE and new in ours
+    ]
+    exchanged += [["flap" if p == "flap_decoupled" else p for p in parts], [*parts, "actuators"]]
+    return [one for one in exchanged if len(set(one)) == len(one) and set(one) != set(parts) and not nonsense(one)]
+
+
+def ranks(parts: Iterable[str]) -> list[int]:
+    """Places of the parts in the order in which they are preferred."""
+    return [tuple(PARTS).index(name) if name in PARTS else len(PARTS) for name in parts]

@@ -2,39 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from swashplate.identification.core.result import percent
-from swashplate.identification.frequency.response_cost import Target, log_error
+from swashplate.identification.frequency.lacking_parts import parts_in
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
-from swashplate.identification.frequency.structure_misfit import FLOOR
-from swashplate.models.linear.state_space import StateSpaceModel
-
-_LINEAR = 5.0
-"""Scatters from which a misfit counts linearly (Huber 1964): a notch is no wrong structure."""
-
-_TOGETHER = 2.0
-"""Times that a misfit is counted, because neighbouring lines err together."""
+from swashplate.identification.frequency.structure_score import hidden, score
 
 _MODES = 5
-
-
-def squared_misfit(model: StateSpaceModel, targets: Sequence[Target]) -> float:
-    """Sum over all points of the squared misfit over the measurement's scatter; two degrees of freedom a point."""
-    total = 0.0
-    by_input = {name: k for k, name in enumerate(model.inputs)}
-    for t in targets:
-        h = model.response(t.omega)[:, model.outputs.index(t.output), by_input[t.input]]
-        spread = np.sqrt((0.0 if t.error is None else t.error) ** 2 + FLOOR**2)
-        times = np.abs(log_error(h, t.measured)) / spread
-        if not np.all(np.isfinite(times)):
-            return float("inf")
-        total += float(np.sum(np.where(times < _LINEAR, times**2, _LINEAR * (2.0 * times - _LINEAR))))
-    return total
 
 
 @dataclass(frozen=True)
@@ -45,6 +23,7 @@ class Contender:
         name: of the structure, or its parts. fit: as far as it was followed.
         misfit: `squared_misfit`. abandoned: whether it was dropped after the first look.
         held_out: J_rms on records that no fit has seen; NaN where there are none, or it was not asked.
+        failed: the structure that it contains and yet fits worse than; empty where there is none.
     """
 
     name: str
@@ -52,6 +31,12 @@ class Contender:
     misfit: float
     abandoned: bool = False
     held_out: float = float("nan")
+    failed: str = ""
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """What the structure is composed of; those whose states it has where it is not composed."""
+        return parts_in(self.fit.solution)
 
     @property
     def parameters(self) -> int:
@@ -78,12 +63,8 @@ class Contender:
         return ", ".join(pairs)
 
     def score(self, spread: float, points: int) -> float:
-        """Bayes' information criterion with overdispersion (Schwarz 1978; Burnham and Anderson 2002, sec. 2.5).
-
-        Args:
-            spread: variance of the scatter over what it should be, 1 and more. points: that were fitted.
-        """
-        return self.misfit / (_TOGETHER * spread) + self.parameters * float(np.log(2.0 * points / _TOGETHER))
+        """`structure_score.score` of it."""
+        return score(self.misfit, self.parameters, hidden=hidden(self.parts), spread=spread, points=points)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource, scale_words
@@ -112,18 +113,25 @@ def fit_targets(
     seed: int = 0,
     progress: Callable[[int, float], None] | None = None,
     began: float | None = None,
+    advise: bool = True,
     data: Sequence[DataSource] = (),
     settings: Mapping[str, Any] | None = None,
 ) -> StateSpaceFit:
-    """Fit a model to given targets, below given ceilings, from the given start or a better one (`fit_state_space`)."""
+    """Fit a model to given targets, below given ceilings, from the given start or a better one (`fit_state_space`).
+
+    Args:
+        advise: whether to say which parts a structure that misses the responses may lack.
+    """
     began = time.perf_counter() if began is None else began
     warnings, problems = [], _start_problems(model)
-    traceless, silent = _traceless(model, targets)
-    if silent:
+    traceless, heard = _traces(model, targets)
+    unheard = [t for t, size in zip(targets, heard, strict=True) if size == 0.0]
+    if unheard:
         raise IdentificationError(
-            f"the structure '{model.name}' answers nothing at all at {', '.join(silent)}, which the flight shows.",
+            f"the structure '{model.name}' answers nothing at all at {', '.join(t.name for t in unheard)}, which the "
+            "flight shows.",
             hint="Take a structure that joins them, or leave them out: "
-            + " ".join(f"--without {name.replace(' ', '')}" for name in silent),
+            + " ".join(f"--without {t.output}/{t.input}" for t in unheard),
         )
     if traceless:
         warnings.append(f"no fitted response sees {', '.join(traceless)}: held at the start values.")
@@ -160,7 +168,7 @@ def fit_targets(
         for name, p in fitted.parameters.items()
     )
     warnings += unit_words(model)
-    warnings += misfit_words(fitted, targets)
+    warnings += misfit_words(fitted, targets, advise=advise)
     warnings += words(
         targets, costs, estimates, accuracy.correlation, at_bound=optimum.at_bound, converged=optimum.converged
     )
@@ -206,8 +214,14 @@ def fit_targets(
     )
 
 
-def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Free parameters without a trace in any fitted response, and responses that are zero, at the start and a shaken
+def silent(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[tuple[str, str], ...]:
+    """Output and input of the responses that are zero whatever the numbers."""
+    _, heard = _traces(model, targets)
+    return tuple((t.output, t.input) for t, size in zip(targets, heard, strict=True) if size == 0.0)
+
+
+def _traces(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[tuple[str, ...], Array]:
+    """Free parameters without a trace in any fitted response, and how large each response is, at the start and a shaken
     one."""
     random = np.random.default_rng(1)
     seen, heard = np.zeros(len(model.free)), np.zeros(len(targets))
@@ -217,10 +231,7 @@ def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[tuple
         answers, slopes = model.sensitivities(model.free, values, pairs_of(model, targets))
         heard += [np.nan_to_num(np.abs(h), nan=1.0).max() for h in answers]
         seen += np.sum([np.nan_to_num(np.abs(s)).max(axis=0) for s in slopes], axis=0)
-    return (
-        tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12),
-        tuple(t.name for t, size in zip(targets, heard, strict=True) if size == 0.0),
-    )
+    return tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12), heard
 
 
 def _start_problems(model: StateSpaceModel) -> list[str]:

@@ -1,4 +1,4 @@
-"""The search behind a fit of a state-space model: many starts, and ways out of a bad end."""
+"""The search behind a fit of a state-space model: several starts, each led to where logarithms can go down from."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.scoring import Optimum, minimise
-from swashplate.identification.frequency.response_cost import ACCEPTABLE, ResponseCost, Target
+from swashplate.identification.frequency.response_cost import (
+    ACCEPTABLE,
+    Answer,
+    RelativeCost,
+    ResponseCost,
+    Target,
+)
 from swashplate.models.linear.state_space import StateSpaceModel
 
 SPREAD = 0.3
@@ -24,20 +30,11 @@ SCREENED, STARTED = 48, 4
 _ROUGH = 25
 """Iterations of each start, before the best is followed to its end."""
 
-RESCUES, RESCUED, _HOPE = 4, 96, 0.99
-"""Times that a bad end is shaken hard, points that are tried then, and what has to be left of the cost at most."""
-
-_HARD, _TURNED = 0.4, 0.08
-"""Relative scatter of these points, and the share of parameters whose sign is turned."""
-
-FREED, _FEW = 3, 0.25
-"""Times that a few badly fitted responses are left out for a while, and the share of all that is a few."""
+_LED = 20
+"""Iterations by relative errors, from a start that is far off."""
 
 _ENOUGH = 1e-4
 """Share of the cost that an iteration has to gain for it to go on."""
-
-_UPPER, _POINTS = 3.0, 5
-"""Times the lowest frequency from which a fit to the upper ones begins, and how many points a response keeps there."""
 
 _VERY_WRONG = 3e4
 """J that a response counts for at most when starts are compared: 30 dB and half a turn off."""
@@ -54,6 +51,18 @@ def pairs_of(model: StateSpaceModel, targets: Sequence[Target]) -> list[tuple[in
     return [(model.outputs.index(t.output), model.inputs.index(t.input), t.omega) for t in targets]
 
 
+def answers(model: StateSpaceModel, targets: Sequence[Target]) -> list[Complex]:
+    """The model's responses, one for each target at its frequencies (n,); NaN where they are not finite."""
+    pairs = pairs_of(model, targets)
+    grid, at = np.unique(np.concatenate([omega for *_, omega in pairs]), return_inverse=True)
+    places = np.split(at, np.cumsum([omega.size for *_, omega in pairs])[:-1])
+    try:
+        h = model.response(grid)
+    except np.linalg.LinAlgError:
+        return [np.full(omega.size, np.nan + 0j) for *_, omega in pairs]
+    return [h[place, o, i] for place, (o, i, _) in zip(places, pairs, strict=True)]
+
+
 def cost_function(model: StateSpaceModel, targets: Sequence[Target], scale: Array) -> ResponseCost:
     """The cost of a model's free parameters, each scaled."""
     pairs, free = pairs_of(model, targets), model.free
@@ -63,12 +72,32 @@ def cost_function(model: StateSpaceModel, targets: Sequence[Target], scale: Arra
         with np.errstate(divide="ignore", invalid="ignore"):
             return responses, [slope / h[:, None] for slope, h in zip(slopes, responses, strict=True)]
 
-    entries = tuple(
-        Entry(n, "parameter", p.value, float(s), p.lower, p.upper)
-        for n, s in zip(free, scale, strict=True)
-        for p in (model.parameters[n],)
+    return ResponseCost(_row(model, scale), targets, evaluate, _answering(model, targets))
+
+
+def relative_cost(model: StateSpaceModel, targets: Sequence[Target], row: Row) -> RelativeCost:
+    """The same cost by relative errors; no ceilings among the targets."""
+    pairs, free = pairs_of(model, targets), model.free
+
+    def evaluate(numbers: Array) -> tuple[list[Complex], list[Complex]]:
+        return model.sensitivities(free, numbers, pairs)
+
+    return RelativeCost(row, targets, evaluate, _answering(model, targets))
+
+
+def _answering(model: StateSpaceModel, targets: Sequence[Target]) -> Answer:
+    free = model.free
+    return lambda numbers: answers(model.with_values(dict(zip(free, map(float, numbers), strict=True))), targets)
+
+
+def _row(model: StateSpaceModel, scale: Array) -> Row:
+    return Row(
+        tuple(
+            Entry(n, "parameter", p.value, float(s), p.lower, p.upper)
+            for n, s in zip(model.free, scale, strict=True)
+            for p in (model.parameters[n],)
+        )
     )
-    return ResponseCost(Row(entries), targets, evaluate)
 
 
 def _scale(model: StateSpaceModel, targets: Sequence[Target]) -> Array:
@@ -88,17 +117,12 @@ def better_start(
     model: StateSpaceModel, others: Mapping[str, StateSpaceModel], targets: Sequence[Target]
 ) -> tuple[StateSpaceModel, str]:
     """The start that costs least, with its source ("" for the given one); zero responses count as very wrong."""
-
-    def price(one: StateSpaceModel) -> float:
-        row = cost_function(one, targets, np.ones(len(model.free)))
-        each = row.each(np.array([one.parameters[n].value for n in model.free]))
-        return float(sum(min(cost, _VERY_WRONG) if np.isfinite(cost) else _VERY_WRONG for cost in each))
-
-    best, source, least = model, "", price(model)
+    best, source, least = model, "", price_of(model, targets)
     for name, other in others.items():
         one = model.with_values({n: other.parameters[n].value for n in model.free})
-        if price(one) < least:
-            best, source, least = one, name, price(one)
+        cost = price_of(one, targets)
+        if cost < least:
+            best, source, least = one, name, cost
     return best, source
 
 
@@ -123,12 +147,10 @@ def best_end(
         shaken = np.clip(shaken, low, high)
         price = np.array([cost.cost(row) for row in shaken])
         candidates += [shaken[k] for k in np.argsort(price)[: starts - 1] if np.isfinite(price[k])]
-    elif not np.isfinite(cost.cost(np.clip(first, low, high))):
-        # A response that starts at zero has no decibels: give what makes it a small value of its own.
-        candidates = [np.where(first == 0.0, 0.1 * SPREAD, first)]
     ends = []
     for row in candidates:
-        if np.isfinite(cost.cost(np.clip(row, low, high))):
+        row = _led(model, cost, np.clip(row, low, high))
+        if np.isfinite(cost.cost(row)):
             rough = iterations if starts == 1 else min(_ROUGH, iterations)
             ends.append(_down(cost, start=row, tolerance=1e-2, iterations=rough, progress=progress))
     if not ends:
@@ -136,16 +158,6 @@ def best_end(
             f"the start of '{model.name}' gives no finite response.", hint="Check the start values of the model file."
         )
     best = min(ends, key=lambda end: end.cost)
-    if starts > 1 and iterations > _ROUGH and _bad(cost, best):
-        best = _from_above(model, cost, best, starts=starts, seed=seed)
-    for turn in range(RESCUES if starts > 1 and iterations > _ROUGH else 0):
-        if not _bad(cost, best):
-            break
-        before, best = best, _rescued(cost, best, seed=seed + 1 + turn)
-        if best.cost > _HOPE * before.cost:
-            break
-    if iterations > _ROUGH:
-        best = _freed(model, cost, best)
     final = _down(
         cost, start=best.row, tolerance=_ENOUGH * max(1.0, best.cost), iterations=iterations, progress=progress
     )
@@ -209,57 +221,32 @@ def _over(cost: ResponseCost, row: Array) -> dict[str, float]:
     return {t.name: j for j, t in each if t.ceiling and j > ACCEPTABLE}
 
 
-def _bad(cost: ResponseCost, best: Optimum) -> bool:
-    """Whether the responses that were seen are badly fitted on average."""
-    return _seen(cost, best) > ACCEPTABLE
+def led(model: StateSpaceModel, targets: Sequence[Target]) -> StateSpaceModel:
+    """The model with numbers from which a descent in logarithms can begin."""
+    cost = cost_function(model, targets, _scale(model, targets))
+    row = _led(model, cost, cost.row.starts())
+    return model.with_values(dict(zip(model.free, map(float, row * cost.row.scale), strict=True)))
 
 
-def _from_above(model: StateSpaceModel, cost: ResponseCost, best: Optimum, *, starts: int, seed: int) -> Optimum:
-    """A better end than a bad one, from a fit to the upper frequencies: slow responses are the least sure, and can hold
-    a search where the fast modes are wrong."""
-    least = _UPPER * min(float(t.omega[0]) for t in cost.targets)
-    upper = [part for t in cost.targets if (part := t.above(least)).omega.size >= _POINTS]
-    if all(t.ceiling for t in upper):
-        return best
-    end, other = best_end(model, upper, starts=starts, iterations=_ROUGH, seed=seed, progress=None)
-    row = end.row * other.row.scale / cost.row.scale
-    if not np.isfinite(cost.cost(row)):
-        return best
-    return min((best, _down(cost, start=row, tolerance=1e-2, iterations=_ROUGH)), key=lambda one: one.cost)
+def price_of(model: StateSpaceModel, targets: Sequence[Target]) -> float:
+    """Sum of J at a model's own numbers, of which no response counts for more than what is very wrong."""
+    cost = cost_function(model, targets, np.ones(len(model.free)))
+    return _priced(cost, np.array([model.parameters[n].value for n in model.free]))
 
 
-def _freed(model: StateSpaceModel, cost: ResponseCost, best: Optimum) -> Optimum:
-    """A better end than one that a few responses hold in a trap (a phase on the wrong side of half a turn): they are
-    left out until the others have settled."""
-    for _ in range(FREED):
-        each = list(zip(cost.each(best.row), cost.targets, strict=True))
-        poor = [t for j, t in each if j > ACCEPTABLE and not t.ceiling]
-        if not 0 < len(poor) <= _FEW * len(each):
-            break
-        others = cost_function(model, [t for _, t in each if not any(t is one for one in poor)], cost.row.scale)
-        rest = _down(others, start=best.row, tolerance=1.0, iterations=_ROUGH)
-        if not np.isfinite(cost.cost(rest.row)):
-            break
-        end = _down(cost, start=rest.row, tolerance=1.0, iterations=_ROUGH)
-        if end.cost > _HOPE * best.cost:
-            break
-        best = end
-    return best
+def _led(model: StateSpaceModel, cost: ResponseCost, row: Array) -> Array:
+    """A row from which a descent in logarithms can begin: a start that is far off anywhere moves by relative errors."""
+    each = zip(cost.each(row), cost.targets, strict=True)
+    if max(j for j, t in each if not t.ceiling) <= ACCEPTABLE:
+        return row
+    far = relative_cost(model, [t for t in cost.targets if not t.ceiling], cost.row)
+    if not np.isfinite(far.cost(row)):
+        return row
+    near = _down(far, start=row, tolerance=1.0, iterations=_LED).row
+    return min((row, near), key=lambda one: _priced(cost, one))
 
 
-def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:
-    """A better end than a bad one, from points around it that are shaken hard and have some signs turned."""
-    random = np.random.default_rng(seed)
-    low, high = cost.row.bounds()
-    shape = (RESCUED, best.row.size)
-    turned = np.where(random.random(shape) < _TURNED, -1.0, 1.0)
-    shaken = np.clip(best.row * turned * np.exp(_HARD * random.standard_normal(shape)), low, high)
-
-    def price(row: Array) -> float:
-        each = np.nan_to_num(cost.each(row), nan=_VERY_WRONG, posinf=_VERY_WRONG)
-        return float(np.sum(np.minimum(each, _VERY_WRONG))) if np.isfinite(cost.cost(row)) else np.inf
-
-    prices = np.array([price(row) for row in shaken])
-    hopeful = [shaken[k] for k in np.argsort(prices)[:STARTED] if np.isfinite(prices[k])]
-    ends = [_down(cost, start=row, tolerance=1e-2, iterations=_ROUGH) for row in hopeful]
-    return min((best, *ends), key=lambda end: end.cost)
+def _priced(cost: ResponseCost, row: Array) -> float:
+    """Sum of J, of which no response counts for more than what is very wrong."""
+    each = np.nan_to_num(cost.each(row), nan=_VERY_WRONG, posinf=_VERY_WRONG)
+    return float(np.sum(np.minimum(each, _VERY_WRONG)))

@@ -15,11 +15,10 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.identification.frequency.lacking_parts import lacking_words
 from swashplate.identification.frequency.response_cost import Target, log_error
+from swashplate.identification.frequency.state_space_search import answers
+from swashplate.identification.frequency.structure_score import scatter
 from swashplate.identification.responses.frequency_response import TWO_PI
 from swashplate.models.linear.state_space import StateSpaceModel
-
-FLOOR = 0.03
-"""Relative error that every response is granted: 0.26 dB or 1.7 degrees of windows, filters and sampling."""
 
 MANY = 3.0
 """Times its scatter by which a response has to be missed to count."""
@@ -55,12 +54,11 @@ def misfits(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[Misfit, 
         model: with its numbers. targets: fitted responses; those without known errors are passed over.
     """
     missed = []
-    for t in targets:
+    for t, h in zip(targets, answers(model, targets), strict=True):
         if t.error is None:
             continue
-        h = model.response(t.omega)[:, model.outputs.index(t.output), model.inputs.index(t.input)]
         # The random error is that of the modulus; real and imaginary part scatter alike.
-        squared = np.abs(log_error(h, t.measured)) ** 2 / (2.0 * (t.error**2 + FLOOR**2))
+        squared = np.abs(log_error(h, t.measured)) ** 2 / (2.0 * scatter(t) ** 2)
         # A tenth of the points may be a notch that windows and model see elsewhere; a wrong structure misses more.
         times = float(np.sqrt(np.mean(np.sort(squared)[: round(_KEPT * squared.size)])))
         if times > MANY:
@@ -68,8 +66,12 @@ def misfits(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[Misfit, 
     return tuple(sorted(missed, key=lambda one: -one.times))
 
 
-def misfit_words(model: StateSpaceModel, targets: Sequence[Target]) -> list[str]:
-    """That a structure cannot be the aircraft's, in words: which responses, how far off, at which end of the band."""
+def misfit_words(model: StateSpaceModel, targets: Sequence[Target], *, advise: bool = True) -> list[str]:
+    """That a structure cannot be the aircraft's, in words: which responses, how far off, at which end of the band.
+
+    Args:
+        model: with its numbers. targets: fitted responses. advise: whether to say what it may lack.
+    """
     missed = misfits(model, targets)
     if not missed:
         return []
@@ -79,7 +81,7 @@ def misfit_words(model: StateSpaceModel, targets: Sequence[Target]) -> list[str]
         f"this structure is not all of the aircraft: {len(missed)} of {len(targets)} responses are missed by more than "
         f"{MANY:g} times their scatter: {named}{_where(missed)}. Do not trust modes or derivatives that rest on them."
     )
-    text += lacking_words(model, [one.name for one in missed])
+    text += lacking_words(model, [one.name for one in missed]) if advise else ""
     speeds = [n for s, n in model.trim.items() if s in ("u", "v", "w")]
     if speeds and all(model.parameters[n].value == 0.0 for n in speeds):
         text += f" If this was not flown in hover, say so: --fix {speeds[0]}=..."

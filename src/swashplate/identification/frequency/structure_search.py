@@ -7,22 +7,33 @@ Parts are added to the best one so far while the misfit falls by more than their
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from swashplate.errors import IdentificationError
-from swashplate.identification.frequency.composed_start import from_core
+from swashplate.identification.frequency.composed_start import from_core, from_relative
 from swashplate.identification.frequency.fitted_pairs import PairChoice
+from swashplate.identification.frequency.foreseen_parts import Foresight, worths
 from swashplate.identification.frequency.lacking_parts import parts_in
-from swashplate.identification.frequency.search_candidates import additions, cores, exchanges, without
-from swashplate.identification.frequency.search_result import Contender, StructureSearch, squared_misfit
+from swashplate.identification.frequency.response_cost import ACCEPTABLE
+from swashplate.identification.frequency.search_candidates import (
+    contains,
+    cores,
+    exchanges,
+    joining,
+    named,
+    offered,
+    preferred,
+    ranks,
+    without,
+)
+from swashplate.identification.frequency.search_result import Contender, StructureSearch
 from swashplate.identification.frequency.search_words import reasons
-from swashplate.identification.frequency.state_space_fit import fit_targets
-from swashplate.identification.frequency.structure_misfit import misfits
+from swashplate.identification.frequency.state_space_fit import fit_targets, silent
+from swashplate.identification.frequency.state_space_search import led, price_of
+from swashplate.identification.frequency.structure_score import spread_of, squared_misfit
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.models.linear.composition import PREFIX
+from swashplate.models.linear.composition import PREFIX, in_order
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure
 from swashplate.models.linear.structure_parts import PARTS
@@ -33,11 +44,20 @@ LOOK, FOLLOW = 12, 40
 HOPELESS = 3.0
 """Times the least misfit of its round from which a structure is abandoned."""
 
-ROUNDS = 3
-"""Times that parts are added."""
+FOLLOWED = 3
+"""Of what is foreseen to be worth its numbers, how much is fitted."""
+
+ROUNDS = 12
+"""Times that parts are added at most."""
+
+ALIKE = 1.02
+"""Times the J_ave of a structure up to which one that contains it may end (what may not be exceeded counts too)."""
 
 LEVEL = 2.0
 """Points of the criterion that are no difference."""
+
+DOUBTFUL = 30.0
+"""Points by which slopes call a part worth its numbers, below which a fit without it is tried on the way."""
 
 CLOSE, BETTER = 10.0, 0.9
 """Points of the criterion within which held-out records decide, and the share of J_rms that one has to come down to."""
@@ -54,8 +74,15 @@ class _Search:
     seed: int
     tried: dict[str, Contender] = field(default_factory=dict)
     refused: dict[str, IdentificationError] = field(default_factory=dict)
+    regressed: dict[str, StateSpaceModel | None] = field(default_factory=dict)
 
-    def looks(self, models: Sequence[StateSpaceModel], *, like: Contender | None, iterations: int) -> list[Contender]:
+    def composed(self, parts: Iterable[str]) -> StateSpaceModel:
+        """The structure of these parts, prepared."""
+        return self.prepare(structure(PREFIX + "+".join(in_order(parts))))
+
+    def looks(
+        self, models: Sequence[StateSpaceModel], *, like: Sequence[Contender] = (), iterations: int = FOLLOW
+    ) -> list[Contender]:
         """A fit of each that can answer to what was measured."""
         contenders = []
         for one in models:
@@ -65,28 +92,32 @@ class _Search:
                 self.refused[one.name] = error
         return contenders
 
-    def look(self, model: StateSpaceModel, *, like: Contender | None, iterations: int) -> Contender:
-        """A fit of a model from the better of its own start and what a relative of it has found."""
+    def look(self, model: StateSpaceModel, *, like: Sequence[Contender], iterations: int) -> Contender:
+        """A fit of a model from the best start: where relatives have ended, or what the responses say of its core."""
         known = self.tried.get(model.name)
-        if known is not None and len(known.fit.history) > iterations:
-            return known
-        self.say(model.name)
         targets, ceilings, left_out = self.choice.targets(model, self.responses)
-        others: dict[str, StateSpaceModel] = {}
-        for name, one in (("a relative", like), ("itself", known)):
-            if one is not None:
-                values = {p.name: p.value for p in one.fit.estimates if p.name in model.free}
-                others[name] = model.with_values(values)
-        if like is None and known is None:
-            others = from_core(model, self.responses, band=self.choice.band)
+        every = (*targets, *ceilings)
+        like = [*like, *(one for one in self.tried.values() if _inside(model, one))]
+        starts = {one.name: _begun(model, one.fit.solution) for one in like}
+        if known is not None:
+            end = price_of(known.fit.solution, every)
+            ahead = [one for one in starts.values() if ALIKE * price_of(one, every) < end]
+            if not ahead and (known.fit.converged or len(known.fit.history) > iterations):
+                return known
+            starts["itself"] = known.fit.solution
+        if known is None and all(one.cost > ACCEPTABLE for one in like):
+            own = from_core(model, self.responses, band=self.choice.band, regressed=self.regressed)
+            starts |= {name: led(one, every) for name, one in {"": model, **own}.items()}
+        self.say(model.name)
         fit = fit_targets(
             model,
             targets,
-            others=others,
+            others=starts,
             ceilings=ceilings,
             left_out=left_out,
             starts=1,
             iterations=iterations,
+            advise=False,
             data=self.responses.data,
             settings={"sources": list(self.responses.sources), "method": self.responses.method}
             | self.choice.settings(),
@@ -95,31 +126,50 @@ class _Search:
         self.tried[model.name] = contender
         return contender
 
+    def followed(self, best: Contender, others: Iterable[Sequence[str]]) -> Contender:
+        """The best of a structure and of others that are begun where it has ended; the best of them to its end."""
+        seen = self.looks([self.composed(parts) for parts in others], like=[best], iterations=LOOK)
+        first = self.best([best, *seen])
+        return best if first is best else self.best([best, self.look(first.fit.start, like=(), iterations=FOLLOW)])
+
+    def answering(self, parts: Sequence[str]) -> list[str]:
+        """Parts with the derivatives without which a seen response would be nothing at all."""
+        model = self.composed(parts)
+        targets, *_ = self.choice.targets(model, self.responses)
+        return [*parts, *joining(parts, silent(model, targets))]
+
     def score(self, one: Contender, best: Contender) -> float:
         """The information criterion, with the scatter that the best one so far leaves."""
-        points = sum(t.omega.size for t in best.fit.targets)
-        spread = max(1.0, best.misfit / max(2.0 * points - best.parameters, 1.0))
-        return one.score(spread, points)
+        return one.score(_spread(best), _points(best))
 
     def best(self, among: Sequence[Contender]) -> Contender:
         """The one of the least score; of those that are level, the one whose parts come first."""
         least = min(among, key=lambda one: one.misfit)
         lowest = min(self.score(one, least) for one in among)
         level = [one for one in among if self.score(one, least) <= lowest + LEVEL]
-        return min(level, key=lambda one: (one.parameters, [tuple(PARTS).index(p) for p in parts_in(one.fit.solution)]))
+        return min(level, key=lambda one: (one.parameters, ranks(one.parts)))
 
-    def round(self, models: Sequence[StateSpaceModel], *, like: Contender | None = None) -> list[Contender]:
+    def round(self, models: Sequence[StateSpaceModel]) -> list[Contender]:
         """A first look at each; those that are not hopeless are followed."""
-        seen = self.looks(models, like=like, iterations=LOOK)
+        seen = self.looks(models, iterations=LOOK)
         if not seen:
             raise next(iter(self.refused.values()))
+        self.audit()
+        seen = [self.tried[one.name] for one in seen]
         least = min(one.misfit for one in seen)
         for one in seen:
             if one.misfit > HOPELESS * least:
                 self.tried[one.name] = replace(one, abandoned=True)
-        return [
-            self.look(one.fit.start, like=None, iterations=FOLLOW) for one in seen if one.misfit <= HOPELESS * least
-        ]
+        return [self.look(one.fit.start, like=(), iterations=FOLLOW) for one in seen if one.misfit <= HOPELESS * least]
+
+    def audit(self) -> None:
+        """Fits that end above what they contain are tried again from there, and called failed where that is in vain."""
+        for one in sorted(self.tried.values(), key=lambda c: len(c.parts)):
+            for other in tuple(self.tried.values()):
+                if _ends_above(one, other):
+                    again = self.look(one.fit.start, like=[other], iterations=FOLLOW)
+                    failed = other.name if _ends_above(again, other) else ""
+                    one = self.tried[one.name] = replace(again, failed=failed)
 
 
 def search_structures(
@@ -157,7 +207,7 @@ def search_structures(
     else:
         best, leaner = _grown(search)
     pick, words = _judged(search, best, judge)
-    pick = _finished(search, pick, pick.fit.start if structures else _composed(search, pick.name.split("+")))
+    pick = _finished(search, pick, pick.fit.start if structures else search.composed(pick.parts))
     tried = sorted(search.tried.values(), key=lambda one: (one is not pick, one.abandoned, search.score(one, pick)))
     refused = [f"  not fitted: {error.problem}" for error in search.refused.values()]
     if apart:
@@ -194,59 +244,75 @@ def _in_common(
     return (replace(choice, without=(*choice.without, *apart)) if apart else choice), apart
 
 
-def _composed(search: _Search, parts: Sequence[str]) -> StateSpaceModel:
-    return search.prepare(structure(PREFIX + "+".join(parts)))
+def _points(one: Contender) -> int:
+    return sum(t.omega.size for t in one.fit.targets)
+
+
+def _spread(one: Contender) -> float:
+    return spread_of(one.misfit, _points(one), one.parameters)
+
+
+def _inside(model: StateSpaceModel, other: Contender) -> bool:
+    """Whether a composed structure contains one that was tried, with every number that was free there."""
+    both = "composed" in model.document and "composed" in other.fit.start.document
+    return both and contains(parts_in(model), other.parts) and set(other.fit.names) <= set(model.free)
+
+
+def _ends_above(one: Contender, other: Contender) -> bool:
+    """Whether a fit ends above that of a structure which it contains."""
+    return one.cost > ALIKE * other.cost and _inside(one.fit.start, other)
+
+
+def _begun(model: StateSpaceModel, relative: StateSpaceModel) -> StateSpaceModel:
+    """The model from where a relative has ended."""
+    if "composed" in model.document and "composed" in relative.document:
+        return from_relative(model, relative)
+    return model.with_values({n: p.value for n, p in relative.parameters.items() if n in model.free})
 
 
 def _grown(search: _Search) -> tuple[Contender, dict[str, Contender]]:
     """The best composed structure, and what it would be without each of its parts."""
-    begun = cores(search.responses)
-    best = search.best(search.round([_composed(search, parts) for parts in begun]))
-    idle: set[str] = set()
+    begun = [search.answering(parts) for parts in cores(search.responses)]
+    best = search.best(search.round([search.composed(parts) for parts in begun]))
+    leaner: dict[str, Contender] = {}
     for _ in range(ROUNDS):
-        parts = tuple(best.name.split("+"))
-        missed = bool(misfits(best.fit.solution, best.fit.targets))
-        better: list[str] = []
-        for group in additions(parts, search.responses, every=missed):
-            named = {"+".join(p for p in PARTS if p in (*parts, n)): n for n in group if n not in idle}
-            seen = search.looks([_composed(search, name.split("+")) for name in named], like=best, iterations=LOOK)
-            looks = {named[one.name]: one for one in seen}
-            idle |= {n for n, one in looks.items() if not _hopeful(one, best)}
-            first = search.best([best, *looks.values()])
-            better += [n for n, one in looks.items() if one is first]
-        if not better:
-            break
-        several = [[n] for n in better] if len(better) < 2 else [better, *([n] for n in better)]
-        grown = search.looks([_composed(search, [*parts, *more]) for more in several], like=best, iterations=FOLLOW)
-        following = search.best([best, *grown])
+        ways = (_extended, _trimmed, _exchanged)
+        following = next((one for way in ways if (one := way(search, best)) is not best), best)
         if following is best:
-            break
+            leaner = {
+                part: one
+                for part, kept in without(best.parts).items()
+                for one in search.looks([search.composed(kept)], like=[best], iterations=LOOK)
+            }
+            following = search.best([best, *leaner.values()])
+            if following is best:
+                break
         best = following
-    return _settled(search, best)
+    search.audit()
+    return search.tried[best.name], {part: search.tried[one.name] for part, one in leaner.items()}
 
 
-def _hopeful(one: Contender, best: Contender) -> bool:
-    """Whether a part lowers the misfit by half of what its numbers cost, were the scatter as it should be."""
-    points = sum(t.omega.size for t in best.fit.targets)
-    half = 0.5 * (one.score(np.inf, points) - best.score(np.inf, points))
-    return best.score(1.0, points) - one.score(1.0, points) > -half
+def _extended(search: _Search, best: Contender) -> Contender:
+    """The best of the structure and those with more that is foreseen to be worth its numbers."""
+    foresight = Foresight(best.fit.solution, best.fit.targets, offered=offered(search.responses), spread=_spread(best))
+    # Slopes say little of what is far off.
+    followed = foresight.proposals()[: None if best.cost > ACCEPTABLE else FOLLOWED]
+    return search.followed(best, [named([*best.parts, *preferred(one.parts)]) for one in followed])
 
 
-def _settled(search: _Search, best: Contender) -> tuple[Contender, dict[str, Contender]]:
-    """The structure with parts exchanged and taken out where that is better, and what those that stay are worth."""
-    while True:
-        parts = best.name.split("+")
-        leaner = {
-            part: one
-            for part, kept in without(parts).items()
-            for one in search.looks([_composed(search, kept)], like=best, iterations=FOLLOW)
-        }
-        others = [_composed(search, other) for other in exchanges(parts, search.responses)]
-        exchanged = search.looks(others, like=best, iterations=FOLLOW)
-        following = search.best([best, *leaner.values(), *exchanged])
-        if following is best:
-            return best, leaner
-        best = following
+def _trimmed(search: _Search, best: Contender) -> Contender:
+    """The best of the structure and those without what slopes call idle."""
+    worth = worths(best.fit.solution, best.fit.targets, spread=_spread(best))
+    smaller = [kept for part, kept in without(best.parts).items() if worth.get(part, DOUBTFUL) < DOUBTFUL]
+    idle = [name for name in worth if name not in PARTS and worth[name] < 0.0]
+    taken = [[min(idle, key=lambda name: worth[name])], idle] if len(idle) > 1 else [idle] if idle else []
+    smaller += [[part for part in best.parts if part not in out] for out in taken]
+    return search.followed(best, smaller)
+
+
+def _exchanged(search: _Search, best: Contender) -> Contender:
+    """The best of the structure and those with one part in place of another that it may stand for."""
+    return search.followed(best, exchanges(best.parts, search.responses))
 
 
 def _judged(

@@ -1,6 +1,7 @@
 """Structures composed of parts: "compose:body+flap+inflow" as the document of a state-space model file.
 
-A pair among the parts ("compose:body+flap+r/pedal") gives that response a delay of its own, a derivative and an input
+A derivative among the parts ("compose:body+flap+Xv+Zb") adds that entry to its equation. A pair among the parts
+("compose:body+flap+r/pedal") gives that response a delay of its own, a derivative and an input
 ("compose:body+flap+r_dot/pedal") that entry of G.
 
 What the parts are is said in `structure_parts`. Quasi-steady body and first-order tip-path plane: Tischler and Remple
@@ -9,13 +10,23 @@ What the parts are is said in `structure_parts`. Quasi-steady body and first-ord
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from swashplate.errors import CardError
 from swashplate.models.linear.accelerometer import TRIM
 from swashplate.models.linear.expressions import Expression
-from swashplate.models.linear.structure_parts import HELD, INPUTS, PARTS, SERVO, SHORT, number
+from swashplate.models.linear.structure_parts import (
+    DERIVATIVES,
+    HELD,
+    INPUTS,
+    PARTS,
+    SERVO,
+    SHORT,
+    entry_of,
+    number,
+)
 from swashplate.registry import nearest
 
 PREFIX = "compose:"
@@ -30,8 +41,9 @@ def is_composed(name: object) -> bool:
     return str(name).startswith(PREFIX)
 
 
+@lru_cache(maxsize=1024)
 def parts_of(text: str) -> tuple[str, ...]:
-    """The parts that "compose:body+flap" names, in the order in which they are put together; pairs are left out.
+    """The parts that "compose:body+flap+Xv" names, as they are put together: derivatives last, pairs left out.
 
     Raises:
         CardError: an unknown part (with what it may stand for), or parts that make no sense together.
@@ -40,7 +52,7 @@ def parts_of(text: str) -> tuple[str, ...]:
     if not any(given):
         raise CardError("names no part.", where=text, hint=f"An example: {PREFIX}body+flap. {_listed()}")
     for name in given:
-        if name not in PARTS:
+        if name not in PARTS and entry_of(name) is None:
             raise CardError(
                 f"'{name}' is no part of a structure.", where=text, hint=f"{nearest(name, PARTS)} {_listed()}".strip()
             )
@@ -49,7 +61,15 @@ def parts_of(text: str) -> tuple[str, ...]:
     reason = nonsense(given)
     if reason:
         raise CardError(reason, where=text, hint=f"See `swash structures list`. {_listed()}")
-    return tuple(name for name in PARTS if name in given)
+    return in_order(given)
+
+
+def in_order(parts: Iterable[str]) -> tuple[str, ...]:
+    """Parts as they are put together: those of `PARTS` in its order, then derivatives by equation and column."""
+    return tuple(sorted(set(parts), key=_RANK.__getitem__))
+
+
+_RANK = {name: k for k, name in enumerate((*PARTS, *DERIVATIVES))}
 
 
 def pairs_of(text: str) -> tuple[str, ...]:
@@ -61,8 +81,25 @@ def _named(text: str) -> list[str]:
     return [part.strip() for part in text.removeprefix(PREFIX).split("+")]
 
 
-def nonsense(parts: Sequence[str]) -> str:
-    """Why these parts make no sense together; empty where they do."""
+def nonsense(parts: Iterable[str]) -> str:
+    """Why these parts make no sense together; empty where they do.
+
+    Whether a part has anything to add is looked up in what the others make, in this very combination.
+    """
+    given = in_order(parts)
+    known = tuple(name for name in given if name in PARTS)
+    entries = _entries(tuple(name for name in known if name != "actuators"))
+    for name in given[len(known) :]:
+        place = entry_of(name)
+        assert place is not None, name
+        if name in entries.get(place, ()) or not _has_place(place, known):
+            return _superfluous(name, {place: (name,)}, entries)
+    return _clash(known)
+
+
+@lru_cache(maxsize=4096)
+def _clash(parts: tuple[str, ...]) -> str:
+    """Why parts of `PARTS` make no sense together; empty where they do."""
     if not any(PARTS[name].core for name in parts):
         return f"there is nothing that flies: it lacks one of {', '.join(_CORES)}."
     for name in parts:
@@ -72,11 +109,70 @@ def nonsense(parts: Sequence[str]) -> str:
                 return f"'{name}' and '{other}' cannot stand together: {why}."
         if part.needs and not set(part.needs) & set(parts):
             return f"'{name}' needs {' or '.join(part.needs)}: {part.why}."
+    whole = _entries(parts)
+    for name in reversed(parts):
+        others = _entries(tuple(part for part in parts if part != name))
+        if others == whole:
+            right = PARTS[name].equations
+            own = {(row, column): (text,) for row, terms in right.items() for column, text in terms.items()}
+            return _superfluous(name, own, others)
     return ""
 
 
+def _superfluous(name: str, own: Entries, others: Entries) -> str:
+    """Why a part adds nothing to the entries that the others make."""
+    there = [text for place, texts in own.items() for text in texts if text in others.get(place, ())]
+    if there:
+        verb = "is" if len(there) == 1 else "are"
+        return f"'{name}' adds nothing: {', '.join(dict.fromkeys(there))} {verb} there already."
+    places = ", ".join(f"d{row}/dt by {column}" for row, column in own)
+    return f"'{name}' has no place: these parts have no {places}."
+
+
 def _listed() -> str:
-    return f"Parts are {', '.join(PARTS)}."
+    return f"Parts are {', '.join(PARTS)}, and derivatives such as Xv, Lq or Zb."
+
+
+Entries = Mapping[tuple[str, str], tuple[str, ...]]
+"""The terms at each place (state, column) of the right sides."""
+
+
+@lru_cache(maxsize=4096)
+def _entries(parts: tuple[str, ...]) -> Entries:
+    """The right sides of parts that are put together, in this order; what has no place is left out."""
+    entries: dict[tuple[str, str], tuple[str, ...]] = {}
+    for name in parts:
+        place = entry_of(name)
+        replaced = PARTS[name].replaces if place is None else (place,)
+        for one in replaced:
+            if one in entries:
+                entries[one] = _kinematic(entries[one])
+        added = PARTS[name].equations if place is None else {place[0]: {place[1]: name}}
+        for row, terms in added.items():
+            for column, text in terms.items():
+                if _has_place((row, column), parts):
+                    there = entries.get((row, column), ())
+                    entries[row, column] = there if text in there else (*there, text)
+    entries = {place: terms for place, terms in entries.items() if terms}
+    return _behind_actuators(entries) if "actuators" in parts else entries
+
+
+def _has_place(place: tuple[str, str], parts: tuple[str, ...]) -> bool:
+    states = _states(parts)
+    return place[0] in states and (place[1] in states or place[1] in INPUTS)
+
+
+@lru_cache(maxsize=4096)
+def _states(parts: tuple[str, ...]) -> dict[str, str]:
+    return {state: unit for name in parts if name in PARTS for state, unit in PARTS[name].states.items()}
+
+
+def _behind_actuators(entries: Entries) -> Entries:
+    """The same with a lag between each input and everything that it moves."""
+    behind = {(row, f"{c}_servo" if c in INPUTS else c): terms for (row, c), terms in entries.items()}
+    for name in (name for name in INPUTS if any(c == name for _, c in entries)):
+        behind |= {(f"{name}_servo", f"{name}_servo"): ("-1",), (f"{name}_servo", name): ("1",)}
+    return behind
 
 
 def document(text: str) -> dict[str, Any]:
@@ -90,25 +186,16 @@ def document(text: str) -> dict[str, Any]:
         CardError: an unknown part, parts that make no sense together, a pair that they do not have.
     """
     names, pairs = parts_of(text), pairs_of(text)
-    parts = [PARTS[name] for name in names]
-    states = {state: unit for part in parts for state, unit in part.states.items()}
+    parts = [PARTS[name] for name in names if name in PARTS]
+    entries = _entries(names)
+    inputs = {name: unit for name, unit in INPUTS.items() if any(column == name for _, column in entries)}
+    servos = {f"{name}_servo": unit for name, unit in inputs.items()} if "actuators" in names else {}
+    states = _states(names) | servos
     equations: dict[str, dict[str, str]] = {state: {} for state in states}
-    for part in parts:
-        for row, column in part.replaces:
-            entry = equations.get(row, {})
-            if column in entry:
-                entry[column] = _kinematic(entry[column])
-        for row, entries in part.equations.items():
-            for column, expression in entries.items():
-                if row in states and (column in states or column in INPUTS):
-                    old = equations[row].get(column, "")
-                    equations[row][column] = f"{old} + {expression}" if old and old != "0" else expression
-    equations = {row: {c: text for c, text in entries.items() if text != "0"} for row, entries in equations.items()}
-    used = {column for entries in equations.values() for column in entries}
-    inputs = {name: unit for name, unit in INPUTS.items() if name in used}
-    left = {row: dict(entries) for part in parts for row, entries in part.left.items()}
-    if "actuators" in names:
-        _behind_actuators(states, equations, left, inputs)
+    for (row, column), terms in entries.items():
+        equations[row][column] = " + ".join(terms)
+    left = {row: dict(terms) for part in parts for row, terms in part.left.items()}
+    left |= {servo: {servo: SERVO[servo.removesuffix("_servo")]} for servo in servos}
     outputs: dict[str, Any] = {
         name: {"unit": unit, "of": {name: "1"}}
         for name, unit in states.items()
@@ -171,30 +258,13 @@ def _delays(
     return {name: f"tau_{SHORT[name]}" for name in shared} | own
 
 
-def _kinematic(expression: str) -> str:
-    """What is left of an entry when the rotor has taken the derivative out: the trim's speeds; "0" for nothing."""
-    kept = [term for term in expression.split(" + ") if term.lstrip("-") in _TRIM_NAMES.values()]
-    return " + ".join(kept) or "0"
-
-
-def _behind_actuators(
-    states: dict[str, str],
-    equations: dict[str, dict[str, str]],
-    left: dict[str, dict[str, str]],
-    inputs: dict[str, str],
-) -> None:
-    """Put a lag between each input and everything that it moves."""
-    for row, entries in equations.items():
-        equations[row] = {f"{c}_servo" if c in inputs else c: text for c, text in entries.items()}
-    for name in inputs:
-        servo = f"{name}_servo"
-        states[servo] = inputs[name]
-        equations[servo] = {servo: "-1", name: "1"}
-        left[servo] = {servo: SERVO[name]}
+def _kinematic(terms: tuple[str, ...]) -> tuple[str, ...]:
+    """What is left of an entry when another part stands for its derivative: the trim's speeds."""
+    return tuple(term for term in terms if term.lstrip("-") in _TRIM_NAMES.values())
 
 
 def _trust(names: Sequence[str]) -> str:
-    holds = list(dict.fromkeys(PARTS[name].holds for name in names if PARTS[name].holds))
+    holds = list(dict.fromkeys(PARTS[name].holds for name in names if name in PARTS and PARTS[name].holds))
     text = "; ".join(holds) or "about hover"
     return f"{text[0].upper()}{text[1:]}. Remove what the responses do not determine (--reduce)."
 

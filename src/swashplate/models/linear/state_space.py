@@ -5,9 +5,7 @@
 A delay belongs to an input, to one response, or to one entry of G. Where entries of one input act at different times
 the input is taken as several, one for each time (`wide`).
 
-(Tischler and Remple 2012, eq. 13.1). The response and its derivatives are exact: with T = (j omega M - F)^-1 an entry
-f of F changes H = C T G by C T (dF/df) T G, one outer product each; entries change with parameters by complex steps,
-which are exact to rounding for a grammar of arithmetic (Squire and Trapp 1998).
+(Tischler and Remple 2012, eq. 13.1). The response and its derivatives (`sensitivities`) are exact.
 """
 
 from __future__ import annotations
@@ -18,15 +16,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import CardError
-from swashplate.models.linear import late_entries, python_control
+from swashplate.models.linear import late_entries, python_control, sensitivities
 from swashplate.models.linear.expressions import Expression
 
 MATRICES = ("M", "F", "G", "H0", "H1", "D")
-_STEP = 1e-30
 
 
 @dataclass(frozen=True)
@@ -191,14 +187,15 @@ class StateSpaceModel:
     def matrices(self) -> dict[str, Array]:
         """M, F, G, H0, H1 and D as numbers."""
         values = self.numbers()
-        shapes = self._shapes
+        shapes = self.shapes
         matrices = {name: np.eye(*shapes[name]) if name == "M" else np.zeros(shapes[name]) for name in MATRICES}
         for e in self.elements:
             matrices[e.matrix][e.row, e.column] = float(e.expression(values))
         return matrices
 
     @property
-    def _shapes(self) -> dict[str, tuple[int, int]]:
+    def shapes(self) -> dict[str, tuple[int, int]]:
+        """Rows and columns of each matrix."""
         n, m, k = len(self.states), len(self.inputs), len(self.outputs)
         return {"M": (n, n), "F": (n, n), "G": (n, m), "H0": (k, n), "H1": (k, n), "D": (k, m)}
 
@@ -273,7 +270,9 @@ class StateSpaceModel:
         m, s = self.matrices(), 1j * np.asarray(omega)[:, None, None]
         x = np.linalg.solve(s * m["M"] - m["F"], np.broadcast_to(m["G"] + 0j, (len(omega), *m["G"].shape)))
         h = (m["H0"] + s * m["H1"]) @ x + m["D"]
-        lag = np.array([[self.delay(o, i) for i in self.inputs] for o in self.outputs])
+        values = self.numbers()
+        late = {name: float(expression(values)) for name, expression in self.delays.items()}
+        lag = np.array([[late.get(f"{o}/{i}", late.get(i, 0.0)) for i in self.inputs] for o in self.outputs])
         return np.asarray(h * np.exp(-s * lag), dtype=np.complex128)
 
     def to_control(self, *, pade: int | None = None) -> Any:
@@ -302,8 +301,8 @@ class StateSpaceModel:
 
     # ---- sensitivities -----------------------------------------------------------------------------------------
     @cached_property
-    def _uses(self) -> dict[str, frozenset[str]]:
-        """The free parameters behind every parameter."""
+    def uses(self) -> dict[str, frozenset[str]]:
+        """The parameters behind every parameter: itself, or those that its tie uses."""
         uses: dict[str, frozenset[str]] = {n: frozenset([n]) for n in self.parameters if n not in self.tie_order}
         for name in self.tie_order:
             uses[name] = frozenset().union(*(uses[used] for used in self._tie(name).names))
@@ -324,39 +323,7 @@ class StateSpaceModel:
         """
         if self.entry_delays:
             return late_entries.sensitivities(self, free, numbers, pairs)
-        changes = dict(zip(free, map(float, numbers), strict=True))
-        values = self.numbers(changes)
-        m = {name: np.eye(*s) if name == "M" else np.zeros(s) for name, s in self._shapes.items()}
-        for e in self.elements:
-            m[e.matrix][e.row, e.column] = e.expression(values)
-        stepped = {name: self.numbers({**changes, name: changes[name] + 1j * _STEP}) for name in free}
-        grid, where = np.unique(np.concatenate([omega for _, _, omega in pairs]), return_inverse=True)
-        s = 1j * grid[:, None, None]
-        try:
-            t = np.linalg.inv(s * m["M"] - m["F"])
-        except np.linalg.LinAlgError:
-            t = np.full((grid.size, *m["F"].shape), np.nan + 0j)
-        c = m["H0"] + s * m["H1"]
-        x, left = t @ m["G"], c @ t
-        h = c @ x + m["D"]
-        moving = self._element_slopes(free, stepped)
-        answers, slopes, done = [], [], 0
-        for o, i, omega in pairs:
-            at = where[done : done + omega.size]
-            done += omega.size
-            xi, lo, hi = x[at, :, i], left[at, o, :], h[at, o, i]
-            jw: Complex = np.asarray(1j * omega, dtype=np.complex128)
-            total = np.zeros((omega.size, len(free)), dtype=np.complex128)
-            for matrix, entries in moving.items():
-                total += _changes(matrix, entries, o, i, xi, lo, jw)
-            expression = self.delays.get(f"{self.outputs[o]}/{self.inputs[i]}", self.delays.get(self.inputs[i]))
-            if expression is not None:
-                lag = np.exp(-jw * float(expression(values)))
-                hi, total = hi * lag, total * lag[:, None]
-                total -= np.outer(jw * hi, self._slopes(expression, free, stepped))
-            answers.append(hi)
-            slopes.append(total)
-        return answers, slopes
+        return sensitivities.of_pairs(self, free, numbers, pairs)
 
     def log_slopes(self, output: str, input: str, omega: Array, free: Sequence[str]) -> tuple[Complex, Complex]:
         """One response (n,) and the derivatives of its logarithm by named parameters, shape (n, n_free).
@@ -370,21 +337,6 @@ class StateSpaceModel:
         with np.errstate(divide="ignore", invalid="ignore"):
             return h, slopes / h[:, None]
 
-    def _slopes(self, expression: Expression, free: tuple[str, ...], stepped: Mapping[str, Any]) -> list[float]:
-        """An expression's derivatives by the free parameters, of the numbers with each stepped aside."""
-        behind = frozenset().union(*(self._uses[used] for used in expression.names))
-        return [float(np.imag(expression(stepped[name]))) / _STEP if name in behind else 0.0 for name in free]
-
-    def _element_slopes(
-        self, free: tuple[str, ...], stepped: Mapping[str, Mapping[str, Any]]
-    ) -> dict[str, tuple[NDArray[Any], ...]]:
-        """By matrix rows and columns (e,) of the entries that move, and their slopes (e, free)."""
-        moving: dict[str, list[tuple[int, int, list[float]]]] = {}
-        for e in self.elements:
-            if any(row := self._slopes(e.expression, free, stepped)):
-                moving.setdefault(e.matrix, []).append((e.row, e.column, row))
-        return {matrix: tuple(map(np.array, zip(*entries, strict=True))) for matrix, entries in moving.items()}
-
     def __repr__(self) -> str:
         head = f"{self.name}: {len(self.states)} states, inputs {', '.join(self.inputs)}"
         lines = [head, f"  {'parameter':<14}{'value':>12}{'sigma %':>8}{'I %':>8}  unit"]
@@ -395,20 +347,3 @@ class StateSpaceModel:
             tie = f"  = {p.tie.text}" if p.tie is not None else "" if p.free else "  fixed"
             lines.append(f"  {p.name:<14}{p.value:>12.5g}{cells}  {p.unit}{tie}")
         return "\n".join(lines)
-
-
-def _changes(
-    matrix: str, entries: tuple[NDArray[Any], ...], o: int, i: int, x: Array | Complex, left: Complex, jw: Complex
-) -> Array | Complex:
-    """What the entries of one matrix do to one response (n,) for a unit of each free parameter, (n, free)."""
-    rows, columns, slopes = entries
-    if matrix in "FM":
-        moved = (left[:, rows] * x[:, columns]) @ slopes
-        return moved if matrix == "F" else -jw[:, None] * moved
-    here = columns == i if matrix == "G" else rows == o
-    if matrix == "G":
-        return left[:, rows[here]] @ slopes[here]
-    if matrix == "D":
-        return np.sum(slopes[here & (columns == i)], axis=0)
-    seen = x[:, columns[here]] @ slopes[here]
-    return seen if matrix == "H0" else jw[:, None] * seen

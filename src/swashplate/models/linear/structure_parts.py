@@ -1,7 +1,8 @@
 """The parts that a structure of a helicopter is composed of: cores, rotor, inflow, engine, gyro, actuators.
 
-A part says which states it adds, what it adds to which equation, which entries of other parts it stands for, and which
-numbers it needs. Axes are body axes (w down); a: tip-path plane tilted back, b: to the right.
+A part says which states it adds, what it adds to which equation, which entries of a core it stands for, and which
+numbers it needs. A single derivative (Xv, La, Zb) is a part of its own. Axes are body axes (w down); a: tip-path plane
+tilted back, b: to the right.
 """
 
 from __future__ import annotations
@@ -32,10 +33,12 @@ class StructurePart:
         states: units by name.
         equations: right sides, by state: expressions before states and inputs. What has no place is left out.
         left: left sides.
-        replaces: entries (row, column) of other parts that it stands for.
+        replaces: entries (row, column) of parts before it that it stands for.
         core: whether a structure may begin with it.
-        needs: one of these must be there. excludes: parts that it cannot stand beside, with the reason.
+        needs: one of these must be there. excludes: parts that it cannot stand beside, with the reason. That another
+            part has the same entries already is no reason to be given here: `composition.nonsense` looks.
         why: what is wrong where `needs` is not met.
+        absent: numbers with which it does nothing, so that a structure with it answers as one without it.
         holds: where the part may be believed.
     """
 
@@ -48,6 +51,7 @@ class StructurePart:
     needs: tuple[str, ...] = ()
     why: str = ""
     excludes: Mapping[str, str] = field(default_factory=dict)
+    absent: Mapping[str, float] = field(default_factory=dict)
     holds: str = ""
 
 
@@ -57,18 +61,51 @@ SPEEDS, RATES = ("u", "v", "w"), ("p", "q", "r")
 
 SHORT = {"lateral": "lat", "longitudinal": "lon", "pedal": "ped", "collective": "col"}
 
-_LETTER = {"u": "X", "v": "Y", "w": "Z", "p": "L", "q": "M", "r": "N"}
+LETTERS = {"X": "u", "Y": "v", "Z": "w", "L": "p", "M": "q", "N": "r", "A": "a", "B": "b"}
+"""Which equation a derivative stands in, by its first letter: of the body, or of the tip-path plane."""
 
+_ANGLES = {"a": "a", "b": "b", "c": "c", "d": "d", "rfb": "r_fb"}
+COLUMNS = {n: n for n in (*SPEEDS, *RATES)} | _ANGLES | {short: name for name, short in SHORT.items()}
+"""What a derivative is by, by the rest of its name: motion, tilts of the rotor and its bar, the yaw gyro, inputs."""
+
+GRAVITY = 9.80665
+"""m/s^2: what a tip-path plane that carries the weight tilts."""
+
+_LETTER = {row: letter for letter, row in LETTERS.items()}
+_REST = {column: rest for rest, column in COLUMNS.items()}
 _CYCLIC = ("lateral", "longitudinal")
 _OF_ROTOR = (
     *((row, column) for row in ("p", "q") for column in ("p", "q", *_CYCLIC)),
-    *((row, column) for row in SPEEDS for column in ("p", "q", *_CYCLIC)),
+    ("u", "longitudinal"),
+    ("v", "lateral"),
 )
-"""What the tip-path plane makes of rates and cyclic, so that nothing is left for quasi-steady derivatives."""
+"""What the tip-path plane makes of rates and cyclic, so that nothing is left for the core's derivatives."""
+
+_ITS_OWN = (("p", "p"), ("q", "q"), ("p", "lateral"), ("q", "longitudinal"), ("u", "longitudinal"), ("v", "lateral"))
+"""What remains the rotor's where every derivative is asked for: an axis by its own rate and its own stick."""
+
+
+_KINEMATIC = (("a", "a"), ("a", "q"), ("b", "b"), ("b", "p"))
+"""Entries of the tip-path plane that are what it is, and no derivatives."""
+
+
+def entry_of(name: str) -> tuple[str, str] | None:
+    """Equation and column of a derivative by its name: ("p", "a") of "La"; None for what is no derivative."""
+    row, column = LETTERS.get(name[:1]), COLUMNS.get(name[1:])
+    return None if row is None or column is None or (row, column) in _KINEMATIC else (row, column)
+
+
+DERIVATIVES = tuple(letter + rest for letter in LETTERS for rest in COLUMNS if entry_of(letter + rest) is not None)
+"""The names of all derivatives, by equation and column."""
+
+
+def derivative_of(row: str, column: str) -> str:
+    """The name of a derivative: "La" of ("p", "a")."""
+    return _LETTER[row] + _REST[column]
 
 
 def _derivatives(row: str, columns: tuple[str, ...]) -> dict[str, str]:
-    return {column: _LETTER[row] + SHORT.get(column, column) for column in columns}
+    return {column: derivative_of(row, column) for column in columns}
 
 
 _KINEMATICS = {
@@ -92,7 +129,6 @@ _BODY_STATES = {
     "u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s", "phi": "rad", "theta": "rad"
 }  # fmt: skip
 
-_ONE_ROTOR = "the tip-path plane is there already; take one of the two"
 _HUB = {
     "p": {"b": "Lb"},
     "q": {"a": "Ma"},
@@ -107,7 +143,6 @@ PARTS: Mapping[str, StructurePart] = {
         states=_BODY_STATES,
         equations={row: {**_KINEMATICS.get(row, {}), **_derivatives(row, _BODY.get(row, ()))} for row in _BODY_STATES},
         core=True,
-        excludes=dict.fromkeys(("cyclic", "heave", "yaw"), "'body' has that axis already"),
         holds="about a steady flight at small attitudes",
     ),
     "cyclic": StructurePart(
@@ -129,13 +164,6 @@ PARTS: Mapping[str, StructurePart] = {
         equations={"r": _derivatives("r", ("r", "pedal", "collective"))},
         core=True,
     ),
-    "coupled": StructurePart(
-        "every quasi-steady derivative of the body, not the usual ones alone",
-        equations={row: _derivatives(row, tuple(c for c in _EVERY if c not in _BODY[row])) for row in _BODY},
-        needs=("body",),
-        why="its derivatives are those of all six degrees of freedom",
-        excludes={"gyroscopic": "'coupled' has Lq and Mp already"},
-    ),
     "flap": StructurePart(
         "main rotor's tip-path plane (a, b), first order, roll and pitch coupled; tilts the thrust and turns the body",
         states={"a": "rad", "b": "rad"},
@@ -148,7 +176,7 @@ PARTS: Mapping[str, StructurePart] = {
         replaces=_OF_ROTOR,
         needs=("body", "cyclic"),
         why="a rotor flaps with roll and pitch",
-        excludes={"flap_decoupled": _ONE_ROTOR},
+        absent={"Ab": 0.0, "Ba": 0.0, "Alat": 0.0, "Blon": 0.0},
         holds="below one rotor revolution",
     ),
     "flap_decoupled": StructurePart(
@@ -163,7 +191,6 @@ PARTS: Mapping[str, StructurePart] = {
         replaces=_OF_ROTOR,
         needs=("body", "cyclic"),
         why="a rotor flaps with roll and pitch",
-        excludes={"flap": _ONE_ROTOR},
         holds="below one rotor revolution",
     ),
     "forces": StructurePart(
@@ -172,18 +199,28 @@ PARTS: Mapping[str, StructurePart] = {
         replaces=(("u", "a"), ("v", "b")),
         needs=("flap", "flap_decoupled"),
         why=_ROTOR_WHY,
+        absent={"Xa": -GRAVITY, "Yb": GRAVITY},
     ),
     "hub": StructurePart(
         "hub moments across the axes (La, Mb)",
         equations={"p": {"a": "La"}, "q": {"b": "Mb"}},
         needs=("flap", "flap_decoupled"),
         why=_ROTOR_WHY,
+        absent={"La": 0.0, "Mb": 0.0},
     ),
     "gyroscopic": StructurePart(
         "moments of a rate across the axes beside the rotor's (Lq, Mp)",
         equations={"p": {"q": "Lq"}, "q": {"p": "Mp"}},
-        needs=("flap", "flap_decoupled"),
-        why="without a rotor's states the core has Lq and Mp already",
+        needs=("body", "cyclic"),
+        why="it couples roll and pitch",
+        absent={"Lq": 0.0, "Mp": 0.0},
+    ),
+    "coupled": StructurePart(
+        "every quasi-steady derivative of the body, not the usual ones alone; a rotor keeps those that it makes of an "
+        "axis' own rate and stick",
+        equations={row: _derivatives(row, tuple(c for c in _EVERY if (row, c) not in _ITS_OWN)) for row in _BODY},
+        needs=("body",),
+        why="its derivatives are those of all six degrees of freedom",
     ),
     "bar": StructurePart(
         "stabilizer bar (c, d), mixed into the cyclic of a flapping rotor",
@@ -197,6 +234,7 @@ PARTS: Mapping[str, StructurePart] = {
         left={"c": {"c": "tau_s"}, "d": {"d": "tau_s"}},
         needs=("flap", "flap_decoupled"),
         why="a bar tilts a rotor that flaps",
+        absent={"Ac": 0.0, "Bd": 0.0},
     ),
     "inflow": StructurePart(
         "induced velocity nu as a state, Pitt-Peters form in hover: thrust feels w - nu, and moves the air",
@@ -220,6 +258,7 @@ PARTS: Mapping[str, StructurePart] = {
         equations={"w": {"col_lag": "Zlag"}, "col_lag": {"col_lag": "-rate_lag", "collective": "rate_lag"}},
         needs=("body", "heave"),
         why="inflow shows in vertical speed",
+        absent={"Zlag": 0.0},
         excludes={"inflow": "both stand for the inflow's lag behind thrust"},
     ),
     "torque": StructurePart(
@@ -228,6 +267,7 @@ PARTS: Mapping[str, StructurePart] = {
         equations={"r": {"torque": "1"}, "torque": {"torque": "-rate_q", "collective": "Kq"}},
         needs=("body", "yaw"),
         why="torque shows in yaw",
+        absent={"Kq": 0.0},
     ),
     "droop": StructurePart(
         "rotor speed (relative) sags with collective; thrust goes with its square, in hover",
@@ -239,6 +279,21 @@ PARTS: Mapping[str, StructurePart] = {
         },
         needs=("body", "heave"),
         why="a slower rotor shows in vertical speed",
+        absent={"Komega": 0.0},
+        holds="in hover",
+    ),
+    "governor": StructurePart(
+        "rotor speed as in 'droop' under a governor that integrates its error; the engine's torque turns the body",
+        states={"omega": "1", "engine": "1/s"},
+        equations={
+            "w": {"omega": "-2 * g"},
+            "r": {"omega": "Nomega", "engine": "Nengine"},
+            "omega": {"omega": "-rate_omega", "engine": "1", "collective": "Komega"},
+            "engine": {"omega": "-rate_engine"},
+        },
+        needs=("body", "heave"),
+        why="a slower rotor shows in vertical speed",
+        absent={"Komega": 0.0},
         holds="in hover",
     ),
     "gyro": StructurePart(
@@ -247,6 +302,7 @@ PARTS: Mapping[str, StructurePart] = {
         equations={"r": {"r_fb": "Nrfb"}, "r_fb": {"r": "1", "r_fb": "-Krfb"}},
         needs=("body", "yaw"),
         why="it is fed by the yaw rate",
+        absent={"Nrfb": 0.0},
     ),
     "actuators": StructurePart(
         "first-order lags of the actuators: one time constant for swashplate and collective, one for the tail",
@@ -267,7 +323,7 @@ _INFLOW = "rate 4 rho A v / m_air, m_air = 8/3 rho R^3 (Pitt and Peters 1981), f
 _MASS = "helicopter's mass over the air's, 8/3 rho R^3 (Pitt and Peters 1981), for 50 kg, R 1.5 m"
 
 NUMBERS: Mapping[str, StartNumber] = {
-    "g": StartNumber(9.80665, "m/s^2", _G),
+    "g": StartNumber(GRAVITY, "m/s^2", _G),
     **{name: StartNumber(0.0, "m/s", _TRIM) for name in ("U0", "V0", "W0")},
     **{name: StartNumber(0.0, "rad", _TRIM) for name in ("phi0", "theta0")},
     "Xu": StartNumber(-0.05, "1/s", _R50), "Yv": StartNumber(-0.15, "1/s", _R50), "Zw": StartNumber(-0.6, "1/s", _R50),
@@ -285,7 +341,6 @@ NUMBERS: Mapping[str, StartNumber] = {
     "Blat": StartNumber(0.14, "rad", _R50), "Blon": StartNumber(0.014, "rad", _R50),
     "Xa": StartNumber(-9.8, "m/s^2", "thrust that carries the weight, tilted"),
     "Yb": StartNumber(9.8, "m/s^2", "thrust that carries the weight, tilted"),
-    "La": StartNumber(0.0, "1/s^2", _ZERO), "Mb": StartNumber(0.0, "1/s^2", _ZERO),
     "tau_s": StartNumber(0.34, "s", _R50, 0.02, 3.0),
     "Ac": StartNumber(0.64, "1", _R50), "Bd": StartNumber(0.71, "1", _R50),
     "Clon": StartNumber(-0.26, "rad", _R50), "Dlat": StartNumber(0.27, "rad", _R50),
@@ -294,6 +349,7 @@ NUMBERS: Mapping[str, StartNumber] = {
     "Kq": StartNumber(5.0, "rad/s^3", _ORDER), "rate_q": StartNumber(3.0, "1/s", _ORDER, 0.05, 50.0),
     "Nomega": StartNumber(0.0, "rad/s^2", _ZERO), "Komega": StartNumber(-0.3, "1/s", _ORDER),
     "rate_omega": StartNumber(1.0, "1/s", _ORDER, 0.05, 50.0),
+    "Nengine": StartNumber(-5.0, "rad/s", _ORDER), "rate_engine": StartNumber(2.0, "1/s^2", _ORDER, lower=0.0),
     "Nrfb": StartNumber(-50.0, "1/s^2", _ORDER), "Krfb": StartNumber(8.0, "1/s", _ORDER, lower=0.01),
     "tau_servo": StartNumber(0.04, "s", "a usual servo", 0.002, 0.5),
     "tau_tail": StartNumber(0.03, "s", "a usual servo", 0.002, 0.5),
@@ -301,19 +357,21 @@ NUMBERS: Mapping[str, StartNumber] = {
 }  # fmt: skip
 """Start values that are known by name; a derivative that is not here begins at zero."""
 
+_PER = {
+    tuple(INPUTS): ("m/s^2", "rad/s^2", "rad"), SPEEDS: ("1/s", "rad/(m s)", "rad s/m"),
+    RATES: ("m/s", "1/s", "s"), tuple(_ANGLES.values()): ("m/s^2", "1/s^2", "1"),
+}  # fmt: skip
+"""Units of derivatives by what they are by: of a specific force, of an angular acceleration, of a tilt."""
+
 HELD = ("g", "U0", "V0", "W0", "phi0", "theta0")
 
 
 def number(name: str) -> StartNumber:
-    """The start value of a parameter; quasi-steady derivatives that have none begin at zero."""
+    """The start value of a parameter; derivatives that have none begin at zero."""
     if name in NUMBERS:
         return NUMBERS[name]
     if name.startswith("tau_"):  # of one response
         return NUMBERS[f"tau_{name.rpartition('_')[2]}"]
-    of_force, column = name[0] in "XYZ", name[1:]
-    if column in SHORT.values():
-        return StartNumber(0.0, "m/s^2" if of_force else "rad/s^2", _ZERO)
-    if column in SPEEDS:
-        return StartNumber(0.0, "1/s" if of_force else "rad/(m s)", _ZERO)
-    assert column in RATES, name
-    return StartNumber(0.0, "m/s" if of_force else "1/s", _ZERO)
+    row, column = LETTERS[name[0]], COLUMNS[name[1:]]
+    kind = 0 if row in SPEEDS else 1 if row in RATES else 2
+    return StartNumber(0.0, next(units[kind] for columns, units in _PER.items() if column in columns), _ZERO)

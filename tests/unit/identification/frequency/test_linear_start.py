@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swashplate.identification.frequency import state_space_search
 from swashplate.identification.frequency.linear_start import by_controls, by_regression
 from swashplate.identification.frequency.response_cost import ceiling, cost_of, target
 from swashplate.identification.frequency.state_space_fit import fit_state_space
@@ -68,20 +69,22 @@ def test_rates_and_accelerations_tell_every_derivative_without_a_start() -> None
     assert all(np.min(np.abs(modes - v)) < 0.1 * max(abs(v), 0.5) for v in truth.eigenvalues())
 
 
-@pytest.mark.proof
 def test_a_fit_from_a_start_with_wrong_signs_ends_at_the_truth() -> None:
     truth = shaken("six_dof_coupled", seed=2)
     responses = measured(truth, ("p", "q", "r", "ax", "ay", "az"), noise=0.01)
     fit = fit_state_space(structure("six_dof_coupled"), responses, starts=2)
     assert fit.settings["started_from"] == "regression on the responses"
     assert fit.cost < 1.0
+    alone = fit_state_space(structure("six_dof_coupled"), responses, starts=1)
+    assert alone.settings["started_from"] == "given values"
+    assert alone.cost < 1.0
 
 
-@pytest.mark.proof
-def test_without_the_regression_such_a_fit_ends_elsewhere() -> None:
-    responses = measured(shaken("six_dof_coupled", seed=2), ("p", "q", "r", "ax", "ay", "az"), noise=0.01)
-    alone = fit_state_space(structure("six_dof_coupled"), responses, starts=1, iterations=30)
-    assert alone.cost > 50.0
+def test_in_logarithms_alone_such_a_fit_ends_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What relative errors are for: a response of the wrong sign does not turn round in logarithms."""
+    monkeypatch.setattr(state_space_search, "_led", lambda model, cost, row: row)
+    rotor = measured(shaken("hybrid", seed=4), ("p", "q", "r", "ax", "ay", "az"), noise=0.02)
+    assert fit_state_space(structure("hybrid"), rotor).cost > 50.0
 
 
 def test_hidden_rotor_states_leave_the_controls_to_be_matched() -> None:
@@ -113,10 +116,8 @@ def test_what_was_not_seen_cannot_be_large() -> None:
     )
 
 
-@pytest.mark.proof
-@pytest.mark.parametrize("seed", [3, 4, 5])
+@pytest.mark.parametrize("seed", [3, 4, *(pytest.param(n, marks=pytest.mark.proof) for n in range(5, 15))])
 def test_a_hidden_rotor_comes_back_from_wrong_signs(seed: int) -> None:
-    """Seed 4 ends at J_ave 290 unless the bad end is shaken and some of its signs are turned."""
     truth = shaken("hybrid", seed=seed)
     fit = fit_state_space(structure("hybrid"), measured(truth, ("p", "q", "r", "ax", "ay", "az"), noise=0.02))
     assert fit.cost < 1.0

@@ -10,8 +10,9 @@ import pytest
 import swashplate as sp
 from coupled_helicopter import INPUTS, STATES, matrices, measured
 from swashplate.errors import CardError, IdentificationError, SwashError
-from swashplate.identification.frequency.search_candidates import additions, cores, exchanges
+from swashplate.identification.frequency.search_candidates import cores, exchanges, offered
 from swashplate.identification.frequency.search_result import StructureSearch
+from swashplate.identification.frequency.structure_score import squared_misfit
 from swashplate.identification.frequency.structure_search import LOOK, search_structures
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -112,11 +113,10 @@ def test_candidates_are_what_the_channels_allow() -> None:
     assert cores(whole.select(("w",), ("collective",))) == [("heave",)]
     with pytest.raises(IdentificationError, match="no composed structure has these responses"):
         cores(replace(whole, inputs=("a", "b", "c", "d")))
-    groups = additions(("body", "flap", "inflow"), whole, every=False)
-    assert ["torque", "gyro"] in groups
-    assert not any({"lead", "inflow", "coupled"} & set(group) for group in groups)
-    assert any("coupled" in group for group in additions(("body", "flap"), whole, every=True))
+    assert offered(whole) == ("bar", "lead", "droop", "governor", "torque", "gyro")
+    assert offered(whole.select(("w", "az"), ("collective",))) == ("lead", "droop", "governor")
     assert ["body", "inflow"] in [sorted(e) for e in exchanges(("body", "lead"), whole)]
+    assert ["body", "flap"] in exchanges(("body", "flap_decoupled"), whole)
 
 
 def test_the_verb_searches_prints_and_has_a_page() -> None:
@@ -136,8 +136,6 @@ def test_the_verb_searches_prints_and_has_a_page() -> None:
 
 
 def test_a_point_that_is_far_off_counts_less_than_its_square(found: StructureSearch) -> None:
-    from swashplate.identification.frequency.search_result import squared_misfit
-
     targets = list(found.pick.fit.targets)
     one = targets[0]
     wrong = one.measured.copy()

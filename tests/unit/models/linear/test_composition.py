@@ -77,14 +77,37 @@ def test_what_a_unit_that_does_not_fit_would_say() -> None:
 
 
 def test_a_rotor_takes_the_place_of_quasi_steady_derivatives_and_leaves_the_trims() -> None:
-    body, flap = structure("compose:body"), structure("compose:body+coupled+flap")
+    body, flap = structure("compose:body"), structure("compose:body+flap")
     assert {"Lp", "Mq", "Llat", "Mlon", "Xlon", "Ylat"} <= set(body.parameters)
-    assert not {"Lp", "Lq", "Mq", "Llat", "Mlon", "Xlon", "Ylat", "Xq", "Yp"} & set(flap.parameters)
+    assert not {"Lp", "Lq", "Mp", "Mq", "Llat", "Llon", "Xlon", "Ylat"} & set(flap.parameters)
     assert flap.document["equations"]["u"]["q"] == "-W0"
     assert {"Lq", "Mp"} <= set(structure("compose:body+flap+gyroscopic").parameters)
     forces = structure("compose:body+flap+forces")
     assert forces.document["equations"]["u"]["a"] == "Xa"
     assert structure("compose:body+flap").document["equations"]["u"]["a"] == "-g"
+
+
+def test_coupled_has_beside_a_rotor_every_derivative_but_those_of_an_axis_own_rate_and_stick() -> None:
+    coupled = structure("compose:body+flap+coupled")
+    axes = {"X": "u", "Y": "v", "Z": "w", "L": "p", "M": "q", "N": "r"}
+    columns = ("u", "v", "w", "p", "q", "r", "lat", "lon", "ped", "col")
+    of_rotor = {"Lp", "Mq", "Llat", "Mlon", "Xlon", "Ylat"}
+    assert {f"{letter}{column}" for letter in axes for column in columns} - of_rotor <= set(coupled.parameters)
+    assert not of_rotor & set(coupled.parameters)
+    assert coupled.document["equations"]["u"]["q"] == "-W0 + Xq"
+    assert of_rotor <= set(structure("compose:body+flap+coupled+" + "+".join(sorted(of_rotor))).parameters)
+    assert set(structure("compose:body+coupled").parameters) >= set(structure("six_dof_coupled").free) - {"Zq0"}
+
+
+def test_derivatives_among_the_parts_stand_in_their_equations() -> None:
+    model = structure("compose:body+flap+bar+gyro+Yb+Xp+Za+Au+Xc+Yrfb")
+    equations = model.document["equations"]
+    assert equations["v"]["b"] == "Yb", "what was tied to gravity is free"
+    assert equations["u"]["a"] == "-g"
+    assert (equations["u"]["p"], equations["u"]["c"], equations["w"]["a"]) == ("Xp", "Xc", "Za")
+    assert (equations["a"]["u"], equations["v"]["r_fb"]) == ("Au", "Yrfb")
+    assert unit_words(model) == []
+    assert parse(to_toml(model)).document["composed"] == "compose:body+flap+bar+gyro+Xp+Xc+Yb+Yrfb+Za+Au"
 
 
 @pytest.mark.parametrize(
@@ -93,11 +116,18 @@ def test_a_rotor_takes_the_place_of_quasi_steady_derivatives_and_leaves_the_trim
         ("compose:body+flapp", "'flapp' is no part of a structure. Did you mean 'flap'? Parts are body, cyclic"),
         ("compose:flap", "there is nothing that flies: it lacks one of body, cyclic, heave, yaw"),
         ("compose:body+bar", "'bar' needs flap or flap_decoupled: a bar tilts a rotor that flaps"),
-        ("compose:body+gyroscopic", "has Lq and Mp already"),
+        ("compose:body+gyroscopic", "'gyroscopic' adds nothing: Lq, Mp are there already"),
+        ("compose:body+flap+coupled+gyroscopic", "'gyroscopic' adds nothing: Lq, Mp are there already"),
+        ("compose:heave+gyroscopic", "'gyroscopic' needs body or cyclic: it couples roll and pitch"),
+        ("compose:cyclic+flap+forces", "'forces' has no place: these parts have no du/dt by a, dv/dt by b"),
+        ("compose:body+flap+forces+Xa", "'Xa' adds nothing: Xa is there already"),
+        ("compose:body+actuators+Llat", "'Llat' adds nothing: Llat is there already"),
+        ("compose:body+Za", "'Za' has no place: these parts have no dw/dt by a"),
+        ("compose:body+flap+Aq", "'Aq' is no part of a structure"),
         ("compose:heave+torque", "'torque' needs body or yaw: torque shows in yaw"),
         ("compose:body+inflow+lead", "'inflow' and 'lead' cannot stand together"),
-        ("compose:body+flap+flap_decoupled", "the tip-path plane is there already"),
-        ("compose:body+heave", "'body' and 'heave' cannot stand together: 'body' has that axis already"),
+        ("compose:body+flap+flap_decoupled", "'flap_decoupled' adds nothing: Lb, Ma"),
+        ("compose:body+heave", "'heave' adds nothing: Zw, Zcol are there already"),
         ("compose:body+body", "'body' is named twice"),
         ("compose:", "names no part. An example: compose:body+flap"),
         ("compose:yaw+r/pedals", "'r/pedals' is no pair output/input of these parts, which could have a delay"),
