@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -125,9 +126,10 @@ def cluster(
         words: further options of each worker.
         workers: how many. environment: of theirs, beside this process's.
     """
-    here = {**os.environ, **QUIET, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     pair = (None, None) if folder is None else certificates(folder)
     with ExitStack() as kept:
+        own = {"DASK_TEMPORARY_DIRECTORY": kept.enter_context(TemporaryDirectory(ignore_cleanup_errors=True))}
+        here = {**os.environ, **QUIET, **own, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
         made = Cluster("", None, [], *pair, here, kept)  # type: ignore[arg-type]
         protocol = ["--protocol", "tcp" if folder is None else "tls"]
         places = ["--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0", "--no-dashboard"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
-import subprocess
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import lru_cache
@@ -15,7 +14,7 @@ from pathlib import Path
 import platformdirs
 
 from swashplate.atomic import scratch_folder
-from swashplate.compiler import compiler, shared_library
+from swashplate.compiler import LIMIT, compiler, ran, shared_library
 from swashplate.errors import WriteError
 
 NATIVE = "-march=native"
@@ -63,4 +62,4 @@ def _processor(program: str | None) -> str:
     if program is None:
         return ""
     asked = [program, NATIVE, "-dM", "-E", "-x", "c", os.devnull]
-    return subprocess.run(asked, capture_output=True, text=True, check=False).stdout
+    return ran(asked, where="the processor's instructions", seconds=LIMIT / 10.0)[1]

@@ -38,7 +38,6 @@ STARTS = {
     "api/campaigns/pool.py": "spawns workers with SAFE_PATH",
     "api/campaigns/program.py": "asks for its parent",
     "api/campaigns/verbs.py": "asks the pool",
-    "compiled.py": "the C compiler",
     "compiler.py": "the C compiler",
     "flights/hdf5.py": "own_python",
     "links/ardupilot/sitl.py": "an autopilot that the user names",

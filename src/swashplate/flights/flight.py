@@ -42,6 +42,8 @@ def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[st
         raise FlightError("time must be one strictly increasing row of numbers.", channel="time")
     variables = {}
     for name, values in channels.items():
+        if name == "time":
+            raise FlightError("is the name of the times of the samples.", channel=name, hint="Rename this channel.")
         known = channel(name)
         unit = (units or {}).get(name, known.unit)
         if known.unit and unit != known.unit:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 Schema = TypeVar("Schema")
 _ENGINE: Final = "h5netcdf"
+_NAME: Final = "swashplate_name"
+"""Attribute of a variable: the channel's name as JSON, where netCDF cannot hold it (`imu/p`)."""
 
 
 class Parts(NamedTuple):
@@ -96,11 +98,34 @@ def save(flight: Parts, path: str | os.PathLike[str]) -> Path:
     file = io.BytesIO()
     xr.Dataset(attrs=attributes).to_netcdf(file, mode="w", engine=_ENGINE)
     for name, group in json.loads(attributes["streams"]):
-        data = flight.streams[name]
+        data = _storable(flight.streams[name])
         # No fill value: a flight's numbers are what they are.
         encoding: dict[Any, Any] = {variable: {"_FillValue": None} for variable in (*data.data_vars, "time")}
         data.to_netcdf(file, mode="a", group=group, engine=_ENGINE, encoding=encoding)
     return write_bytes(path, file.getbuffer())
+
+
+def _storable(data: xr.Dataset) -> xr.Dataset:
+    """A stream under names that netCDF can hold; a channel that is called otherwise keeps its name as an attribute."""
+    odd = [str(name) for name in data.data_vars if not _can_be_held(str(name))]
+    taken, names = {str(name) for name in data.data_vars}, {}
+    for name in odd:
+        safe = "".join(letter if _can_be_held(f"x{letter}") else "_" for letter in name).strip(".") or "channel"
+        while safe in taken:
+            safe += "_"
+        taken.add(safe)
+        names[name] = safe
+    if not names:
+        return data
+    renamed = data.rename(names)
+    for name, safe in names.items():
+        renamed[safe].attrs = {**renamed[safe].attrs, _NAME: json.dumps(name)}
+    return renamed
+
+
+def _can_be_held(name: str) -> bool:
+    """Whether netCDF can call a variable so: slashes part groups, a zero ends the name, the rest is Unicode."""
+    return bool(name.strip(".")) and not {"/", "\0"} & set(name) and not any("\ud800" <= c <= "\udfff" for c in name)
 
 
 def _groups(path: Path) -> dict[str, hdf5.Group]:
@@ -142,7 +167,14 @@ def _stream(name: str, group: hdf5.Group, place: Path) -> xr.Dataset:
             channel=f"{name}/time",
             hint="Copy it again.",
         )
-    made = {variable: timed(column.values, column.attributes) for variable, column in group.variables.items()}
+    made = {}
+    for variable, column in group.variables.items():
+        labels, own = dict(column.attributes), variable
+        if _NAME in labels:
+            own = documents.parse_logged(str(labels.pop(_NAME)), str, where=place, at=variable, error=FlightError)
+        if own in made:
+            raise FlightError("is there twice.", where=place, channel=f"{name}/{own}", hint="Save it again.")
+        made[own] = timed(column.values, labels)
     return over_time(made.pop("time"), made, group.attributes)
 
 

@@ -208,3 +208,36 @@ def test_a_list_of_axes_of_another_type_is_never_read(odd: object, tmp_path: Pat
         place = next(item for item in file["stream_0"].values() if "DIMENSION_LIST" in item.attrs)
         place.attrs["DIMENSION_LIST"] = odd
     assert Flight.load(path) == _flight()
+
+
+ODD = ["imu/p", "imu_p", "/", "a/b/c", "a_b_c", ".", "..", "a\x00b", "a\x00c", "\udcff", "x\u202ey", " p ", "é😀"]
+
+
+def test_every_name_of_a_channel_comes_back(tmp_path: Path) -> None:
+    time = np.arange(4) * 0.1
+    flight = Flight({"log": stream(time, {name: k + time for k, name in enumerate(ODD)}, {"imu/p": "V"})})
+    back = Flight.load(flight.save(tmp_path / "a.nc"))
+    assert back.channels == tuple(ODD)
+    for k, name in enumerate(ODD):
+        np.testing.assert_array_equal(back.values(name), k + time)
+    assert back.streams["log"]["imu/p"].attrs["units"] == "V"
+    assert "swashplate_name" not in back.streams["log"]["imu/p"].attrs
+    back.save(tmp_path / "b.nc")
+    assert (tmp_path / "b.nc").read_bytes() == (tmp_path / "a.nc").read_bytes()
+    with h5py.File(tmp_path / "a.nc") as file:
+        assert file["stream_0/imu_p_"].attrs["swashplate_name"] == '"imu/p"', "others see which it is"
+
+
+def test_a_name_that_two_channels_claim_is_refused(tmp_path: Path) -> None:
+    time = np.arange(4) * 0.1
+    Flight({"log": stream(time, {"p": time, "imu/p": time}, {})}).save(tmp_path / "a.nc")
+    for said, expected in (('"p"', "log/p: is there twice"), ("[1]", "imu_p"), ('"p', "is not JSON")):
+        with h5py.File(tmp_path / "a.nc", "a") as file:
+            file["stream_0/imu_p"].attrs["swashplate_name"] = said
+        with pytest.raises(FlightError, match=expected):
+            Flight.load(tmp_path / "a.nc")
+
+
+def test_a_channel_cannot_be_called_as_the_times(tmp_path: Path) -> None:
+    with pytest.raises(FlightError, match="time: is the name of the times of the samples"):
+        stream(np.arange(3), {"time": np.arange(3)})

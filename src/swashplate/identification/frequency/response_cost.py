@@ -285,7 +285,7 @@ class RelativeCost(ResponseCost):
         for model, wanted in zip(self._answer(np.asarray(row * self.row.scale)), self.targets, strict=True):
             gain, phase = wanted.weights
             error = model / wanted.measured - 1.0
-            costs.append(float(np.sum((gain * _DB * error.real) ** 2 + (phase * _DEG * error.imag) ** 2)))
+            costs.append(float(np.sum((gain * DB * error.real) ** 2 + (phase * DEG * error.imag) ** 2)))
         return [cost if np.isfinite(cost) else np.inf for cost in costs]
 
     def residuals(self, row: Array) -> tuple[Array, Array]:
@@ -294,8 +294,8 @@ class RelativeCost(ResponseCost):
         for model, slope, wanted in zip(*self.evaluate(row), self.targets, strict=True):
             gain, phase = wanted.weights
             error, by = model / wanted.measured - 1.0, slope / wanted.measured[:, None]
-            rows += [gain * _DB * error.real, phase * _DEG * error.imag]
-            derivatives += [(gain * _DB)[:, None] * by.real, (phase * _DEG)[:, None] * by.imag]
+            rows += [gain * DB * error.real, phase * DEG * error.imag]
+            derivatives += [(gain * DB)[:, None] * by.real, (phase * DEG)[:, None] * by.imag]
         return np.concatenate(rows), np.concatenate(derivatives) * self.row.scale
 
 

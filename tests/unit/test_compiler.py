@@ -1,0 +1,53 @@
+"""A C compiler that speaks another language, hangs, lies in the folder of a log or is none is told in words."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from swashplate import compiled, compiler
+from swashplate.errors import ExportError
+
+
+def made(folder: Path, script: bytes, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A `cc` that is a shell script."""
+    path = folder / "cc"
+    path.write_bytes(b"#!/bin/sh\n" + script)
+    path.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
+    return path
+
+
+def test_messages_in_a_national_encoding_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made(tmp_path, "echo 'Datei nicht übersetzt' >&2; exit 1\n".encode("latin-1"), monkeypatch)
+    with pytest.raises(ExportError, match="refused the exported sources: Datei nicht \ufffdbersetzt"):
+        compiler.shared_library([tmp_path / "a.c"], tmp_path / "a.so")
+
+
+def test_one_that_hangs_is_ended_with_all_that_it_has_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    os.mkfifo(tmp_path / "held")
+    cc = made(tmp_path, f"exec 9>{tmp_path}/held; sleep 1000 & sleep 1000\n".encode(), monkeypatch)
+    reader = os.open(tmp_path / "held", os.O_RDONLY | os.O_NONBLOCK)
+    with pytest.raises(ExportError, match=rf"a\.so: the C compiler {cc} has not ended after 1 s\. Try it by hand"):
+        compiler.ran([str(cc), "a.c"], where="a.so", seconds=1.0)
+    os.set_blocking(reader, True)
+    assert os.read(reader, 1) == b"", "nobody holds it any more"
+    os.close(reader)
+
+
+def test_one_that_cannot_be_started_is_told(tmp_path: Path) -> None:
+    (tmp_path / "cc").write_text("no program")
+    with pytest.raises(ExportError, match=r"cc cannot be started: Permission denied"):
+        compiler.ran([str(tmp_path / "cc")], where="a.so")
+
+
+def test_what_lies_in_the_folder_one_works_in_is_no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cc = made(tmp_path, b"exit 0\n", monkeypatch)
+    assert compiler.compiler() == str(cc)
+    monkeypatch.chdir(tmp_path)
+    for path in (".", "", f".{os.pathsep}"):
+        monkeypatch.setenv("PATH", path)
+        assert compiler.compiler() is None
+        assert not compiled.can_compile()
