@@ -40,7 +40,7 @@ def _nanobench(path: Path, *, attitude: tuple[str, str, str] = ("roll", "pitch",
 @lru_cache(maxsize=1)
 def _logs(data: Path) -> dict[str, Flight]:
     found = {"trex550": read(data / "trex550" / "trex550_flight.csv", units=_TREX)}
-    found |= {path.stem: read(path) for path in sorted((data / "ardupilot_sitl").glob("*.BIN"))}
+    found |= {path.stem: read(path) for path in sorted(data.glob("ardupilot_*/*.BIN"))}
     found |= {path.stem: _nanobench(path) for path in sorted((data / "nanobench").glob("*.csv"))}
     found |= {path.name: read(path) for path in sorted((data / "logs").iterdir()) if path.is_file()}
     found |= {path.stem: read(path) for path in sorted((data / "coax56").glob("flight_*.mat"))}
@@ -49,7 +49,7 @@ def _logs(data: Path) -> dict[str, Flight]:
 
 def test_no_real_log_is_accused(shared_data: Path) -> None:
     logs = _logs(shared_data)
-    assert len(logs) >= 20
+    assert len(logs) >= 22
     assert {name: [str(f) for f in consistency(flight)] for name, flight in logs.items()} == {name: [] for name in logs}
 
 
@@ -64,6 +64,29 @@ def test_a_spoilt_rate_is_found(shared_data: Path, name: str) -> None:
             assert words in finding.text
     exchanged = flight.with_channel("p", flight.values("q"), like="p").with_channel("q", flight.values("p"), like="q")
     assert {finding.channel for finding in consistency(exchanged)} == {"p", "q"}
+
+
+@pytest.mark.parametrize(
+    ("name", "rates"),
+    [
+        ("trex550", "pqr"),
+        ("heli_sid_roll_mix", "pq"),
+        ("heli_sid_pitch_mix", "pq"),
+        ("heli_sid_coll_mix", "pqr"),
+        ("coax_roll_yaw_sweeps", "pqr"),
+        ("raptor50_three_sweeps", "pqr"),
+        ("dataflash_reference.bin", "q"),
+    ],
+)
+def test_a_wrong_scale_is_found_where_the_axis_moves(shared_data: Path, name: str, rates: str) -> None:
+    flight = _logs(shared_data)[name]
+    for rate in rates:
+        for factor in (1.25, 0.8):
+            (finding,) = consistency(flight.with_channel(rate, factor * flight.values(rate), like=rate))
+            assert finding.channel == rate
+            assert finding.scale is not None
+            assert finding.scale[0] == pytest.approx(factor, rel=0.035)  # the logs' own sensors are off by up to 3 %
+            assert not finding.decisive
 
 
 def test_the_crazyflies_own_pitch_counts_the_other_way(shared_data: Path) -> None:

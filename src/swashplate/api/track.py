@@ -173,7 +173,7 @@ def recursive_estimator(
     equation: str | RegressionEquation,
     *,
     rate: float,
-    band: tuple[float, float] = (0.1, 2.5),
+    band: tuple[float, float] | None = None,
     spacing: float | None = None,
     memory: float | None = None,
     held: Sequence[str] = (),
@@ -185,7 +185,8 @@ def recursive_estimator(
     Args:
         equation: such as "p_dot = Lp*p + La*aileron + bias"; a name is unknown, a number known.
         rate: samples per second [Hz].
-        band: frequencies from and to [Hz] that are looked at; what moves the vehicle should lie in it.
+        band: frequencies from and to [Hz] that are looked at; what moves the vehicle should lie in it. None: 0.1 to
+            2.5 Hz, or to a fifth of the rate where that is less.
         spacing: of the frequencies [Hz]; a 25th of the band's upper end where None.
         memory: time constant of forgetting [s]; None: nothing is forgotten.
         held: channels that keep their value between samples, such as commands.
@@ -203,7 +204,7 @@ def recursive_estimator(
 def _plan(
     e: RegressionEquation,
     rate: float,
-    band: tuple[float, float],
+    band: tuple[float, float] | None,
     spacing: float | None,
     memory: float | None,
     held: Sequence[str],
@@ -217,7 +218,7 @@ def track(
     equations: str | Sequence[str] | StateSpaceModel | Vehicle,
     *,
     rate: float | None = None,
-    band: tuple[float, float] = (0.1, 2.5),
+    band: tuple[float, float] | None = None,
     spacing: float | None = None,
     memory: float | None = None,
     held: Sequence[str] = (),

@@ -51,6 +51,7 @@ def fit_ss(
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
+    as_logged: options.AsLogged = False,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -65,7 +66,7 @@ def fit_ss(
     begun, (limits, own) = [sp.structure(name) for name in named], flying.bands(band)
     measured = flying.load_responses(place)
     first, held = options.numbers_by_name(start, option="--start"), options.fixed_values(fix)
-    names, how = flying.renamed(rename, option="--rename"), asked(mapping, unit, drop_bad_stamps)
+    names, how = flying.renamed(rename, option="--rename"), asked(mapping, unit, drop_bad_stamps, as_logged)
     flying.carried_out(
         lambda say: sp.fit_ss(
             begun,

@@ -44,6 +44,7 @@ def fit_tf(
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
+    as_logged: options.AsLogged = False,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -55,7 +56,7 @@ def fit_tf(
     from swashplate.cli.reading import asked, read_all
 
     measured, limits, held = flying.load_responses(responses), flying.band(band), options.fixed_values(fix)
-    names, how = flying.renamed(rename, option="--rename"), asked(mapping, unit, drop_bad_stamps)
+    names, how = flying.renamed(rename, option="--rename"), asked(mapping, unit, drop_bad_stamps, as_logged)
     flying.carried_out(
         lambda say: sp.fit_tf(
             measured,

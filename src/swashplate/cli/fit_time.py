@@ -38,6 +38,7 @@ def fit_time(
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
+    as_logged: options.AsLogged = False,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -51,7 +52,7 @@ def fit_time(
 
     begun, names = sp.structure(structure), flying.renamed(rename, option="--rename")
     first, held = options.numbers_by_name(start, option="--start"), options.fixed_values(fix)
-    how = asked(mapping, unit, drop_bad_stamps)
+    how = asked(mapping, unit, drop_bad_stamps, as_logged)
     flying.carried_out(
         lambda say: sp.fit_time(
             begun,

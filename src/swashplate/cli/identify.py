@@ -108,6 +108,7 @@ def identify(
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
+    as_logged: options.AsLogged = False,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -126,7 +127,7 @@ def identify(
     names = list(options.names(free))
     held, priors = options.fixed_values(fix), options.prior_values(texts)
     prior_card, aircraft = None if card is None else sp.vehicle(card).card, sp.vehicle(vehicle)
-    called, how = [*flight, *(hold_out or [])], asked(mapping, unit, drop_bad_stamps)
+    called, how = [*flight, *(hold_out or [])], asked(mapping, unit, drop_bad_stamps, as_logged)
 
     if nested:
         untold = [

@@ -84,6 +84,10 @@ Units = Annotated[
 BadStamps = Annotated[
     bool, typer.Option("--drop-bad-stamps", help="Leave out samples whose time repeats or goes backwards.")
 ]
+AsLogged = Annotated[
+    bool,
+    typer.Option("--as-logged", help="Use channels as they are logged, even where they contradict each other."),
+]
 Estimate = Annotated[
     list[str] | None,
     typer.Option(

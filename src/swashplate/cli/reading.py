@@ -21,16 +21,20 @@ class LogOptions:
         mapping: a file that maps columns to channels.
         units: units by channel or field.
         drop_bad_stamps: leave out samples whose time does not increase.
+        as_logged: channels that contradict each other are used as they are.
     """
 
     mapping: Path | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     drop_bad_stamps: bool = False
+    as_logged: bool = False
 
 
-def asked(mapping: Path | None, unit: Sequence[str] | None, drop_bad_stamps: bool) -> LogOptions:
+def asked(
+    mapping: Path | None, unit: Sequence[str] | None, drop_bad_stamps: bool, as_logged: bool = False
+) -> LogOptions:
     """The options as what is said about logs."""
-    return LogOptions(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    return LogOptions(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, as_logged)
 
 
 def read(text: str, *, how: LogOptions | None = None) -> Flight:
@@ -39,6 +43,7 @@ def read(text: str, *, how: LogOptions | None = None) -> Flight:
     Raises:
         FlightError, UnitError, DatasetError: as the readers say.
     """
+    from swashplate.flights.consistency import UNCHECKED
     from swashplate.flights.readers.read import read as read_log
     from swashplate.flights.readers.windows import split_log, split_window
 
@@ -49,6 +54,8 @@ def read(text: str, *, how: LogOptions | None = None) -> Flight:
         units=chosen.units,
         bad_stamps="drop" if chosen.drop_bad_stamps else "error",
     )
+    if chosen.as_logged:
+        flight = flight.done(UNCHECKED)
     if not flight.provenance.simulated:
         return flight
     # Messages and reports name the file, not "simulated coax", of which there may be several.

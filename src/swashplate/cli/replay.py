@@ -46,6 +46,7 @@ def replay(
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
+    as_logged: options.AsLogged = False,
     port: live.Port = 8018,
     host: live.Host = "127.0.0.1",
     allow_remote: live.Remote = False,
@@ -71,7 +72,7 @@ def replay(
 
         def prepared() -> Replay:
             line.say("reading the flight")
-            how = asked(mapping, unit, drop_bad_stamps)
+            how = asked(mapping, unit, drop_bad_stamps, as_logged)
             log = read(flight, how=how)
             # A simulation's true states have no outliers, and what looks like one is a maneuver.
             clean = log.provenance.simulated and "phi" in log

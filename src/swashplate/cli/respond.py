@@ -42,6 +42,7 @@ def respond(
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
+    as_logged: options.AsLogged = False,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -64,7 +65,7 @@ def respond(
         raise SwashError(f"'{windows}' are not all positive lengths in s.", channel="--windows")
     with progress(quiet=quiet or json) as line:
         line.say("reading logs")
-        raw = read_all(log, how=asked(mapping, unit, drop_bad_stamps))
+        raw = read_all(log, how=asked(mapping, unit, drop_bad_stamps, as_logged))
         flights = sp.uniform_records(raw, (*ins, *outs, *refs), rate=rate, cutoff=cutoff, names=ins | outs)
         check_disjoint(flights, log)
         with folder_when_complete(out, ours=FILES) as folder:

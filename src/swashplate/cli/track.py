@@ -28,8 +28,13 @@ def track(
         float | None, typer.Option("--rate", help="Samples a second [Hz]; the log's own if not given.", min=1.0)
     ] = None,
     band: Annotated[
-        str, typer.Option("--band", metavar="LOW-HIGH", help="Frequencies that are used [Hz].")
-    ] = "0.1-2.5",
+        str | None,
+        typer.Option(
+            "--band",
+            metavar="LOW-HIGH",
+            help="Frequencies that are used [Hz]; 0.1-2.5 if not given, or to a fifth of the rate.",
+        ),
+    ] = None,
     spacing: Annotated[
         float | None, typer.Option("--spacing", help="Distance between them [Hz]; HIGH / 25 by default.", min=1e-4)
     ] = None,
@@ -92,8 +97,6 @@ def track(
         raise SwashError("is of a vehicle: give --model too.", channel="--unknown")
     if (model is None) == (not equation):
         raise SwashError("is wanted, or --model: one of the two.", channel="--equation")
-    limits = flying.band(band)
-    assert limits is not None
     with (
         progress(quiet=quiet or json) as line,
         folder_when_complete(out, ours=Tracking.files) as folder,
@@ -102,7 +105,7 @@ def track(
             read(log, how=asked(mapping, unit, drop_bad_stamps)),
             (sp.vehicle(model) if names else sp.structure(model)) if model is not None else equation or (),
             rate=rate,
-            band=limits,
+            band=flying.band(band),
             spacing=spacing,
             memory=memory,
             held=flying.names(held),

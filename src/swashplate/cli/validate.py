@@ -53,6 +53,7 @@ def validate(
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
+    as_logged: options.AsLogged = False,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -69,7 +70,7 @@ def validate(
     from swashplate.flights.overlap import check_disjoint
     from swashplate.identification.core.records import records
 
-    how, limits = asked(mapping, unit, drop_bad_stamps), flying.band(band)
+    how, limits = asked(mapping, unit, drop_bad_stamps, as_logged), flying.band(band)
     judged, other = sp.vehicle(model), None if published is None else sp.vehicle(published)
     names = flying.renamed(rename, option="--rename")
     closing = options.names(close_loop)

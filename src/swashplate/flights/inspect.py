@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -329,7 +329,7 @@ def _channel_problems(summary: ChannelSummary) -> list[str]:
     return problems
 
 
-def _shared_problems(channels: tuple[ChannelSummary, ...], jumps: Mapping[str, int]) -> list[str]:
+def _shared_problems(channels: Sequence[ChannelSummary], jumps: Mapping[str, int]) -> list[str]:
     """What several channels may have in common, one line for all of them."""
     still = [c.name for c in channels if c.constant and not (c.name.startswith(_STILL) or c.name.endswith("_demand"))]
     beyond = f"beyond {OUTLIER:g} robust sigmas (outliers?)"
@@ -343,13 +343,10 @@ def _shared_problems(channels: tuple[ChannelSummary, ...], jumps: Mapping[str, i
     return problems
 
 
-def inspect(flight: Flight) -> Inspection:
-    """Summary of a flight: channels, units, rates, gaps, jitter, constants, jumps, sweeps, the problems in words.
-
-    Nothing is repaired; conditioning does that.
-    """
-    switched = np.array([event.time for event in flight.provenance.events if event.kind == "mode"])
-    streams = tuple(_summarise_stream(name, data, np.sort(switched)) for name, data in flight.streams.items())
+def _looked(flight: Flight) -> tuple[tuple[StreamSummary, ...], tuple[ChannelSummary, ...]]:
+    """Every stream and every channel of a flight without impossible numbers, which are counted."""
+    switched = np.sort([event.time for event in flight.provenance.events if event.kind == "mode"])
+    streams = tuple(_summarise_stream(name, data, switched) for name, data in flight.streams.items())
     flight, impossible = _without_impossible(flight)
     outliers = jumps(flight)
     labels = {channel: name for name, group in attitudes(flight).items() for channel in group}
@@ -359,11 +356,31 @@ def inspect(flight: Flight) -> Inspection:
         )
         for name in flight.channels
     )
+    return streams, channels
+
+
+def _told(flight: Flight, streams: Sequence[StreamSummary], channels: Sequence[ChannelSummary]) -> list[str]:
+    labels = {channel: name for name, group in attitudes(flight).items() for channel in group}
+    outliers = {labels.get(summary.name, summary.name): summary.outliers for summary in channels if summary.outliers}
+    told = [text for stream in streams for text in _stream_problems(stream)]
+    told += [text for summary in channels for text in _channel_problems(summary)]
+    return told + _shared_problems(channels, outliers)
+
+
+def problems(flight: Flight) -> tuple[str, ...]:
+    """What is wrong with a flight's streams and channels, each by itself, in words."""
+    return tuple(_told(flight, *_looked(flight)))
+
+
+def inspect(flight: Flight) -> Inspection:
+    """Summary of a flight: channels, units, rates, gaps, jitter, constants, jumps, sweeps, the problems in words.
+
+    Nothing is repaired; conditioning does that.
+    """
+    streams, channels = _looked(flight)
+    possible, _ = _without_impossible(flight)
     damage = flight.provenance.damage
-    problems = [*damage, *(str(finding) for finding in consistency(flight))]
-    problems += [text for stream in streams for text in _stream_problems(stream)]
-    problems += [text for summary in channels for text in _channel_problems(summary)]
-    problems += _shared_problems(channels, outliers)
+    contradictions = (str(finding) for finding in consistency(possible))
     return Inspection(
         source=flight.provenance.source,
         simulated=flight.provenance.simulated,
@@ -375,8 +392,8 @@ def inspect(flight: Flight) -> Inspection:
             *([note(flight.epoch)] if flight.epoch else ()),
             *(text for stream in streams for text in _stream_notes(stream)),
         ),
-        problems=tuple(problems),
-        sweeps=sweeps(flight),
+        problems=(*damage, *contradictions, *_told(flight, streams, channels)),
+        sweeps=sweeps(possible),
         damage=damage,
         vehicle=flight.provenance.vehicle,
     )

@@ -68,11 +68,11 @@ def jumps(flight: Flight) -> dict[str, int]:
         if _base(name) in _INERTIAL and outstanding[name].any()
     }
     counts = {}
-    for name, found in outstanding.items():
-        if found.any():
-            told = found & _impossible(changes[name], "attitude" if name in groups else _base(name))
+    for name, out in outstanding.items():
+        if out.any():
+            told = out & _impossible(changes[name], "attitude" if name in groups else _base(name))
             if name not in groups:
-                told |= _spikes(name, changes[name], found, felt)
+                told |= _spikes(name, changes[name], out, felt)
             if count := int(np.sum(told)):
                 counts[name] = count
     return counts
@@ -125,10 +125,10 @@ def _stands_out(changes: Array) -> NDArray[np.bool_]:
     span = float(np.ptp(np.cumsum(changes)))
     if not sigma > np.finfo(np.float64).eps * span:
         return np.zeros(changes.shape, dtype=np.bool_)
-    found = np.asarray(off > max(OUTLIER * sigma, _SLIGHT * span))
-    for i in np.flatnonzero(found).tolist():
-        found[i] = off[i] > _UNUSUAL * _MAD_TO_SIGMA * np.median(off[max(0, i - _NEAR) : i + _NEAR + 1])
-    return found
+    out = np.asarray(off > max(OUTLIER * sigma, _SLIGHT * span))
+    for i in np.flatnonzero(out).tolist():
+        out[i] = off[i] > _UNUSUAL * _MAD_TO_SIGMA * np.median(off[max(0, i - _NEAR) : i + _NEAR + 1])
+    return out
 
 
 def _impossible(changes: Changes, kind: str) -> NDArray[np.bool_]:
@@ -148,15 +148,15 @@ def _impossible(changes: Changes, kind: str) -> NDArray[np.bool_]:
     return np.asarray(np.any(np.abs(speed) > most, axis=0))
 
 
-def _spikes(name: str, changes: Changes, found: NDArray[np.bool_], felt: Mapping[str, Array]) -> NDArray[np.bool_]:
+def _spikes(name: str, changes: Changes, out: NDArray[np.bool_], felt: Mapping[str, Array]) -> NDArray[np.bool_]:
     """Jumps that one of the next samples takes back, far out of the samples around them, and that were not felt."""
     time, (row,) = changes
     values = np.concatenate([[0.0], np.cumsum(row)])
-    told = np.zeros(found.shape, dtype=np.bool_)
-    for k in np.flatnonzero(found).tolist():
+    told = np.zeros(out.shape, dtype=np.bool_)
+    for k in np.flatnonzero(out).tolist():
         for back in range(k + 1, min(k + _BRIEF, row.size - 1) + 1):
             left = abs(float(np.sum(row[k : back + 1])))
-            if found[back] and row[k] * row[back] < 0.0 and left < _TAKEN_BACK * abs(row[k]):
+            if out[back] and row[k] * row[back] < 0.0 and left < _TAKEN_BACK * abs(row[k]):
                 around = np.concatenate([values[max(0, k - _NEAR) : k + 1], values[back + 1 : back + 1 + _NEAR]])
                 low, high = np.quantile(around, (0.05, 0.95))
                 # A change is known at its later sample, and a channel of another rate knows of it up to a step away.

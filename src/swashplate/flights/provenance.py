@@ -29,6 +29,19 @@ class Event:
 
 
 @dataclass(frozen=True)
+class Problem:
+    """What is wrong with a log as it was read, in `inspect`'s words.
+
+    Attributes:
+        text: in words, the channel's or stream's name first.
+        scale: the factor by which a channel is off, and its standard error; empty where that is not what is wrong.
+    """
+
+    text: str
+    scale: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class Provenance:
     """Where a flight comes from.
 
@@ -43,6 +56,8 @@ class Provenance:
         damage: what is broken in the file itself (cut off, lost bytes, clock resets); the rest of it was read.
         parameters: an autopilot's settings as the log begins; changes in flight are events.
         events: what the log says happened, in order of time.
+        problems: of the channels that are worked on, told where a log is conditioned (`checked`); they go with the
+            flight into every report.
         epoch: the flight's time zero on the log's own clock [s], 0 where times are that clock's; a clock of Unix time
             counts from 1970. Readers keep stamps small with it (`flights/epoch.py`).
     """
@@ -57,6 +72,7 @@ class Provenance:
     damage: tuple[str, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
+    problems: tuple[Problem, ...] = ()
     epoch: float = 0.0
 
     def parameter(self, name: str, *, at: float = math.inf) -> float | None:

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from swashplate.errors import SwashError
+from swashplate.identification.core.sources import problem_words, scale_words
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
 from swashplate.reporting.html import write_page
@@ -123,11 +124,14 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         )
     elif m.fit or m.transfer_functions:
         rows.append(("In time", "not verified: give a flight that the fit has not seen.", "caution"))
+    data = [*(m.time_fit.data if m.time_fit else ()), *(m.fit.data if m.fit and not m.responses else ())]
     told = [
+        *scale_words(data),
         *(m.time_fit.warnings if m.time_fit else ()),
         *(m.responses.warnings if m.responses else ()),
         *(m.fit.warnings if m.fit else ()),
         *(text for f in m.transfer_functions for text in f.warnings),
+        *problem_words(data),
     ]
     rows.append(
         ("Warnings", " ".join(told[:3]) or "no problem was found in these flights.", "caution" if told else "plain")

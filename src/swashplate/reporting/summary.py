@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import DataSource
+from swashplate.identification.core.sources import DataSource, problem_words, scale_words
 from swashplate.reporting.figures_validation import middle_horizon
 from swashplate.reporting.sections_data import method_words, used_twice
 from swashplate.reporting.sections_fit import PRIOR_HEAVY
@@ -142,6 +142,8 @@ def _warnings(fit: Result[Any, Any] | None, validation: Validation | None) -> Li
             words.append("battery voltage not logged")
     elif validation and any(not r.voltage_known for r in validation.records):
         words.append("battery voltage not logged")
+    data = (*(fit.data if fit else ()), *(validation.data if validation else ()))
+    words += [text.rstrip(".") for text in (*scale_words(data), *problem_words(data))]
     if not words:
         return "Warnings", "no problem was found in these flights.", "plain"
     text = "; ".join(words)

@@ -12,6 +12,7 @@ import swashplate as sp
 from short_period import TRUTH, short_period
 from swashplate.errors import ExportError, FlightError, IdentificationError
 from swashplate.flights.flight import Flight, stream
+from swashplate.identification.recursive.fourier_regression import RegressionPlan
 from swashplate.identification.recursive.tracked import stream_of
 
 EQUATION = "q_dot = Mw*w + Mq*q + Md*servo_pitch + bias"
@@ -97,13 +98,24 @@ def test_models_give_their_equations_and_renamed_channels_are_found() -> None:
         ("q_dot = Mq*q", {"held": ["servo_pich"]}, IdentificationError),
         ("q_dot = Mq*q", {"instruments": ["servo_pich"]}, IdentificationError),
         ("q_dot = Mq*q", {"instruments": ["q"]}, IdentificationError),
-        ("q_dot = Mq*q", {"rate": 2.0}, IdentificationError),
+        ("q_dot = Mq*q", {"rate": 0.4}, IdentificationError),
         ([], {}, IdentificationError),
     ],
 )
 def test_what_cannot_be_tracked_is_refused(equation: str, arguments: dict[str, object], error: type) -> None:
     with pytest.raises(error):
         sp.track(flight_of(short_period(50)), equation, **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("rate", "high"), [(100.0, 2.5), (10.0, 2.0), (5.0, 1.0)])
+def test_the_band_that_is_not_given_ends_where_the_rate_ends(rate: float, high: float) -> None:
+    rows = short_period(3000)[:: round(100.0 / rate)]
+    flown = Flight.from_arrays(np.arange(len(rows)) / rate, dict(zip(("q", "w", "servo_pitch"), rows.T, strict=True)))
+    plan = sp.track(flown, EQUATION, held=["servo_pitch"]).followed[0].plan
+    assert isinstance(plan, RegressionPlan)
+    assert (min(plan.hertz), max(plan.hertz)) == pytest.approx((0.1, high), abs=0.05)
+    with pytest.raises(IdentificationError, match="HIGH up to"):
+        sp.track(flown, EQUATION, held=["servo_pitch"], band=(0.1, 0.21 * rate))
 
 
 def test_an_estimator_for_a_stream_of_ones_own() -> None:

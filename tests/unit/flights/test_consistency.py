@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from conditioning_flights import hover, tracked
 from swashplate.errors import FlightError
 from swashplate.flights import consistency as consistency_module
+from swashplate.flights.agreement import thinned
 from swashplate.flights.conditioning.condition import condition, replay
 from swashplate.flights.consistency import consistency, refuse_inconsistent
 from swashplate.flights.flight import Flight, stream
@@ -118,6 +121,74 @@ def test_velocities_weight_and_angles_are_held_against_the_rest() -> None:
     assert {finding.channel for finding in found} == {"theta"}  # the rest is judged with the angles put right
 
 
+@pytest.mark.parametrize("factor", [1.25, 0.8, 1.08, 0.92])
+@pytest.mark.parametrize("name", ["p", "q", "r", "vx", "vz"])
+def test_a_scale_error_is_told_with_its_factor_and_stops_nothing(name: str, factor: float) -> None:
+    flight = changed(flown(), **{name: factor * flown().values(name)})
+    (finding,) = consistency(flight)
+    assert (finding.channel, finding.decisive) == (name, False)
+    assert finding.scale is not None
+    told, sigma = finding.scale
+    assert abs(told - factor) < max(3.0 * sigma, 0.01)
+    assert sigma < 0.02
+    assert f"{name}: is {told:.4g} ± {sigma:.1g} times what the" in str(finding)
+    assert f"factor = {1.0 / told:.4g}" in finding.mend
+    refuse_inconsistent(flight)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.02, 0.98])
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_a_slight_factor_and_noise_on_either_side_are_no_scale_error(factor: float, noise: float) -> None:
+    """Half as much noise as motion in the band: the plain ratio of sizes would be 1.1, or 0.9."""
+    whole, rng = flown(), np.random.default_rng(5)
+    p, phi = whole.values("p"), whole.values("phi")
+    moves = np.convolve(rng.standard_normal(p.size), np.hanning(25), "same")
+    noisy_rate = factor * p + noise * np.std(p) * moves / np.std(moves)
+    assert consistency(changed(whole, p=noisy_rate)) == ()
+    shaken = np.convolve(rng.standard_normal(phi.size), np.hanning(25), "same")
+    noisy_angle = phi + 0.2 * noise * np.std(phi) * shaken / np.std(shaken)
+    assert consistency(changed(whole, p=factor * p, phi=noisy_angle)) == ()
+
+
+@pytest.mark.parametrize("corner", [1.0, 2.0, 5.0])
+def test_a_filter_is_no_scale_error(corner: float) -> None:
+    """A minute of motion from 0.1 to 3 Hz: slow motion passes a low-pass whole."""
+    time, rng = np.arange(0.0, 60.0, 0.01), np.random.default_rng(2)
+    phi = sum(
+        0.1 / f * np.sin(2.0 * np.pi * f * time + a) for f, a in zip(*rng.uniform(0.1, 6.0, (2, 40)), strict=True)
+    )
+    p = np.gradient(np.asarray(phi), time)
+    late = lfilter([1.0 - np.exp(-0.02 * np.pi * corner)], [1.0, -np.exp(-0.02 * np.pi * corner)], p)
+    log = Flight.from_arrays(time, {"phi": phi, "theta": 0.0 * time, "p": late}, source="late.csv")
+    assert [finding for finding in consistency(log) if finding.scale] == []
+    wrong = log.with_channel("p", 1.25 * p, like="p")
+    assert [finding.channel for finding in consistency(wrong)] == ["p"]
+
+
+def test_a_unit_that_the_format_fixes_is_doubted_only_where_the_ratio_is_exact() -> None:
+    """The speed of a copter in a still hover: a third of what the noise of its place gives."""
+    whole = flown()
+    for factor, words in ((1.0 / 3.28084, "converted twice"), (0.38, "is 0.38")):
+        for reader in ("ardupilot", "delimited"):
+            flight = changed(whole, vx=factor * whole.values("vx"))
+            flight = replace(flight, provenance=replace(flight.provenance, reader=reader))
+            (finding,) = consistency(flight)
+            doubted = reader == "delimited" or "twice" in words
+            assert ("converted twice" in finding.text, finding.decisive) == (doubted, doubted)
+
+
+def test_what_an_estimator_makes_of_a_still_hover_is_no_unit() -> None:
+    """The velocity follows what moves, and a third of what the place jitters when nothing does."""
+    whole = flown()
+    time = whole.time("x")
+    moving = time < 10.0
+    x = whole.values("x") * np.where(moving, 1.0, 0.1)
+    speed = np.gradient(x, time) * np.where(moving, 1.0, 0.35)
+    assert consistency(changed(whole, x=x, vx=speed)) == ()
+    (finding,) = consistency(changed(whole, x=x, vx=0.35 * np.gradient(x, time)))
+    assert "3.28 times too small" in finding.text
+
+
 def test_an_axis_that_does_not_move_says_nothing() -> None:
     flight = flown()
     noise = 1e-3 * np.random.default_rng(1).standard_normal(flight.time("phi").size)
@@ -206,5 +277,5 @@ def test_a_fast_log_is_averaged_down_and_judged_alike(monkeypatch: pytest.Monkey
 def test_stamps_that_hardly_differ_are_no_reason_to_stop() -> None:
     """Times of a damaged log: the number of samples in a block would be infinite."""
     time = np.arange(50) * 5e-324
-    stamps, table = consistency_module._thinned(time, np.ones((50, 3)))
+    stamps, table = thinned(time, np.ones((50, 3)))
     assert (stamps.shape, table.shape) == ((50,), (50, 3))

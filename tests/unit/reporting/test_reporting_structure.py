@@ -6,6 +6,7 @@ import base64
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 from report_samples import fit, flight, modes, validation
 from swashplate.cli.tables import fit_table
 from swashplate.errors import SwashError
-from swashplate.flights.provenance import ProcessingStep
+from swashplate.flights.provenance import Problem, ProcessingStep
 from swashplate.identification.core import result_file
 from swashplate.identification.core.sources import source_of, sources_of
 from swashplate.reporting.compose import compose, hover_modes
@@ -163,6 +164,17 @@ def test_summary_has_five_lines_and_a_picture() -> None:
         assert report.picture is not None
     only = compose(None, validation(), modes=modes())
     assert [label for label, _, _ in only.summary] == ["What", "Prediction", "Verdict", "Warnings"]
+
+
+def test_the_warnings_tell_what_is_wrong_with_the_logs() -> None:
+    def warnings(**changed: Any) -> str:
+        return {label: words for label, words, _ in compose(None, replace(validation(), **changed)).summary}["Warnings"]
+
+    gaps = Problem("motion: 8 gaps in the time stamps, the longest 51 ms (usual step 6.7 ms)")
+    told = tuple(replace(one, problems=(gaps,)) for one in validation().data)
+    assert "no problem was found" not in warnings(data=told)
+    assert f"hover.mat: {gaps.text}" in warnings(data=told)
+    assert gaps.text not in warnings()
 
 
 def test_summary_praises_the_model_only_where_it_beats_every_rival() -> None:

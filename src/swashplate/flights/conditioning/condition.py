@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.errors import FlightError
+from swashplate.flights.checked import checked
 from swashplate.flights.conditioning.derive import derive as derive_motion
 from swashplate.flights.conditioning.filters import lowpass
 from swashplate.flights.conditioning.ground import cut
@@ -16,7 +17,7 @@ from swashplate.flights.conditioning.lever_arm import move_to_cg
 from swashplate.flights.conditioning.outliers import remove_outliers
 from swashplate.flights.conditioning.reconstruction import correct_sensors
 from swashplate.flights.conditioning.resample import resample
-from swashplate.flights.consistency import UNCHECKED, refuse_inconsistent
+from swashplate.flights.consistency import UNCHECKED
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import ProcessingStep
 from swashplate.flights.schema import ATTITUDE, QUATERNION
@@ -60,7 +61,7 @@ def condition(
     trim_ground: bool = True,
     derive: bool = True,
     method: str = "linear",
-    check: bool = True,
+    check: bool | None = True,
 ) -> Flight:
     """A log as one uniform stream of clean channels: the chain in its order, each step with its counts in the history.
 
@@ -78,17 +79,15 @@ def condition(
         derive: add angles, body velocities, rates and specific force where position and attitude are there.
         method: between samples: "linear", "pchip" or "spline" (`resample`).
         check: refuse a log whose rates, attitude, velocities, positions and weight contradict each other in unit, sign
-            or axis (`consistency`). False takes it as it is; the history says so.
+            or axis (`consistency`). False takes it as it is; the history says so. None: it was `checked` before.
 
     Raises:
         FlightError: channels that contradict each other, nothing to condition, no piece long enough, a filter that
             does not fit.
     """
     check_streams(flight)
-    if check:
-        refuse_inconsistent(flight)
-    else:
-        flight = flight.done(UNCHECKED)
+    if check is not None:
+        flight = checked(flight if check else flight.done(UNCHECKED))
     out = remove_outliers(flight) if outliers else flight
     if trim_ground:
         out = trim(out)

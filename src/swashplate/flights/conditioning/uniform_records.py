@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from swashplate.flights.checked import checked
 from swashplate.flights.conditioning.condition import condition
-from swashplate.flights.consistency import refuse_inconsistent
 from swashplate.flights.flight import Flight
 
 
@@ -74,15 +74,24 @@ def uniform_records(
     """
     given, made = names or {}, []
     for raw in (flights,) if isinstance(flights, Flight) else flights:
-        refuse_inconsistent(raw)  # whole: the streams that are left out below may be what shows a wrong unit
         logged = {name: source for name, source in given.items() if source in raw}
+        used = {given.get(name, name) for name in (*channels, *also)}
+        # Whole: the streams that are left out below may be what shows a wrong unit; what is derived uses all of them.
+        raw = checked(raw, used if all(given.get(name, name) in raw for name in channels) else None)
         flight = with_names(raw, logged)
         whole = all(name in flight for name in channels)
         if whole:
             homes = {flight.stream_of(name) for name in (*channels, *also) if name in flight}
             flight = flight.with_streams({name: data for name, data in flight.streams.items() if name in homes})
         flight = condition(
-            flight, rate=rate, cutoff=cutoff, outliers=False, trim_ground=False, derive=not whole, method="spline"
+            flight,
+            rate=rate,
+            cutoff=cutoff,
+            outliers=False,
+            trim_ground=False,
+            derive=not whole,
+            method="spline",
+            check=None,
         )
         made.append(with_names(flight, {name: source for name, source in given.items() if name not in logged}))
     return tuple(made)

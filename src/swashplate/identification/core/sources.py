@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from swashplate.flights.flight import Flight
-from swashplate.flights.provenance import ProcessingStep
+from swashplate.flights.provenance import Problem, ProcessingStep
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class DataSource:
         segments: unbroken pieces, from and to [s].
         rate: of its first channel [Hz].
         damage: what is broken in the file itself.
+        problems: of its channels that were worked on, as `inspect` tells them.
     """
 
     name: str
@@ -41,6 +43,7 @@ class DataSource:
     segments: tuple[tuple[float, float], ...] = ()
     rate: float = float("nan")
     damage: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
 
     def same_log(self, other: DataSource) -> bool:
         """True for two parts of one log: equal hashes of the file, or equal signals where there is no file."""
@@ -64,6 +67,7 @@ def source_of(flight: Flight) -> DataSource:
         segments=tuple((float(a), float(b)) for a, b in flight.segments or ((flight.start, flight.stop),)),
         rate=float(flight.rate(flight.channels[0])),
         damage=tuple(said.damage),
+        problems=tuple(said.problems),
     )
 
 
@@ -71,30 +75,53 @@ def sources_of(flights: Iterable[Flight]) -> tuple[DataSource, ...]:
     return tuple(source_of(flight) for flight in flights)
 
 
-def hashes(flights: Iterable[Flight]) -> dict[str, dict[str, str]]:
+def scale_words(data: Iterable[DataSource]) -> tuple[str, ...]:
+    """The channels of the data that are off by a factor: what is fitted to them is off by as much."""
+    return tuple(dict.fromkeys(f"{_log(one)}: {each.text}" for one in data for each in one.problems if each.scale))
+
+
+def problem_words(data: Iterable[DataSource]) -> tuple[str, ...]:
+    """What else is wrong with the data: a line for each log."""
+    told = {_log(one): "; ".join(each.text.rstrip(".") for each in one.problems if not each.scale) for one in data}
+    return tuple(f"{log}: {text}." for log, text in told.items() if text)
+
+
+def _log(data: DataSource) -> str:
+    """The name of the log that data are a piece of."""
+    match = _INTERVAL.fullmatch(data.name)
+    return (data.name if match is None else match["name"]) or "flight"
+
+
+def hashes(flights: Iterable[Flight]) -> dict[str, dict[str, Any]]:
     """Hashes of flights by their names, as settings keep them: of the file, and of the conditioned signals.
 
-    Where two flights have one name (windows of a log, simulations) only what both share is told.
+    With their problems, where they have some. Where two flights have one name (windows of a log, simulations) only the
+    hashes that both share are told.
     """
-    by_name: dict[str, dict[str, str]] = {}
+    by_name: dict[str, dict[str, Any]] = {}
     for flight in flights:
         name = flight.provenance.source or "flight"
-        own = {"sha256": flight.provenance.sha256, "signals": _signals(flight)}
+        own: dict[str, Any] = {"sha256": flight.provenance.sha256, "signals": _signals(flight)}
         before = by_name.get(name, own)
+        problems = [*before.get("problems", ()), *(asdict(problem) for problem in flight.provenance.problems)]
         by_name[name] = {key: value if before[key] == value else "" for key, value in own.items()}
+        if problems:
+            by_name[name]["problems"] = [one for i, one in enumerate(problems) if one not in problems[:i]]
     return by_name
 
 
 _INTERVAL = re.compile(r"(?P<name>.+) -?[\d.]+-+[\d.]+ s")
 
 
-def sources_named(names: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> tuple[DataSource, ...]:
+def sources_named(names: Iterable[str], known: Mapping[str, Mapping[str, Any]]) -> tuple[DataSource, ...]:
     """Records ("log 3.00-9.00 s" each) with the hashes of their flights, of `hashes`."""
     made = []
     for name in names:
         match = _INTERVAL.fullmatch(name)
         own = known.get(name if match is None else match["name"], {})
-        made.append(DataSource(name, sha256=str(own.get("sha256", "")), signals=str(own.get("signals", ""))))
+        problems = tuple(Problem(each["text"], tuple(each["scale"])) for each in own.get("problems", ()))
+        sha256, signals = (str(own.get(key, "")) for key in ("sha256", "signals"))
+        made.append(DataSource(name, sha256=sha256, signals=signals, problems=problems))
     return tuple(made)
 
 

@@ -17,7 +17,7 @@ from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.result import Constant, Estimate, Fitted, Result, correlation_of
 from swashplate.identification.core.scoring import Likelihood, Optimum, Progress, minimise
-from swashplate.identification.core.sources import DataSource
+from swashplate.identification.core.sources import DataSource, scale_words
 from swashplate.identification.core.time_likelihood import TimeErrors
 
 METHODS = ("output-error", "filter-error", "prediction-error")
@@ -207,7 +207,7 @@ def result_of(
         details=TimeDetails(likelihood.covariance),
         history=optimum.history,
         converged=optimum.converged,
-        problems=problems,
+        problems=(*problems, *scale_words(data)),
         failed=bool(problems),
         warnings=_words(free, optimum),
         directions=accuracy.blind_directions(row.names[:k], marginal),

@@ -11,7 +11,7 @@ import numpy as np
 
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.result import Estimate, Result
-from swashplate.identification.core.sources import DataSource
+from swashplate.identification.core.sources import DataSource, scale_words
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.frequency.composed_start import from_core
 from swashplate.identification.frequency.fitted_pairs import PairChoice
@@ -210,7 +210,7 @@ def fit_targets(
         history=optimum.history,
         converged=optimum.converged,
         warnings=tuple(warnings),
-        problems=tuple(problems),
+        problems=(*problems, *scale_words(data)),
         comparisons=tuple(
             ResponseComparison(t, np.asarray(h), j) for t, h, j in zip(targets, answers, costs, strict=False)
         ),

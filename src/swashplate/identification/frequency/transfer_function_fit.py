@@ -16,6 +16,7 @@ from swashplate.flights.schema import channel
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.scoring import Optimum, minimise
+from swashplate.identification.core.sources import scale_words
 from swashplate.identification.frequency.response_cost import (
     NOT_FOLLOWED,
     ResponseComparison,
@@ -128,7 +129,9 @@ def as_told(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferF
     """The fit with its gains' units, and with what its responses were warned of: it is no better than they are."""
     pairs = tuple(f"{t.output} / {t.input}:" for t in fit.targets)
     heard = tuple(words for words in (*responses.warnings, *responses.problems) if words.startswith(pairs))
-    return _with_gain_units(replace(fit, warnings=(*fit.warnings, *heard), data=responses.data), responses)
+    problems = (*fit.problems, *scale_words(responses.data))
+    told = replace(fit, warnings=(*fit.warnings, *heard), problems=problems, data=responses.data)
+    return _with_gain_units(told, responses)
 
 
 def _with_gain_units(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:

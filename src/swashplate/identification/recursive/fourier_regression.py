@@ -40,6 +40,9 @@ NO_NUMBER, GAP, CLOCK = "a value that is no number", "a gap", "a clock that jump
 
 Complex = NDArray[np.complex128]
 
+BAND, _HIGHEST = (0.1, 2.5), 0.2
+"""Usual lines from and to [Hz], and the share of the rate up to which lines can be used."""
+
 
 @dataclass(frozen=True)
 class RegressionPlan:
@@ -102,7 +105,7 @@ def regression_plan(
     equation: RegressionEquation,
     *,
     rate: float,
-    band: tuple[float, float] = (0.1, 2.5),
+    band: tuple[float, float] | None = None,
     spacing: float | None = None,
     memory: float | None = None,
     held: Sequence[str] = (),
@@ -113,7 +116,7 @@ def regression_plan(
     Args:
         equation: what is estimated.
         rate: samples per second [Hz].
-        band: lines from and to [Hz]; what moves the vehicle should lie in it.
+        band: lines from and to [Hz]; what moves the vehicle should lie in it. None: `BAND`, as far as the rate allows.
         spacing: of the lines [Hz]; a 25th of the band's upper end where None.
         memory: time constant of forgetting [s]; None: nothing is forgotten.
         held: channels that are held between samples.
@@ -122,11 +125,12 @@ def regression_plan(
     Raises:
         IdentificationError: a band beyond a fifth of the rate, or too few lines; an unknown channel; no memory.
     """
-    low, high = band
+    low, high = (BAND[0], min(BAND[1], _HIGHEST * rate)) if band is None else band
     wide = high / 25.0 if spacing is None else spacing
-    if not (0.0 < low < high <= rate / 5.0 and 0.0 < wide < np.inf):
+    if not (0.0 < low < high <= _HIGHEST * rate and 0.0 < wide < np.inf):
         raise IdentificationError(
-            f"{low:g} to {high:g} Hz at {rate:g} samples a second: expected 0 < LOW < HIGH, HIGH up to {rate / 5.0:g}.",
+            f"{low:g} to {high:g} Hz at {rate:g} samples a second: expected 0 < LOW < HIGH, "
+            f"HIGH up to {_HIGHEST * rate:g}.",
             channel="band",
         )
     first, last = max(1, round(low / wide)), round(high / wide)

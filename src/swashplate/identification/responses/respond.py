@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
+from swashplate.flights.checked import checked
 from swashplate.flights.conditioning.uniform_records import renamed_channels
-from swashplate.flights.consistency import refuse_inconsistent
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.identification.core.record_facts import (
@@ -23,7 +23,7 @@ from swashplate.identification.core.record_facts import (
     slowest_of,
     unit_of,
 )
-from swashplate.identification.core.sources import hashes, sources_of
+from swashplate.identification.core.sources import hashes, problem_words, scale_words, sources_of
 from swashplate.identification.responses import response_warnings
 from swashplate.identification.responses.answers import answer_words
 from swashplate.identification.responses.composite import composite
@@ -105,9 +105,9 @@ def respond(
             channel=", ".join(sorted(mixed)),
             hint="A reference is what a program adds to a command, such as sid_target.",
         )
-    for flight in flights:
-        if not flight.history:  # as read; whatever conditions a flight checks it itself
-            refuse_inconsistent(flight)
+    # What is as read is checked here; whatever conditions a flight checks it itself.
+    named = {*inputs, *outputs, *references}
+    flights = tuple(flight if flight.history else checked(flight, named) for flight in flights)
     others = bystanders_of(flights, (*inputs, *outputs, *references)) if bystanders is None else tuple(bystanders)
     pieces = signals(flights, (*inputs, *outputs, *references, *others))
     sweep = sweeps_of(flights)
@@ -161,7 +161,9 @@ def respond(
             f"the band ends at half the rate, {highest:.4g} Hz, not at {band[1]:.4g} Hz; read the logs faster."
         )
     made = replace(made, sources=tuple(piece.name for piece in pieces))
-    warnings, problems = [*slow_words, *chosen.warnings, *notes], response_warnings.damaged(sources_of(flights))
+    data = sources_of(flights)
+    warnings = [*slow_words, *chosen.warnings, *notes, *problem_words(data)]
+    problems = [*response_warnings.damaged(data), *scale_words(data)]
     problems += response_warnings.dead(flights, inputs, outputs)
     problems += [
         f"reference '{name}' never moves: nothing was injected, so the joint estimate has no number."

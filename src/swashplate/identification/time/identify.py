@@ -27,7 +27,7 @@ from swashplate.identification.core.parameters import FROM_CARD, Parameterizatio
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import APART, Estimate, Fitted, Result, correlation_of
 from swashplate.identification.core.scoring import Optimum, Progress, minimise
-from swashplate.identification.core.sources import sources_of
+from swashplate.identification.core.sources import scale_words, sources_of
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time import feedback, nelder_mead
@@ -149,6 +149,7 @@ def identify_flight(
         notes += vehicle.traits.balance(
             vehicle, identified, {name: sum(values) / len(values) for name, values in trims.items()}
         )
+    data = sources_of(flights)
     return Result(
         method=by.method,
         solution=identified,
@@ -167,10 +168,15 @@ def identify_flight(
         details=FlightDetails(axes),
         history=optimum.history,
         converged=optimum.converged,
-        problems=(*problems, *notes, *(() if optimum.converged else (stopping.unfinished(),))),
+        problems=(
+            *problems,
+            *scale_words(data),
+            *notes,
+            *(() if optimum.converged else (stopping.unfinished(),)),
+        ),
         failed=bool(problems),
         comparisons=likelihood.comparisons(row),
-        data=sources_of(flights),
+        data=data,
         fitted=Fitted(likelihood, optimum.row) if horizon is None else None,
         seconds=time.perf_counter() - started,
         settings={

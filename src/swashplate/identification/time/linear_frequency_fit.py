@@ -20,7 +20,7 @@ from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.accuracy import blind_directions, marginal_information, sandwich
 from swashplate.identification.core.records import uniform_table
 from swashplate.identification.core.result import Estimate, Result, correlation_of
-from swashplate.identification.core.sources import sources_of
+from swashplate.identification.core.sources import scale_words, sources_of
 from swashplate.identification.core.time_fit import TimeDetails
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
@@ -113,6 +113,7 @@ def fit_in_frequency(
         )
         for i, p in enumerate(model.free)
     )
+    data = sources_of(flights)
     return Result(
         method=METHOD,
         solution=model.with_values(dict(zip(model.free, map(float, start[:k]), strict=True))),
@@ -126,9 +127,12 @@ def fit_in_frequency(
         history=tuple(history),
         converged=bool(solved.success),
         failed=failed,
-        problems=("the search has found no least cost: its numbers mean nothing.",) if failed else (),
+        problems=(
+            *(("the search has found no least cost: its numbers mean nothing.",) if failed else ()),
+            *scale_words(data),
+        ),
         directions=blind_directions(model.free, alone * np.outer(scale, scale)),
-        data=sources_of(flights),
+        data=data,
         settings={"band": list(band), "outputs": list(names), "records": sources},
     )
 

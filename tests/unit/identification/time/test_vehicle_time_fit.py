@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from hfb320 import OUTPUTS, START, flight, hfb320
 from rolling import SAME, TRUTH, gusty, rolling
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
+from swashplate.flights.provenance import Problem
 from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.identification.time.vehicle_time_fit import fit_vehicle
 from swashplate.models.linear.state_space_file import parse
@@ -29,6 +32,21 @@ def test_a_linear_vehicle_is_fitted_as_the_linear_model() -> None:
     entry = found.model.card.parameters["tau"]
     assert (entry.value, entry.status) == (found["tau"].value, "identified")
     assert found.to_document()["estimates"][0]["name"] == "Lb"
+
+
+def test_a_fit_carries_a_channel_that_is_off_by_a_factor_and_is_not_failed() -> None:
+    flown = gusty()
+    scaled = Problem("p: is 1.25 ± 0.004 times what the attitude's change gives", (1.25, 0.004))
+    told = (scaled, Problem("arrays: 2 gaps"))
+    flown = replace(flown, provenance=replace(flown.provenance, source="log.csv", problems=told))
+    found = fit_in_time(parse(SAME), flown, method="filter-error", shifts=False, biases=["ay"])
+    assert found.problems == (f"log.csv: {scaled.text}",)
+    assert not found.failed
+    assert found.data[0].problems == told
+    assert f"! log.csv: {scaled.text}" in repr(found)
+    assert fit_vehicle(rolling(), flown, free=list(TRUTH), outputs=("p", "pdot", "ay"), biases=["ay"]).problems == (
+        f"log.csv: {scaled.text}",
+    )
 
 
 def test_a_delay_of_a_stick_that_rests_is_what_was_known_before() -> None:
