@@ -153,14 +153,16 @@ class _Record:
         spare = (*(_LOCAL if local else ()), *(POSITION if moving else ()))
         return tuple(n for n in self.states if n in self.outputs or n not in spare)
 
-    def told(self, name: str) -> Told:
-        """What the motion tells of a channel; what the outputs tell, where the record is too short for more."""
+    @cached_property
+    def told(self) -> dict[str, Told]:
+        """What the motion tells of each input; what the outputs tell, where the record is too short for more."""
+        found: tuple[Told, ...] = ()
         for names in (self.motion, self.outputs or tuple(n for n in self.motion if n in RATES)):
             forces = [str(self.flight[n].attrs.get("units", "")) in _AT_ONCE for n in names]
-            told = told_by_motion(self.at([name])[:, 0], self.at(names), self.dt, at_once=forces)
-            if told.known:
+            found = told_by_motion(self.at(self.inputs), self.at(names), self.dt, at_once=forces)
+            if any(one.known for one in found):
                 break
-        return told
+        return dict(zip(self.inputs, found, strict=True))
 
     def share(self, name: str, causes: Sequence[str]) -> float:
         """Share of an input that other channels explain."""
@@ -263,7 +265,7 @@ class _Record:
         return Excitation(self.name, name, CONTROLLER, words)
 
     def _by_motion(self, name: str, *, stick: bool, swept: bool) -> Excitation:
-        told = self.told(name)
+        told = self.told[name]
         share = f"the motion until then explains {100.0 * told.past:.1f} % of it"
         if told.answer:
             words = f"a controller's answer: {share}, and the motion that follows tells it no better."

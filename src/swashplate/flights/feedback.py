@@ -40,7 +40,7 @@ _SPAN = 0.5  # s: of the samples before and after
 _LAGS = ((1, 2, 3, 5, 8, 12), (1, 3, 8), (1, 4))  # steps; the fewer, the shorter the record
 _FADING = (1.0, 3.0)  # s: fading averages of what lies further back
 _SLOW = 0.1  # Hz: what is slower is trim, drift and wind, and left out
-_ROWS = 3.0  # rows of the regression per column
+_ROWS, _MOST_ROWS = 3.0, 3000  # rows of the regression per column, and enough of them
 
 
 @dataclass(frozen=True)
@@ -85,26 +85,30 @@ NOTHING = Told(*[float("nan")] * 4)
 
 
 def told_by_motion(
-    command: Array, motion: Array, dt: float, *, at_once: Sequence[bool] = (), memory: bool = True
-) -> Told:
-    """What motion tells of a command.
+    commands: Array, motion: Array, dt: float, *, at_once: Sequence[bool] = (), memory: bool = True
+) -> tuple[Told, ...]:
+    """What motion tells of each command.
 
     Args:
-        command: shape (n,), evenly sampled. motion: shape (n, k).
+        commands: shape (n, m), evenly sampled. motion: shape (n, k).
         dt: sample time [s].
         at_once: which columns of the motion follow a command at once (forces, accelerations): their sample of the same
             instant counts as later only. None where not given.
         memory: whether averages over seconds and the motion's integral count too, as integral terms remember them, and
             as an attitude is the integral of a rate; else half a second alone.
     """
-    table = _Table.of(command, motion, dt, at_once)
+    table = _Table.of(commands, motion, dt, at_once)
     if table is None:
-        return NOTHING
+        return (NOTHING,) * commands.shape[1]
     until_then = ("now", "before", *(("long before", "sum") if memory else ()))
     from_then = ("now", "at once", "after", *(("long after", "sum") if memory else ()))
-    fresh = table.left("own")
-    news = (table.left("own", *until_then) + _DUST) / (fresh + _DUST)
-    return Told(1.0 - table.left(*until_then), 1.0 - table.left(*from_then), 1.0 - news, fresh)
+    past, later = table.left(*until_then), table.left(*from_then)
+    told = []
+    for j in range(commands.shape[1]):
+        fresh, news = (float(table.left(f"own {j}", *more)[j]) + _DUST for more in ((), until_then))
+        share = Told(1.0 - float(past[j]), 1.0 - float(later[j]), 1.0 - news / fresh, fresh - _DUST)
+        told.append(share if table.moves[j] else NOTHING)
+    return tuple(told)
 
 
 def share_of(command: Array, causes: Array, dt: float, *, past: bool = True) -> float:
@@ -114,39 +118,42 @@ def share_of(command: Array, causes: Array, dt: float, *, past: bool = True) -> 
         command: shape (n,). causes: shape (n, k). dt: sample time [s].
         past: by what they were until then; else by their values of the same instant alone.
     """
-    table = _Table.of(command, causes, dt, ())
-    return float("nan") if table is None else 1.0 - table.left("now", *(("before", "long before") if past else ()))
+    table = _Table.of(command[:, None], causes, dt, ())
+    if table is None or not table.moves[0]:
+        return float("nan")
+    return 1.0 - float(table.left("now", *(("before", "long before") if past else ()))[0])
 
 
 @dataclass(frozen=True)
 class _Table:
-    """The columns of the regressions by their products, trends taken out; the command is of variance one."""
+    """The columns of the regressions by their products, trends taken out; each command that moves is of variance one.
+
+    Attributes:
+        products: of the columns. with_commands: of columns and commands. group: of each column. rows: behind them.
+        moves: which commands move.
+    """
 
     products: Array
-    with_command: Array
+    with_commands: Array
     group: NDArray[np.str_]
     rows: int
+    moves: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, command: Array, motion: Array, dt: float, at_once: Sequence[bool]) -> _Table | None:
+    def of(cls, commands: Array, motion: Array, dt: float, at_once: Sequence[bool]) -> _Table | None:
         """None where the record is too short for its channels, or nothing moves."""
         from scipy.signal import lfilter
 
-        every = max(1, round(_STEP / dt))
-        n, step = (len(command) - 1) // every, every * dt
-        whole = np.column_stack([command, motion])[: n * every + 1]
-        still = (
-            np.ptp(whole, axis=0) <= 1e-9 * np.max(np.abs(whole), axis=0, initial=0.0) if n > 0 else np.ones(2, bool)
-        )
-        if still[0] or still[1:].all():
+        every, m = max(1, round(_STEP / dt)), commands.shape[1]
+        n, step = len(commands) // every, every * dt
+        slow = np.column_stack([commands, motion])[: n * every].reshape(n, every, -1).mean(axis=1)
+        if n < 2:
             return None
-        forces = np.asarray(at_once or np.zeros(motion.shape[1]), dtype=bool)[~still[1:]]
-        moved = _normal(whole[:, 1:][:, ~still[1:]])
-        u, y, sums = whole[:-1:every, 0], moved[:-1:every], _normal(np.cumsum(moved, axis=0))[:-1:every]
-        # Between instants averages: sensors' noise is no motion. They must not hold the instant itself, at which a
-        # command that the motion follows has not acted yet.
-        after = moved[1:].reshape(n, every, -1).mean(axis=1)
-        before = np.concatenate([moved[:1], moved[:-1].reshape(n, every, -1).mean(axis=1)[:-1]])
+        moves = np.ptp(slow, axis=0) > 1e-9 * np.max(np.abs(slow), axis=0)
+        if not moves[:m].any() or not moves[m:].any():
+            return None
+        forces = np.asarray(at_once or np.zeros(motion.shape[1]), dtype=bool)[moves[m:]]
+        u, y = _normal(slow[:, :m]), _normal(slow[:, m:][:, moves[m:]])
         trends = int(2.0 * _SLOW * n * step) + 2
         for given in _LAGS:
             lags = [lag for lag in given if lag <= 2 or lag * step <= _SPAN]
@@ -155,49 +162,45 @@ class _Table:
                 break
         else:
             return None
-        middle, keep = slice(most, n - most), np.exp(-step / np.array(_FADING))
+        # Neighbouring rows hardly differ: a long record needs no more of them than its columns ask for.
+        at = np.arange(most, n - most, max(1, (n - 2 * most) // max(_MOST_ROWS, int(_ROWS * columns))))
+        keep = np.exp(-step / np.array(_FADING))
 
-        def near(values: Array, sign: int) -> Array:
-            """Of averages on one side of each instant those some steps away; the first is none."""
-            away = [sign * (lag - 1) for lag in lags]
-            return np.hstack([values[most + by : n - most + by] for by in away])
+        def near(sign: int) -> Array:
+            return np.hstack([y[at + sign * lag] for lag in lags])
 
-        def far(values: Array, sign: int) -> Array:
-            faded = [lfilter([1.0 - k], [1.0, -k], values[::-sign], axis=0)[::-sign][middle] for k in keep]
-            return np.hstack(faded)
+        def far(sign: int) -> Array:
+            return np.hstack([lfilter([1.0 - k], [1.0, -k], y[::-sign], axis=0)[::-sign][at] for k in keep])
 
         parts = {
-            "now": y[middle][:, ~forces],
-            "at once": y[middle][:, forces],
-            "before": near(before, -1),
-            "after": near(after, 1),
-            "long before": far(before, -1),
-            "long after": far(after, 1),
-            "sum": sums[middle],
-            "own": np.stack([u[most - lag : n - most - lag] for lag in lags], axis=1),
+            "now": y[at][:, ~forces],
+            "at once": y[at][:, forces],
+            "before": near(-1),
+            "after": near(1),
+            "long before": far(-1),
+            "long after": far(1),
+            "sum": _normal(np.cumsum(y, axis=0))[at],
+            **{f"own {j}": np.stack([u[at - lag, j] for lag in lags], axis=1) for j in range(m)},
         }
-        trend, _ = np.linalg.qr(np.cos(np.pi * np.outer((np.arange(n)[middle] + 0.5) / n, np.arange(trends))))
-        table = np.hstack([*parts.values(), u[middle, None]])
-        table = table - trend @ (trend.T @ table)
-        size = np.linalg.norm(table[:, -1])
-        if not size > 1e-12 * np.linalg.norm(u):
-            return None
-        own = np.repeat(list(parts), [part.shape[1] for part in parts.values()]) == "own"
-        scale = np.where(np.append(own, True), size, np.sqrt(len(table)))
-        products = (table / scale).T @ (table / scale)
+        trend, _ = np.linalg.qr(np.cos(np.pi * np.outer((at + 0.5) / n, np.arange(trends))))
+        table = np.hstack([*parts.values(), u[at]])
+        table = (table - trend @ (trend.T @ table)) / np.sqrt(len(at))
+        size = np.linalg.norm(table[:, -m:], axis=0)
+        table[:, -m:] /= np.maximum(size, 1e-12)
         group = np.repeat(list(parts), [part.shape[1] for part in parts.values()])
-        return cls(products[:-1, :-1], products[:-1, -1], group, len(table) - trends)
+        products = table.T @ table
+        return cls(products[:-m, :-m], products[:-m, -m:], group, len(at) - trends, moves[:m] & (size > 1e-12))
 
-    def left(self, *groups: str) -> float:
-        """Share of the command's variance that some groups of columns leave, per degree of freedom."""
+    def left(self, *groups: str) -> Array:
+        """Share of each command's variance that some groups of columns leave, per degree of freedom, shape (m,)."""
         used = np.isin(self.group, groups)
-        products, wanted = self.products[np.ix_(used, used)], self.with_command[used]
-        ridge = np.where(self.group[used] == "own", 1e-8, _NOISE**2)
-        values, vectors = np.linalg.eigh(products + np.diag(ridge))
-        weights = vectors @ ((vectors.T @ wanted) / values)
-        freedom = float(np.sum(np.einsum("ij,ij->j", vectors, products @ vectors) / values))
-        rest = 1.0 - 2.0 * float(weights @ wanted) + float(weights @ products @ weights)
-        return max(rest, 0.0) * self.rows / max(self.rows - freedom, 1.0)
+        products, wanted = self.products[np.ix_(used, used)], self.with_commands[used]
+        ridge = np.where(np.char.startswith(self.group[used], "own"), 1e-8, _NOISE**2)
+        inverse = np.linalg.inv(products + np.diag(ridge))
+        weights = inverse @ wanted
+        freedom = float(ridge.size - np.diag(inverse) @ ridge)
+        rest = 1.0 - 2.0 * np.sum(weights * wanted, axis=0) + np.sum(weights * (products @ weights), axis=0)
+        return np.asarray(np.maximum(rest, 0.0) * self.rows / max(self.rows - freedom, 1.0))
 
 
 def _normal(values: Array) -> Array:

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from simulated_loops import Case, Flown, fly
-from swashplate.flights.feedback import ANSWER, NO_NEWS, OWN, Told, share_of, told_by_motion
+from swashplate.flights import feedback
+from swashplate.flights.feedback import ANSWER, NO_NEWS, OWN, Told, share_of
 
 LOOP = Case(1, plant=(40.0, 3.0, 0.04, 0.02), gains=(0.15, 0.1, 0.0, 1.2, 0.0), gust=(1.0, 0.5, 0.0), seconds=30.0)
 OPEN = Case(2, shape="3-2-1-1", size=0.05, gust=(0.5, 1.0, 0.0), sensor=(0.2, 1.0), seconds=30.0)
+
+
+def told_by_motion(command: np.ndarray, motion: np.ndarray, dt: float, **how: Any) -> Told:
+    """Of one command."""
+    (told,) = feedback.told_by_motion(command[:, None], motion, dt, **how)
+    return told
 
 
 def asked(flown: Flown, *channels: str, backwards: bool = False) -> Told:
@@ -125,3 +133,25 @@ def test_what_changes_only_by_unit_changes_nothing(flights: list[Flown]) -> None
         (other.past, other.later, other.news, other.fresh), abs=1e-6
     )
     assert told.past > ANSWER
+
+
+def test_several_commands_at_once_are_told_as_each_alone(flights: list[Flown]) -> None:
+    flight = flights[0].flight
+    motion = flight.array(("p", "phi"))
+    commands = np.stack([flight.values("command"), 0.0 * motion[:, 0], np.roll(motion[:, 0], -7)], axis=1)
+    together = feedback.told_by_motion(commands, motion, 0.01)
+    assert not together[1].known
+    for command, told in zip(commands.T[::2], together[::2], strict=True):
+        alone = told_by_motion(command, motion, 0.01)
+        assert vars(told) == pytest.approx(vars(alone), abs=1e-9)
+    assert together[2].follows
+
+
+def test_a_long_record_is_told_by_a_part_of_its_rows() -> None:
+    """The law of ten minutes is found whichever rows are left out."""
+    random = np.random.default_rng(8)
+    rate = lfilter([1.0], [1.0, -0.9], random.standard_normal(15_000))
+    command = -0.5 * np.roll(rate, 1) + 0.1 * rate.std() * random.standard_normal(15_000)
+    told = told_by_motion(command, rate[:, None], 0.04)
+    assert told.past == pytest.approx(1.0 - 0.1**2 / (0.5**2 + 0.1**2), abs=0.01)
+    assert told.answer

@@ -43,11 +43,15 @@ def smooth(seed: int, over: float = 0.2) -> np.ndarray:
 
 
 def flown(*, pitch: np.ndarray, gust: np.ndarray, answers: float = 0.0) -> Flight:
-    """p' = -6 p + 25 roll + 10 pitch + gust; with `answers` a loop gives the pitch command of the gust that q feels."""
+    """p' = -6 p + 25 roll + 10 pitch + gust behind servos of 50 ms.
+
+    With `answers` a loop gives the pitch command of the rate that the gust makes of q.
+    """
     roll = 0.01 * smooth(1)
     q = lsim(([1.0], [1.0, 4.0]), gust, TIME)[1]
     command = pitch - answers * q
-    p = lsim(([1.0], [1.0, 6.0]), 25.0 * roll + 10.0 * command + gust, TIME)[1]
+    servo = lsim(([1.0], [0.05, 1.0]), 25.0 * roll + 10.0 * command, TIME)[1]
+    p = lsim(([1.0], [1.0, 6.0]), servo + gust, TIME)[1]
     noise = np.random.default_rng(2).standard_normal((2, TIME.size))
     table = {"mixer_roll": roll, "mixer_pitch": command, "p": p + 0.005 * noise[0], "q": q + 0.005 * noise[1]}
     return Flight({"uniform": stream(TIME, table)})

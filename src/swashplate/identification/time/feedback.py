@@ -70,7 +70,7 @@ def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array])
     if not still:
         answered, response = MOTION[axis.name]
         moved = np.stack([motion[name] for name in answered], axis=1)
-        told = told_by_motion(command, moved, record.dt, memory=False)
+        (told,) = told_by_motion(command[:, None], moved, record.dt, memory=False)
         peak, phase = _coherence(command, motion[response], rate, high)
     # News is not asked: rates that were derived from a tracked pose know a little of what follows.
     answer = told.known and told.past >= ANSWER and not told.follows
