@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.flights.excitation import CONTROLLER, FLY, UNKNOWN, Excitation
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.sources import DataSource
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
@@ -52,6 +53,21 @@ def dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str
         for role, names in (("input", inputs), ("output", outputs))
         for name in still(flights, names)
     ]
+
+
+def answers(moved: Mapping[str, Excitation]) -> list[str]:
+    """Inputs that are a controller's answer."""
+    return [
+        f"{one.record}: input '{name}' is {one.words} Its responses are minus the controller's inverse, not the "
+        f"aircraft's, however coherent. {FLY}"
+        for name, one in moved.items()
+        if one.kind == CONTROLLER
+    ]
+
+
+def unsure(moved: Mapping[str, Excitation]) -> list[str]:
+    """Inputs of which nobody knows whether they are a controller's answer."""
+    return [f"{one.record}: input '{name}': {one.words}" for name, one in moved.items() if one.kind == UNKNOWN]
 
 
 def damaged(logs: Sequence[DataSource]) -> list[str]:
