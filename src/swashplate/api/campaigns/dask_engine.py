@@ -6,6 +6,7 @@ import logging
 import queue
 import socket
 import time
+from asyncio import CancelledError
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
@@ -73,7 +74,7 @@ class DaskEngine:
     def workers(self) -> int:
         if time.monotonic() - self._counted > _COUNTED:  # asked of the scheduler: not for every task
             self._counted = time.monotonic()
-            with suppress(Exception):  # between two connections it knows nothing: as many as before
+            with suppress(Exception, CancelledError):  # between two connections it knows nothing: as many as before
                 self._count = len(self._known())
         return self._count
 
@@ -184,7 +185,7 @@ class DaskEngine:
 
     def close(self) -> None:
         if self._client is not None:
-            with suppress(Exception):
+            with suppress(Exception, CancelledError):  # it may be trying to connect to a scheduler that is gone
                 for future in self._tasks:
                     future.release()
                 self._client.close(timeout=5.0)

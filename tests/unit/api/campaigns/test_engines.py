@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import shutil
 import subprocess
@@ -296,3 +297,20 @@ def test_program_says_what_differs() -> None:
     assert program.differences(mine, mine) == []
     assert program.differences(mine, {**mine, "jax": "0.0"}) == [f"jax is 0.0, expected {mine['jax']}"]
     assert np.all([len(value) > 0 for name, value in mine.items() if name != "XLA flags"])
+
+
+def test_an_engine_closes_while_its_client_looks_for_a_scheduler_that_is_gone(
+    dask: Cluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine = DaskEngine(made_campaigns.numbers, scheduler=dask.named)
+
+    def cancelled(*_: object, **__: object) -> None:
+        raise asyncio.CancelledError  # what Dask's client raises then; it is no Exception
+
+    with monkeypatch.context() as gone:
+        for name in ("close", "scheduler_info"):
+            gone.setattr(engine._client, name, cancelled)
+        engine._counted = float("-inf")
+        assert engine.workers == 1, "as many as before"
+        engine.close()
+    engine.close()
