@@ -235,6 +235,7 @@ def respond(
             closed=loops,
             window=chosen.lengths[len(chosen.lengths) // 2],
             overlap=overlap,
+            incoherent=[o for o in outputs if all(made.band(o, name) is None for name in inputs)],
         )
     return replace(
         made,

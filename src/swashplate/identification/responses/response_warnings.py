@@ -255,12 +255,15 @@ def bystander_words(
     closed: Sequence[str],
     window: float,
     overlap: float,
+    incoherent: Sequence[str] = (),
 ) -> list[str]:
     """Commands left out that change the answer to a named input: compared in one window, with and without them.
 
     A middle window: enough averages to be sure of a difference, long enough to see the low end. The pieces hold
     inputs (the `named` first), outputs and the others, in this order. A loop that is broken at an input (the outputs
     `closed`) has the others closed: there they move along rightly.
+    Of outputs that the inputs do not move (`incoherent`), those are
+    named that move them: before gusts are blamed, every command is asked.
     """
     n_in, n_out = len(inputs), len(outputs)
     first = pieces[0].values.shape[1] - len(others)
@@ -279,18 +282,24 @@ def bystander_words(
             # What it adds must be real: its own share, its own effect, and noise that it explains away.
             quieter = (1.0 - both.multiple) < EXPLAINED * (1.0 - alone.multiple)
         for o, output in enumerate(outputs):
+            acts = quieter[:, o] & (both.coherence[:, o, n_in] >= CLEAR)
+            before = len(words)
             for i, mover in enumerate(inputs[:named] if output not in closed else ()):
                 h, b = alone.response[:, o, i], both.response[:, o, i]
                 with np.errstate(divide="ignore", invalid="ignore"):
                     apart = np.abs(np.log(h / b))
                 bound = np.maximum(3.0 * both.error[:, o, i], np.log(10.0) / 40.0)
-                off = (both.error[:, o, i] < SURE) & (apart > bound) & quieter[:, o]
-                off &= both.coherence[:, o, n_in] >= CLEAR
+                off = (both.error[:, o, i] < SURE) & (apart > bound) & acts
                 if off.sum() > max(2, 0.05 * np.isfinite(h).sum()):
                     words.append(
                         f"{output} / {mover}: '{name}' moved along and acts on {output} too at {_hertz(omega, off)}; "
                         f"this single response is wrong there. Add '{name}' to the inputs, and logs that move each."
                     )
+            if len(words) == before and output in incoherent and acts.sum() > max(2, 0.05 * omega.size):
+                words.append(
+                    f"{output}: '{name}' explains at {_hertz(omega, acts)} what the inputs leave. Add '{name}' to the "
+                    "inputs."
+                )
     return words
 
 
