@@ -47,8 +47,8 @@ class CardSpread:
         told = {one.kind: one for one in self.model.values()}
         parts = ", ".join(f"{kind} {100.0 * one.sigma:.0f} % of {one.vehicles}" for kind, one in told.items())
         return (
-            f"5 % and 95 % bounds of {self.draws} samples of the card ({self.refused} could not be trimmed), and of "
-            f"what such a model misses beside published helicopters (standard deviation, told by how many): {parts}. "
+            f"5 % and 95 % bounds: of {self.draws} samples of the card ({self.refused} could not be trimmed), and of "
+            f"what such a model misses beside published helicopters (standard deviation, told by how many: {parts}). "
             "The modes' bounds have the card's samples in them alone."
         )
 
