@@ -60,7 +60,6 @@ class Provenance:
         reader_version: its version.
         simulated: True where no aircraft flew.
         vehicle: the vehicle as the log or the user names it.
-        firmware: the autopilot's, as the log names it ("ArduCopter V4.5.7"); "" where it does not.
         notes: what a reader found wrong and what the user must know.
         damage: what is broken in the file itself (cut off, lost bytes, clock resets); the rest of it was read.
         parameters: an autopilot's settings as the log begins; changes in flight are events.
@@ -69,6 +68,7 @@ class Provenance:
             flight into every report.
         epoch: the flight's time zero on the log's own clock [s], 0 where times are that clock's; a clock of Unix time
             counts from 1970. Readers keep stamps small with it (`flights/epoch.py`).
+        firmware: the autopilot's, as the log names it ("ArduCopter V4.5.7"); "" where it does not.
     """
 
     source: str = ""
@@ -77,13 +77,13 @@ class Provenance:
     reader_version: str = ""
     simulated: bool = False
     vehicle: str = ""
-    firmware: str = ""
     notes: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     problems: tuple[Problem, ...] = ()
     epoch: float = 0.0
+    firmware: str = ""
 
     @property
     def autopilot(self) -> str:

@@ -139,7 +139,8 @@ class Suggestion(Shown):
 
         told: dict[str, Any] = {k: v for k, v in vars(self).items() if k != "loop"}
         told |= {"figures_suggested": read(self.figures_suggested), "figures_flown": read(self.figures_flown)}
-        return told | {"margins": margins(self.figures_suggested), "flown_margins": margins(self.figures_flown)}
+        told |= {"margins": margins(self.figures_suggested), "flown_margins": margins(self.figures_flown)}
+        return told | {"refused": self.refused}
 
     def table(self) -> list[tuple[str, str, str]]:
         """What the loop is worth: a name with its unit, suggested, flown."""
