@@ -10,12 +10,16 @@ such a method calls `resolve("condition")`, and the verb's module is loaded then
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from swashplate.errors import MissingLibraryError
 from swashplate.extras import EXTRA_OF, missing
+from swashplate.meant import taking_names
 
 _LIGHT: Mapping[str, str] = {
     "CHOICES": "swashplate.models.coax_choices:CHOICES",
@@ -201,6 +205,24 @@ def _load(where: str) -> Any:
     return getattr(import_module(module), attribute)
 
 
+@cache
+def _taking_names(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """A public function that takes a vehicle's name, a file or one channel's name for what is meant by it."""
+    loads = {place(kind): partial(_loaded, verb) for kind, verb in _LOADED_BY.items()}
+    made = taking_names(function, loads)
+    if name in NAMES:  # where pickle finds it again
+        made.__module__, made.__qualname__ = __package__ or "swashplate", name
+    return made
+
+
+def _loaded(verb: str, given: str | Path) -> Any:
+    return _load(place(verb))(given)
+
+
+_LOADED_BY: Mapping[str, str] = {"Vehicle": "vehicle", "Flight": "read", "FrequencyResponse": "load", "Result": "load"}
+"""What makes an object of a name or a file, where a function takes the object."""
+
+
 def resolve(name: str) -> Any:
     """What a name of the tables stands for; its module is loaded now, and JAX is set up where it computes.
 
@@ -211,7 +233,8 @@ def resolve(name: str) -> Any:
     try:
         if name in _COMPUTING:
             set_up()
-        return _load(place(name))
+        named = _load(place(name))
+        return _taking_names(name, named) if inspect.isfunction(named) else named
     except ModuleNotFoundError as error:
         if isinstance(error, MissingLibraryError) or (error.name or "").partition(".")[0] not in EXTRA_OF:
             raise

@@ -17,6 +17,7 @@ from swashplate.errors import FlightError, UnitError
 from swashplate.flights import storage
 from swashplate.flights.provenance import LATEST, ProcessingStep, Provenance
 from swashplate.flights.schema import channel
+from swashplate.meant import taking_names
 from swashplate.public import resolve
 from swashplate.registry import listed
 
@@ -118,6 +119,7 @@ class Flight:
         """Values of a channel in its inside unit, shape (n,)."""
         return np.asarray(self[name].values, dtype=np.float64)
 
+    @taking_names
     def array(self, names: Iterable[str]) -> Array:
         """Channels of one stream side by side, shape (n, len(names)).
 

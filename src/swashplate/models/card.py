@@ -14,6 +14,7 @@ import tomli_w
 
 from swashplate import documents
 from swashplate.errors import CardError
+from swashplate.meant import taking_names
 from swashplate.registry import nearest
 
 CARD_SCHEMA = 1
@@ -134,6 +135,7 @@ class Card:
         card = self.with_values(before, source="before the identification", status="assumed", sigma=None, before=None)
         return replace(card, title=self.title.split(", identified from ")[0], observer={}, path="")
 
+    @taking_names
     def covariance(self, names: Sequence[str]) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Covariance of parameters that have a sigma, shape (n, n), from the sigmas and the correlations."""
         matrix = np.eye(len(names))

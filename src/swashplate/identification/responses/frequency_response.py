@@ -15,6 +15,7 @@ from swashplate.errors import IdentificationError
 from swashplate.extras import library
 from swashplate.identification.core.sources import DataSource, sources_named
 from swashplate.identification.responses import response_file
+from swashplate.meant import taking_names
 from swashplate.public import resolve
 from swashplate.registry import listed, nearest
 
@@ -109,6 +110,7 @@ class FrequencyResponse:
         runs = [run for run in runs if run[1] >= run[0] * 2.0**0.25]
         return max(runs, key=lambda run: run[1] / run[0]) if runs else None
 
+    @taking_names
     def select(self, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> FrequencyResponse:
         """The part with some outputs and inputs."""
         o = [self.place(name, self.inputs[0])[0] for name in outputs]
