@@ -20,7 +20,8 @@ from swashplate.flights.conditioning.derive import GRAVITY, body_rates, differen
 from swashplate.flights.conditioning.filters import within
 from swashplate.flights.conditioning.resample import common, unbroken
 from swashplate.flights.flight import Flight
-from swashplate.flights.schema import ATTITUDE, LOGGED_UNIT, POSITION, QUATERNION, RATES, VARIANTS, VELOCITY, channel
+from swashplate.flights.readers.given_units import unit_to_give
+from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, VARIANTS, VELOCITY, channel
 
 Reference = Callable[[Array], Array]
 """What the other side of the log says about the three axes at the times of a uniform grid, shape (n, 3)."""
@@ -355,19 +356,8 @@ def _judged(
     words = [f"is {unit[1:]} times too small (converted twice?)" if doubled else f"looks like {unit}, not {inside}"]
     words = words * bool(unit) + ["has the other sign"] * bool(sign)
     text = f"{' and '.join(words)}, against {kind.reference} ({number})"
-    mend = "Check the units of both sides." if doubled else _unit_to_give(flight, name, sign=sign, looks_like=unit)
+    mend = "Check the units of both sides." if doubled else unit_to_give(flight, name, sign=sign, looks_like=unit)
     return [Inconsistency(name, text, mend)] if words else []
-
-
-def _unit_to_give(flight: Flight, name: str, *, sign: str, looks_like: str) -> str:
-    """The option that mends a channel: it replaces the unit that the file was read with, sign and all."""
-    inside = channel(name).unit
-    logged = str(flight[name].attrs.get(LOGGED_UNIT, "")) or inside
-    turned, plain = logged.startswith("-"), logged.removeprefix("-")
-    if looks_like and plain != inside:
-        return f"It was read as {logged}; check its unit."
-    signed = "-" if turned != bool(sign) else ""
-    return f"Give --unit {name}={signed}{looks_like or plain}."
 
 
 def _unit_of(ratio: float, kind: _Kind) -> str | None:
@@ -394,7 +384,7 @@ def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[
             if abs(abs(felt) - weight) < 0.3 * weight and (unit, felt > 0.0) != ("m/s^2", True):
                 words = ["looks like g, not m/s^2"] * (unit == "g") + ["has the other sign"] * (felt < 0.0)
                 text = f"{' and '.join(words)}: its median is {-felt:+.3g} when level, expected {-gravity:.3g} m/s^2"
-                mend = _unit_to_give(flight, name, sign="-" * (felt < 0.0), looks_like=unit.removeprefix("m/s^2"))
+                mend = unit_to_give(flight, name, sign="-" * (felt < 0.0), looks_like=unit.removeprefix("m/s^2"))
                 # Without an attitude it may have lain on its back.
                 contradictions.append(Inconsistency(name, text, mend, decisive=attitude is not None))
     return contradictions

@@ -10,6 +10,14 @@ from typing import Any
 LATEST = 1e20
 """Seconds; nanoseconds since 1970 that are taken for seconds stay below."""
 
+_FIRMWARES: Mapping[str, str] = {
+    "ardupilot": "ArduPilot",
+    "blackbox": "unnamed (Blackbox)",
+    "ulog": "PX4",
+    "px4log": "PX4",
+}
+"""What the format of a log tells of its autopilot, by reader."""
+
 
 @dataclass(frozen=True)
 class Event:
@@ -45,6 +53,7 @@ class Provenance:
         events: what the log says happened, in order of time.
         epoch: the flight's time zero on the log's own clock [s], 0 where times are that clock's; a clock of Unix time
             counts from 1970. Readers keep stamps small with it (`flights/epoch.py`).
+        firmware: the autopilot's, as the log names it ("ArduCopter V4.5.7"); "" where it does not.
     """
 
     source: str = ""
@@ -58,6 +67,12 @@ class Provenance:
     parameters: Mapping[str, float] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     epoch: float = 0.0
+    firmware: str = ""
+
+    @property
+    def autopilot(self) -> str:
+        """The firmware that wrote the log, as far as it or its format tells; "" where no autopilot wrote it."""
+        return self.firmware or _FIRMWARES.get(self.reader, "")
 
     def parameter(self, name: str, *, at: float = math.inf) -> float | None:
         """An autopilot's setting at a time [s], at the end of the log if none is given; None where it is not logged."""

@@ -13,7 +13,7 @@ from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import interpolate
 from swashplate.flights.conditioning.filters import filtered, shortest
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION
+from swashplate.flights.schema import ATTITUDE, LOGGED_UNIT, POSITION, QUATERNION
 
 Interval = tuple[float, float]
 _FASTER = 1.02  # how much faster than the new rate a stream is that needs a filter: more than its stamps' jitter
@@ -253,6 +253,10 @@ def resample(
     uniform = stream(
         np.concatenate(times), {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}, units
     )
+    for data in flight.streams.values():
+        for name, values in data.data_vars.items():
+            if LOGGED_UNIT in values.attrs:
+                uniform[name].attrs[LOGGED_UNIT] = values.attrs[LOGGED_UNIT]
     dropped = [list(piece) for piece in pieces if piece not in kept]
     made = replace(flight, streams={"uniform": uniform}, segments=tuple(segments))
     return made.done(

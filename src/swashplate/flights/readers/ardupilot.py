@@ -148,6 +148,7 @@ def read(source: Source, options: Options) -> Flight:
         NAME,
         VERSION,
         vehicle=told.vehicle,
+        firmware=told.firmware,
         notes=tuple(notes),
         damage=damage,
         parameters=told.parameters,

@@ -41,13 +41,14 @@ class Story:
     """What the log says beside its measurements.
 
     Attributes:
-        vehicle: firmware and frame, as the log names them ("" where it does not).
+        vehicle: firmware and frame, as the log names them ("" where it does not). firmware: that alone.
         parameters: as first reported.
         events: in order of time.
         damage: what the story shows to be missing: a flight or a sweep that does not end.
     """
 
     vehicle: str
+    firmware: str
     parameters: dict[str, float]
     events: tuple[Event, ...]
     damage: tuple[str, ...]
@@ -167,8 +168,12 @@ def _reached(data: MessageTable | None, begin: float, until: float) -> float | N
     return float(own.max()) if own.size else None
 
 
+def _firmware(texts: list[Event]) -> str:
+    return next((e.text for e in texts if re.match(r"Ardu\w+ V|(AP|Ardu)\w*[: ]?(Copter|Plane|Rover|Sub)", e.text)), "")
+
+
 def _vehicle(texts: list[Event]) -> str:
-    firmware = next((e.text for e in texts if re.match(r"Ardu\w+ V|(AP|Ardu)\w* ?(Copter|Plane|Rover)", e.text)), "")
+    firmware = _firmware(texts)
     frame = next((e.text.partition(":")[2].strip() for e in texts if e.text.startswith("Frame:")), "")
     return ", ".join(part for part in (firmware, frame) if part)
 
@@ -186,4 +191,4 @@ def story(messages: Messages, *, end: float) -> Story:
     if arming and arming[-1].kind == "armed":
         damage.append(f"the log is cut off: it ends at {end:.2f} s with the motors armed since {arming[-1].time:.2f} s")
     events = sorted((*changes, *texts, *_modes(messages), *arming, *sweeps), key=lambda event: event.time)
-    return Story(_vehicle(texts), parameters, tuple(events), tuple(damage))
+    return Story(_vehicle(texts), _firmware(texts), parameters, tuple(events), tuple(damage))

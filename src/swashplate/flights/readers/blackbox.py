@@ -74,6 +74,7 @@ def read(source: Source, options: Options) -> Flight:
         NAME,
         VERSION,
         vehicle=" ".join(filter(None, (header.values.get("Craft name", ""), fields.firmware))),
+        firmware=fields.called,
         notes=tuple(notes),
         damage=(*_lost(frames), *main.damage),
         parameters=_parameters(header, own=fields.rotorflight),

@@ -67,6 +67,12 @@ class Fields:
         self.fine = 0.1 if header.number("blackbox_high_resolution") > 0.0 else 1.0
         self.notes: list[str] = []
 
+    @property
+    def called(self) -> str:
+        """The firmware, as the header names it."""
+        known = not self.rotorflight or "rotorflight" in self.firmware.lower()
+        return self.firmware if known else f"Rotorflight {self.firmware}".strip()
+
     def columns(self, values: Mapping[str, Whole]) -> dict[str, tuple[Array, str]]:
         """Numbers and their unit, by channel."""
         columns: dict[str, tuple[Array, str]] = {}

@@ -8,7 +8,7 @@ from dataclasses import replace
 from swashplate.errors import UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight
-from swashplate.flights.schema import LOGGED_UNIT
+from swashplate.flights.schema import LOGGED_UNIT, channel
 from swashplate.registry import listed, nearest
 
 
@@ -41,3 +41,21 @@ def with_units(flight: Flight, given: Mapping[str, str], *, where: str) -> Fligh
         notes.append(f"{name}: taken in {unit}, which was given, and not in {before}, as the log has it")
     told = replace(flight.provenance, notes=(*flight.provenance.notes, *notes))
     return replace(flight.with_streams(streams), provenance=told)
+
+
+def unit_to_give(flight: Flight, name: str, *, sign: str, looks_like: str = "") -> str:
+    """The option that mends a channel: it replaces the unit that the file was read with, sign and all.
+
+    Args:
+        flight, name: the flight, and its channel.
+        sign: "-" where the sign must be turned, "" where it is right.
+        looks_like: the unit that its numbers are in; "" where its own is right.
+    """
+    inside = channel(name).unit
+    own = flight[name].attrs
+    logged = str(own.get(LOGGED_UNIT, "")) or inside or str(own.get("units", "")) or "1"
+    turned, plain = logged.startswith("-"), logged.removeprefix("-")
+    if looks_like and plain != inside:
+        return f"It was read as {logged}; check its unit."
+    signed = "-" if turned != bool(sign) else ""
+    return f"Give --unit {name}={signed}{looks_like or plain}."

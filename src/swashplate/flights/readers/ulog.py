@@ -139,6 +139,7 @@ def read(source: Source, options: Options) -> Flight:
         NAME,
         VERSION,
         vehicle=" ".join(str(info[key]) for key in ("sys_name", "ver_hw", "ver_sw") if key in info),
+        firmware=str(info.get("sys_name", "")),
         notes=tuple(notes),
         damage=tuple(_damage(whole, log)),
         parameters={str(k): float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -19,13 +20,14 @@ _RATE_GAINS = re.compile(
 )
 
 
-def autopilot_gains(flights: Sequence[Flight]) -> dict[str, dict[str, float]]:
-    """Rate gains and filters of the autopilot, where all logs hold them and agree: suggestions start from them."""
+def autopilot_facts(flights: Sequence[Flight]) -> dict[str, Any]:
+    """What suggested gains start from: the autopilot's rate gains and filters where all logs agree, its firmware."""
     said = [flight.provenance for flight in flights]
+    firmware = ", ".join(dict.fromkeys(one.autopilot for one in said if one.autopilot))
     names = (n for n in said[0].parameters if _RATE_GAINS.fullmatch(n))
     values = {n: {one.parameter(n, at=f.stop) for one, f in zip(said, flights, strict=True)} for n in names}
     same = {n: float(v) for n, one in sorted(values.items()) if len(one) == 1 and (v := one.pop()) is not None}
-    return {"autopilot": same} if same else {}
+    return ({"autopilot": same} if same else {}) | ({"firmware": firmware} if firmware else {})
 
 
 def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str, ...]:

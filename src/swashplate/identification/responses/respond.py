@@ -17,7 +17,7 @@ from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.identification.core.record_facts import (
     INJECTED,
-    autopilot_gains,
+    autopilot_facts,
     bystanders_of,
     means,
     slowest_of,
@@ -29,6 +29,7 @@ from swashplate.identification.responses.answers import answer_words
 from swashplate.identification.responses.composite import composite
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.responses.input_shares import own_shares
+from swashplate.identification.responses.moved_from_outside import excitation_of, moved_inputs
 from swashplate.identification.responses.multi_input import (
     Conditioned,
     condition_spectra,
@@ -37,6 +38,7 @@ from swashplate.identification.responses.multi_input import (
 from swashplate.identification.responses.own_references import own_references
 from swashplate.identification.responses.references import reference_columns, sweeps_of
 from swashplate.identification.responses.resolution import LONGER, TWICED, blur, first_guess, without
+from swashplate.identification.responses.signs import sign_problems
 from swashplate.identification.responses.spectra import Signals, SpectralMatrix, signals, spectral_matrix
 from swashplate.identification.responses.window_lengths import Windows, choose_windows
 
@@ -168,9 +170,12 @@ def respond(
         for name in response_warnings.still(flights, references)
     ]
     told = any(event.kind == "sweep" for flight in flights for event in flight.provenance.events)
+    answers: list[str] = []
     if not question.references and not told:
         answers = answer_words(pieces, inputs, outputs)
-        problems += [] if answers and any(map(sweeps, flights)) else answers
+        answers = [] if answers and any(map(sweeps, flights)) else answers
+        problems += answers
+    moved = excitation_of(inputs, references=references, swept=tracked.swept if tracked else (), answers=answers)
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
         beside = _composed(matrices, omega, replace(question, references=0), [None] * len(matrices))
@@ -189,6 +194,8 @@ def respond(
     problems += response_warnings.correlated(made, dead=unmoved)
     warnings += response_warnings.untold(made, dead=unmoved)
     problems += response_warnings.incoherent(made)
+    channels = renamed_channels(flights, (*inputs, *outputs))
+    problems += sign_problems(made.select(outputs, moved_inputs(moved)), flights[0], called=channels)
     if not references:
         axes = len({int(k) for labels in sweep for k in np.unique(labels) if k >= 0})
         warnings += response_warnings.unused_references(flights, inputs, names=INJECTED, axes=axes)
@@ -209,8 +216,9 @@ def respond(
             "references": list(references),
             **({"sweeps": list(tracked.sweeps)} if tracked else {}),
             "averages": [m.averages for m in matrices],
-            **({"channels": called} if (called := renamed_channels(flights, (*inputs, *outputs))) else {}),
-            **autopilot_gains(flights),
+            **({"channels": channels} if channels else {}),
+            "excitation": moved,
+            **autopilot_facts(flights),
             "hashes": hashes(flights),
             "means": means(flights, (*inputs, *outputs)),
         },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,8 @@ def test_second_opinions_get_a_suffix_and_unused_channels_are_left_out(tmp_path:
 def test_parameters_events_and_the_sweep_are_kept(tmp_path: Path) -> None:
     provenance = _flight(tmp_path, dataflash(ardupilot_rows())).provenance
     assert provenance.vehicle == "ArduCopter V4.7.0-dev (1234abcd), HELI"
+    assert provenance.firmware == provenance.autopilot == "ArduCopter V4.7.0-dev (1234abcd)"
+    assert replace(provenance, firmware="").autopilot == "ArduPilot", "the format tells that much"
     assert provenance.parameters == {"SID_AXIS": 10.0, "SCHED_LOOP_RATE": 400.0}
     assert provenance.parameter("SID_AXIS", at=25.0) == 10.0
     assert provenance.parameter("SID_AXIS") == 11.0
