@@ -12,7 +12,10 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.frequency.response_cost import cost_of, target
 from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
+from swashplate.identification.frequency.transfer_function_forms import BAND, suggest
 from swashplate.identification.responses.respond import respond
+from swashplate.identification.responses.signs import response_sign
+from swashplate.models.linear.transfer_function import Form
 from swashplate.validation.verify import verify_inside
 
 
@@ -50,6 +53,27 @@ def test_x8_second_order_model_of_one_half_answers_as_the_other_half(shared_data
     assert verified.verdict == "cannot be judged", verified
     assert verified.inside["p"].theil < 0.15
     assert not verified.good
+
+
+def test_no_unstable_model_is_suggested_of_the_stable_x8(shared_data: Path) -> None:
+    """Cut to its sweep, the slow end is the loop's answer to gusts, and the best form of it all is unstable."""
+    forms = [Form(0, 1), Form(0, 1, 1), Form(0, 2), Form(1, 2), Form(2, 4)]
+    cut = respond(x8(shared_data, slice(34, 7087)), inputs=["command"], outputs=["p"], band=(0.0917, 14.0))
+    best, trials = suggest(cut, input="command", forms=forms)
+    over_all = min((t for t in trials if not t.unsound), key=lambda t: t.cost)
+    assert over_all.unstable > 1.0
+    assert best.unstable == 0.0
+    assert best.cost < 20.0
+    assert best.fit.settings[BAND][0] > 0.6
+    assert any("a stable form follows" in text for text in best.fit.warnings)
+    whole = respond(x8(shared_data, slice(None)), inputs=["command"], outputs=["p"], band=(0.0917, 14.0))
+    other, _ = suggest(whole, input="command", forms=forms)
+    assert other.form == best.form
+    for name in ("K", "pole"):
+        assert best.fit[name].value == pytest.approx(other.fit[name].value, rel=0.05)
+    sign = response_sign(cut, "p", "command", expected=1, integrations=1)
+    assert sign.told == 0, "where loop and sweep mix, no sign is told"
+    assert response_sign(whole, "p", "command", expected=1, integrations=1).told == 1
 
 
 def test_trex_tells_what_it_cannot(shared_data: Path) -> None:

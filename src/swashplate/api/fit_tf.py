@@ -15,7 +15,7 @@ from swashplate.identification.frequency.transfer_function_fit import (
     as_state_space,
     fit_transfer_function,
 )
-from swashplate.identification.frequency.transfer_function_forms import TriedStructure, suggest
+from swashplate.identification.frequency.transfer_function_forms import BAND, TriedStructure, suggest
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.transfer_function import Form
 from swashplate.reporting.sections_responses import ResponseMaterial
@@ -71,7 +71,7 @@ def fit_tf(
             least_coherence=least_coherence,
             tell=lambda done, total: say("fitting", done=done, total=total),
         )
-        fit = best.fit
+        fit, band = best.fit, best.fit.settings.get(BAND, band)
     else:
         fit = fit_transfer_function(
             responses,

@@ -6,18 +6,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from swashplate.identification.core.result import Estimate, percent
-from swashplate.identification.frequency.response_cost import Target
+from swashplate.identification.frequency.response_cost import ACCEPTABLE, Target
 from swashplate.identification.frequency.transfer_function_fit import (
     TransferFunctionFit,
     as_told,
     fit_form,
     targets_of,
 )
-from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.models.linear.transfer_function import USUAL, Form
 
 UNTOLD = 100.0
 """Percent of Cramér-Rao bound above which a parameter speaks against its form."""
+_WIDE = 4.0
+"""Highest over lowest frequency that must be left above an unstable mode for a form to be fitted there."""
+_STILL = 1e-9
+BAND = "band_hz"
+"""Setting of a fit whose form was suggested for a part of the band only: that part [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,11 @@ class TriedStructure:
     cost: float
     fit: TransferFunctionFit
     unsound: str = ""
+
+    @property
+    def unstable(self) -> float:
+        """Size of the fastest pole that grows [rad/s]; 0 for a stable form."""
+        return max((abs(pole) for pole in self.fit.solution[0].poles if pole.real > _STILL), default=0.0)
 
 
 def suggest(
@@ -49,10 +59,51 @@ def suggest(
     (the pair of Tischler and Remple's "acceptable" and "indistinguishable" lies a factor of two apart). `tell` hears
     how many structures of how many are done.
 
+    An unstable one is suggested only where no stable one costs hardly more. A loop's answer to gusts, below a sweep,
+    looks like an unstable aircraft: where no recorded reference rules it out and a stable form is acceptable from twice
+    the unstable mode's frequency on, that one is suggested, with its band.
+
     Returns:
         The suggestion, and all trials by number of parameters.
     """
     wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
+    trials = _trials(wanted, forms, responses, seed=seed, tell=tell)
+    best = _pick(trials)
+    if best.unstable:
+        low = float(2.0 * best.unstable / TWO_PI)
+        stable: list[TriedStructure] = []
+        if responses.method != "joint" and all(t.omega[-1] >= _WIDE * TWO_PI * low for t in wanted):
+            ends = (low, _highest(wanted))
+            above = targets_of(responses, input=input, outputs=outputs, band=ends, least=least_coherence)
+            upper = _trials(above, forms, responses, seed=seed)
+            stable = [t for t in upper if not t.unstable and not t.unsound and t.cost <= ACCEPTABLE]
+        if stable:
+            best = _said(_pick(stable), _BELOW.format(low, best.unstable, best.cost))
+            best = replace(best, fit=replace(best.fit, settings={**best.fit.settings, BAND: [low, _highest(wanted)]}))
+        else:
+            others = min((t.cost for t in trials if not t.unstable), default=float("inf"))
+            best = _said(best, f"the data demand an unstable model: the best stable form tried has J = {others:.1f}.")
+    if best.unsound:
+        lacks = "no form that was tried has" if all(t.unsound for t in trials) else "no stable form that follows has"
+        best = _said(best, f"{lacks} all its parameters told; of this one, {best.unsound}.")
+    return best, tuple(trials)
+
+
+_BELOW = (
+    "from {:.2g} Hz on a stable form follows. Below, the response is that of an unstable mode of {:.2g} rad/s "
+    "(J = {:.1f} over the whole band), or what a loop makes of gusts: not of this form. --form fits all of it."
+)
+
+
+def _trials(
+    wanted: Sequence[Target],
+    forms: Sequence[Form],
+    responses: FrequencyResponse,
+    *,
+    seed: int,
+    tell: Callable[[int, int], None] | None = None,
+) -> list[TriedStructure]:
+    """All forms, by number of parameters."""
     trials = []
     for k, form in enumerate(forms):
         if tell is not None:
@@ -62,14 +113,24 @@ def suggest(
         if trial.unsound and {p.name for p in _vague(trial.fit)} <= delays:
             trial = _tried(wanted, replace(form, delay=False), responses, seed=seed)
         trials.append(trial)
-    trials.sort(key=lambda trial: (trial.parameters, trial.cost))
-    sound = [trial for trial in trials if not trial.unsound] or trials
+    return sorted(trials, key=lambda trial: (trial.parameters, trial.cost))
+
+
+def _pick(trials: Sequence[TriedStructure]) -> TriedStructure:
+    """The simplest sound one that costs hardly more than the best; a stable one, even if vague, before an unstable."""
+    sound = [trial for trial in trials if not trial.unsound] or list(trials)
     least = min(trial.cost for trial in sound)
-    best = next(trial for trial in sound if trial.cost <= max(1.5 * least, least + 10.0))
-    if best.unsound:
-        words = f"no form that was tried has all its parameters told; of this one, {best.unsound}."
-        best = replace(best, fit=replace(best.fit, warnings=(*best.fit.warnings, words)))
-    return best, tuple(trials)
+    near = max(1.5 * least, least + 10.0)
+    of_these = [t for t in sound if t.cost <= near]
+    return min((*of_these, *(t for t in trials if t.cost <= near)), key=lambda t: t.unstable > 0.0)
+
+
+def _highest(targets: Sequence[Target]) -> float:
+    return max(float(t.omega[-1]) for t in targets) / TWO_PI
+
+
+def _said(trial: TriedStructure, words: str) -> TriedStructure:
+    return replace(trial, fit=replace(trial.fit, warnings=(*trial.fit.warnings, words)))
 
 
 def _tried(wanted: Sequence[Target], form: Form, responses: FrequencyResponse, *, seed: int) -> TriedStructure:

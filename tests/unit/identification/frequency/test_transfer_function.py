@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.frequency.handling import attitude_of, handling_qualities, margins
 from swashplate.identification.frequency.response_cost import ResponseCost, cost_of, target
 from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
-from swashplate.identification.frequency.transfer_function_forms import suggest
+from swashplate.identification.frequency.transfer_function_forms import BAND, suggest
 from swashplate.identification.frequency.unnoticeable_dynamics import envelopes, mismatch
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.transfer_function import Form, TransferFunction
@@ -134,6 +135,44 @@ def test_no_form_is_suggested_whose_parameters_are_not_told() -> None:
     assert not any("no form that was tried" in text for text in best.fit.warnings)
     only, _ = suggest(responses, input="stick", forms=[Form(2, 3)])
     assert any("no form that was tried has all its parameters told" in text for text in only.fit.warnings)
+
+
+UNSTABLE = TransferFunction(Form(0, 1), {"K": 20.0, "tau": 0.03, "pole": -3.0}, "rate", "stick")
+STABLE = TransferFunction(Form(0, 1), {"K": 20.0, "tau": 0.03, "pole": 6.0}, "rate", "stick")
+
+
+def test_an_unstable_form_is_suggested_only_where_the_data_demand_it() -> None:
+    """A recorded reference rules a loop's answer out: what is left is the aircraft, and it is said."""
+    forms = [Form(0, 0), Form(0, 1), Form(0, 2), Form(1, 2)]
+    joint = replace(exact(UNSTABLE, noise=0.01), method="joint")
+    best, trials = suggest(joint, input="stick", forms=forms)
+    assert best.unstable == pytest.approx(3.0, rel=0.05)
+    assert any("the data demand an unstable model" in text for text in best.fit.warnings)
+    assert min(t.cost for t in trials if not t.unstable) > 100.0
+    stable, trials = suggest(exact(STABLE, noise=0.01), input="stick", forms=forms)
+    assert stable.unstable == 0.0
+    assert not any("unstable" in text for text in stable.fit.warnings)
+    assert BAND not in stable.fit.settings
+
+
+def test_what_a_loop_makes_of_gusts_below_a_sweep_is_no_unstable_aircraft() -> None:
+    """Below 0.7 Hz gusts rule, and the response is minus the inverse of the controller 0.1 + 0.2/s, as a real X8's."""
+    s = 1j * OMEGA
+    swept = 1.0 / (1.0 + (2.0 * np.pi * 0.7 / OMEGA) ** 8)
+    true = STABLE.response(OMEGA)
+    mixed = swept * true - (1.0 - swept) / (0.1 + 0.2 / s)
+    seen = replace(exact(STABLE), response=mixed[:, None, None])
+    best, trials = suggest(seen, input="stick")
+    whole = min((t for t in trials if not t.unsound), key=lambda t: t.cost)
+    assert whole.unstable > 1.0, "over the whole band the best form is unstable"
+    assert best.unstable == 0.0
+    assert 0.4 < best.fit.settings[BAND][0] < 2.0
+    values = best.fit.solution[0].response(OMEGA[OMEGA > 12.0])
+    assert np.abs(values / true[OMEGA > 12.0] - 1.0).max() < 0.1, "above, it is the aircraft"
+    assert any("what a loop makes of gusts" in text for text in best.fit.warnings)
+    study = sp.fit_tf(seen, input="stick")
+    assert study.fit is not None
+    assert study.fit.targets[0].omega[0] == pytest.approx(2.0 * np.pi * best.fit.settings[BAND][0], rel=0.03)
 
 
 def test_a_delay_that_is_zero_is_left_out_of_a_form() -> None:
