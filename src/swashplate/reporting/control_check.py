@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -57,8 +58,11 @@ def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:
     )
 
 
-def _tone(levels: list[int]) -> str:
-    return _TONES[max(levels)] if levels else "plain"
+def _tone(levels: Sequence[int | None]) -> str:
+    """Of the worst level; no better than a caution where one was not judged, plain where there is nothing."""
+    known = [level for level in levels if level is not None]
+    worst = _TONES[max(known)] if known else "caution"
+    return "plain" if not levels else "caution" if len(known) < len(levels) and worst == "good" else worst
 
 
 def _decibel(factor: float) -> float:
@@ -97,7 +101,9 @@ def _rejection_line(check: ControlCheck) -> tuple[str, str]:
     worst = max(check.rejections, key=lambda r: r.peak)
     levels = [x for r in check.rejections for x in (r.level, r.peak_level) if x is not None]
     names = listed([r.state for r in check.rejections], most=8)
-    return f"{names} are held; largest peak {worst.peak:.1f} dB ({worst.state}).", _tone(levels)
+    unjudged = [r.state for r in check.rejections if r.level is None]
+    beside = f" No standard judges {listed(unjudged, most=8)}." if unjudged else ""
+    return f"{names} are held; largest peak {worst.peak:.1f} dB ({worst.state}).{beside}", _tone(levels)
 
 
 def _handling_line(check: ControlCheck) -> tuple[str, str]:
@@ -109,12 +115,14 @@ def _handling_line(check: ControlCheck) -> tuple[str, str]:
     words = [
         f"{figures.ATTITUDE_WORDS[a.state]} {h.bandwidth.value:.3g} rad/s, Level {a.level or '–'}" for a, h in rows
     ]
-    return f"{'; '.join(words)} (boundaries scaled, not checked).", _tone([a.level for a, _ in rows if a.level])
+    return f"{'; '.join(words)} (boundaries scaled, not checked).", _tone([a.level for a, _ in rows])
 
 
 def _coupling_line(check: ControlCheck) -> tuple[str, str]:
     words = [f"{c.name.split(' (')[0]} {value_words(c.value)} {c.unit}" for c in check.couplings]
-    return f"{'; '.join(words) or 'no step was flown'}.", _tone([c.level for c in check.couplings if c.level])
+    judged = [c.level for c in check.couplings if c.level]
+    beside = f" {len(judged)} of {len(words)} have a standard." if len(judged) < len(words) else ""
+    return f"{'; '.join(words) or 'no step was flown'}.{beside}", _tone(judged)
 
 
 def _level(level: int | None) -> Cell:

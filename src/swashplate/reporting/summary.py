@@ -114,8 +114,9 @@ _AXES = (("phi", "roll"), ("theta", "pitch"), ("p", "roll rate"), ("q", "pitch r
 def _verdict(validation: Validation) -> Line:
     by_level = {level: [v.axis for v in validation.verdict if v.level == level] for level in _LEVELS}
     words = [f"{level}: {', '.join(axes)}" for level, axes in by_level.items() if axes]
-    worst = next((level for level in ("poor", "usable", "good") if by_level[level]), "")
-    return "Verdict", ("; ".join(words) or "no axis was judged") + ".", _TONES.get(worst, "plain")
+    # What nobody judged is nothing good: the bar is green only where every axis is.
+    worst = next((level for level in ("poor", "usable", "cannot be judged", "good") if by_level[level]), "")
+    return "Verdict", ("; ".join(words) or "no axis was judged") + ".", _TONES.get(worst, "caution")
 
 
 def _changes(fit: Result[Any, Any]) -> Line:

@@ -29,6 +29,7 @@ from swashplate.reporting.theme import packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash
 from swashplate.reporting.words import noise_told, plain_words, sigma_words, span_words, step_words, value_words
 from swashplate.validation.prediction import HORIZONS
+from swashplate.validation.validation import AxisVerdict
 
 
 @given(
@@ -174,6 +175,21 @@ def test_summary_praises_the_model_only_where_it_beats_every_rival() -> None:
     )
     tones = {label: tone for label, _, tone in compose(None, replace(good, scores=worse), modes=modes()).summary}
     assert tones["Prediction"] == "caution"
+
+
+def test_the_verdicts_bar_is_green_only_where_every_axis_was_judged() -> None:
+    seen = validation()
+
+    def tone(*levels: str) -> str:
+        verdict = tuple(AxisVerdict(f"axis {k}", level, "") for k, level in enumerate(levels))
+        rows = compose(None, replace(seen, verdict=verdict), modes=modes()).summary
+        return next(tone for label, _, tone in rows if label == "Verdict")
+
+    assert tone("good", "good") == "good"
+    assert tone("good", "good", "cannot be judged", "cannot be judged", "cannot be judged") == "caution"
+    assert tone("cannot be judged") == tone() == "caution"
+    assert tone("usable", "good") == "caution"
+    assert tone("cannot be judged", "poor") == "bad"
 
 
 def test_every_part_is_there() -> None:
