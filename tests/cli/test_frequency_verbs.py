@@ -13,6 +13,7 @@ import pytest
 from commands import one_message, swash
 from scipy import signal
 
+import swashplate as sp
 from swashplate.cli.console import Progress
 from swashplate.identification.time.linear_simulation import delayed
 from swashplate.models.linear.state_space_file import structure
@@ -25,12 +26,19 @@ TRUTH = {
 }  # fmt: skip
 
 
-def log(path: Path, *, seed: int, dead: bool = False, doubled: bool = False, seconds: float = 120.0) -> Path:
-    """A CSV log of a four-state helicopter shaken on both axes, with noise."""
+def log(
+    path: Path, *, seed: int, dead: bool = False, doubled: bool = False, swept: bool = False, seconds: float = 120.0
+) -> Path:
+    """A CSV log of a four-state helicopter shaken on both axes, or swept one after the other, with noise."""
     random = np.random.default_rng(seed)
     n = round(seconds * RATE)
     u = 0.05 * signal.lfilter([0.2], [1.0, -0.8], random.standard_normal((n, 2)), axis=0)
     u[:, 1] = 0.0 if dead else 0.5 * u[:, 0] if doubled else u[:, 1] + 0.4 * u[:, 0]
+    if swept:
+        half = np.arange(n // 2) / RATE
+        sweep = sp.maneuver(f"sweep:mixer_roll,0.2-12Hz,{half[-1] - 4.0:.0f}s,0.05").signals(half - 2.0)["mixer_roll"]
+        u = np.zeros((n, 2))
+        u[: n // 2, 0], u[n - n // 2 :, 1] = sweep, sweep
     a, b, c, _ = structure("rotor_body").with_values(TRUTH).explicit()
     phi, q0, q1 = first_order_hold(a, b, 1 / RATE)
     late = np.column_stack([delayed(column, 5.0) for column in u.T])
@@ -69,9 +77,18 @@ def answered(folder: Path, flown: Path) -> Path:
     return out
 
 
-def test_from_a_log_to_a_model_that_is_verified(folder: Path, answered: Path) -> None:
+@pytest.fixture(scope="module")
+def swept(folder: Path) -> Path:
+    """Responses of a log that sweeps one axis after the other: gains need an input that was moved from outside."""
+    flight, out = log(folder / "swept.csv", seed=5, swept=True), folder / "swept"
+    asked = ("--inputs", "mixer_roll,mixer_pitch", "--outputs", "p,q", "--band", "0.3-11", "--out", out)
+    assert swash("respond", flight, *asked).code == 0
+    return out
+
+
+def test_from_a_log_to_a_model_that_is_verified(folder: Path, swept: Path) -> None:
     out, unseen = folder / "model", log(folder / "unseen.csv", seed=2, seconds=40.0)
-    done = swash("fit-ss", "rotor_body", answered, "--out", out, "--hold-out", unseen, "--gains")
+    done = swash("fit-ss", "rotor_body", swept, "--out", out, "--hold-out", unseen, "--gains")
     assert done.code == 0, done.err
     assert "ATC_RAT_RLL_FF" in done.out
     fit = json.loads((out / "fit.json").read_text(encoding="utf-8"))
@@ -142,8 +159,8 @@ def test_transfer_functions_start_a_model_and_tell_margins(folder: Path, answere
     assert "neither a vehicle's name nor a file" in one_message(refused)
 
 
-def test_gains_come_from_transfer_functions_too_and_their_lack_is_said(answered: Path) -> None:
-    ask = ("fit-tf", answered, "--input", "mixer_roll", "--form", "2/4")
+def test_gains_come_from_transfer_functions_too_and_their_lack_is_said(swept: Path) -> None:
+    ask = ("fit-tf", swept, "--input", "mixer_roll", "--form", "2/4")
     done = swash(*ask, "--outputs", "p", "--gains", "--json")
     assert done.code == 0, done.err
     (roll,) = json.loads(done.out)["gains"]
@@ -151,6 +168,7 @@ def test_gains_come_from_transfer_functions_too_and_their_lack_is_said(answered:
     assert roll["margins"]["gain_margin"][0] >= 6.0
     assert roll["margins"]["gain_margin"][1] > 0.0
     assert roll["flown"] == {}  # a table holds no parameters of an autopilot
+    assert "nothing to compare with" in roll["words"]
     assert "joins no rate with its mixer command" in one_message(swash(*ask, "--outputs", "q", "--gains"))
 
 

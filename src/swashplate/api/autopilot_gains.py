@@ -13,6 +13,7 @@ import numpy as np
 from swashplate.api.link import mapping_of
 from swashplate.atomic import write_text
 from swashplate.control.analysis.cascade_gains import CascadeGains, cascade_gains, judge_cascade
+from swashplate.control.analysis.gain_premises import refused_by_card
 from swashplate.control.controller_file import save_controller
 from swashplate.control.laws.ardupilot.law import FLIGHT_MODES, RATE_OF_LOOPS, ArduPilotLaw, FlightMode
 from swashplate.control.laws.ardupilot.parameters import RENAMED
@@ -73,6 +74,8 @@ class AutopilotGains(Shown):
         gains: those of them that are gains and filters.
         flown: modes flown; empty where none was.
         late: how late commands are taken to be, in words.
+        premise: why the model carries no gains, in words; "" where it does.
+        judged: whether the gains were given, and only judged.
     """
 
     autopilot: AutopilotName
@@ -82,11 +85,15 @@ class AutopilotGains(Shown):
     gains: tuple[str, ...]
     flown: tuple[FlownMode, ...]
     late: str
+    premise: str = ""
+    judged: bool = False
 
     @property
     def problems(self) -> tuple[str, ...]:
         """Why these gains should not be flown; empty where margins hold and the flights stay where they should."""
-        problems = list(self.found.problems)
+        problems = [*filter(None, (self.premise,)), *self.found.problems]
+        if self.judged and self.found.grows:
+            problems.append("If the aircraft flies with these parameters, its flight refutes this model: use neither.")
         for flight in self.flown:
             if flight.fell:
                 problems.append(f"{flight.mode} does not fly: {flight.fell}")
@@ -205,7 +212,8 @@ def autopilot_gains(
         fly: also fly the three modes on the nonlinear model.
 
     Raises:
-        ControllerError: naming the loop for which nothing holds the margins.
+        ControllerError: naming the loop for which nothing holds the margins, the command that the vehicle turns
+            against, or the axis that was fitted although no flight moved it.
         SwashError: where there is no servo mapping.
     """
     if autopilot not in _SUFFIX:
@@ -232,7 +240,17 @@ def autopilot_gains(
         gains = written_gains(design.law)
         lines = {**ardupilot_parameters(mapping, vehicle, hover), **gains}
     flown = tuple(_flown(vehicle, hover, design, mode) for mode in FLIGHT_MODES) if fly else ()
-    return AutopilotGains(autopilot, vehicle.card.title, design, lines, tuple(gains), flown, told)
+    return AutopilotGains(
+        autopilot,
+        vehicle.card.title,
+        design,
+        lines,
+        tuple(gains),
+        flown,
+        told,
+        refused_by_card(vehicle.card),
+        parameters is not None,
+    )
 
 
 def _late(vehicle: Vehicle, given: Mapping[str, float] | float | None) -> tuple[dict[str, float], str]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
 
 from swashplate.control.analysis import ardupilot_gains
 from swashplate.control.analysis.ardupilot_gains import Suggestion
+from swashplate.control.analysis.gain_premises import refused_by_data
 from swashplate.control.analysis.rate_gain_names import ARDUPILOT
 from swashplate.errors import SwashError
 from swashplate.identification.frequency.reading_accuracy import Fitted
@@ -15,7 +16,10 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 def suggest_gains(fit: Fitted, responses: FrequencyResponse) -> tuple[Suggestion, ...]:
     """Rate-loop gains for every axis of a fit, beside those that the log flew with, with margins of both.
 
-    In Rotorflight's names and whole numbers where the log is Rotorflight's, otherwise in ArduPilot's.
+    In Rotorflight's names and whole numbers where the log is Rotorflight's, otherwise in ArduPilot's. An axis whose
+    premises do not hold gets no gains but the reason (`Suggestion.refused`): the log is of another autopilot, the
+    command was not moved from outside, its sign is wrong or not known, the model does not follow the response, or the
+    flown gains are unstable on it.
 
     Args:
         fit: of transfer functions or of a state-space model.
@@ -24,9 +28,12 @@ def suggest_gains(fit: Fitted, responses: FrequencyResponse) -> tuple[Suggestion
     Raises:
         SwashError: no axis joins a rate with its mixer command.
     """
-    settings: dict[str, Any] = dict(responses.settings)
+    settings = responses.settings
     suggestions = ardupilot_gains.suggest_gains(
-        fit, autopilot=settings.get("autopilot"), sources=settings.get("channels")
+        fit,
+        autopilot=settings.get("autopilot"),
+        sources=settings.get("channels"),
+        premise=partial(refused_by_data, fit, responses),
     )
     if not suggestions:
         pairs = ", ".join(f"{rate} with {command}" for rate, command in ARDUPILOT.values())

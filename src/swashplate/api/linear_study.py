@@ -60,10 +60,11 @@ class LinearStudy(ReportFolder):
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What could not be computed, and logs that are damaged; empty where all is well."""
+        """What could not be computed, gains that are refused, logs that are damaged; empty where all is well."""
         own = () if self.fit is None else self.fit.problems
+        refused = tuple(f"{one.axis}: {one.refused}" for one in self.material.gains if one.refused)
         logs = (*(self.fit.data if self.fit else ()), *(self.verification.data if self.verification else ()))
-        return (*own, *dict.fromkeys(damaged(logs)))
+        return (*own, *refused, *dict.fromkeys(damaged(logs)))
 
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON."""

@@ -57,6 +57,7 @@ def fit_ss(
     """Fit a state-space model, with accuracy figures, and verify it in time on flights that the fit has not seen.
 
     Writes report.html, model.toml, fit.json and (with --hold-out) verification.json to --out.
+    Exit code 2 if a fit fails or --gains are refused: the reason is said.
     """
     import swashplate as sp
     from swashplate.cli.reading import asked, read_all

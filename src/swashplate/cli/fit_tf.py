@@ -50,6 +50,7 @@ def fit_tf(
     """Fit transfer functions with a delay; without --form the usual structures are tried and one is suggested.
 
     Writes report.html, fit.json and (where it can be flown) model.toml to --out; --hold-out verifies it in time.
+    Exit code 2 if a fit fails or --gains are refused: the reason is said.
     """
     import swashplate as sp
     from swashplate.cli.reading import asked, read_all

@@ -327,22 +327,31 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
     )
     said = dict.fromkeys(g.words for g in gains)
     firmware = "Rotorflight" if any(g.axis in ROTORFLIGHT for g in gains) else "ArduPilot"
+    refused = {g.words for g in gains if g.refused}
+    words = tuple(
+        Text(f"{', '.join(g.axis for g in gains if g.words == w)}: {w}", tone="bad" if w in refused else "caution")
+        for w in said
+    )
+    tables = (
+        Table(f"Gains ({firmware})", ("parameter", "suggested", "flown"), rows),
+        Table(
+            "The rate loop on the identified model",
+            ("axis", "", "suggested", "flown"),
+            judged,
+            note="If the loop crosses several times, the smallest margin counts. ± follows from the Cramér-Rao "
+            "bounds of the model's parameters. The controller's filters (FLTT, FLTE, FLTD; cutoff) are included. "
+            f"The demand steps at once: {firmware}'s own shaping is not included.",
+        ),
+    )
     return Section(
         "gains",
         "Suggested rate-loop gains",
         (
-            Table(f"Gains ({firmware})", ("parameter", "suggested", "flown"), rows),
-            Table(
-                "The rate loop on the identified model",
-                ("axis", "", "suggested", "flown"),
-                judged,
-                note="If the loop crosses several times, the smallest margin counts. ± follows from the Cramér-Rao "
-                "bounds of the model's parameters. The controller's filters (FLTT, FLTE, FLTD; cutoff) are included. "
-                f"The demand steps at once: {firmware}'s own shaping is not included.",
-            ),
+            *(words if refused else ()),
+            *(table for table in tables if table.rows),
             *(figure for g in gains if (figure := rate_steps_figure(g)) is not None),
             *(Text(f"{g.axis}: {line}") for g in gains for line in g.trade),
-            *(Text(f"{', '.join(g.axis for g in gains if g.words == w)}: {w}", tone="caution") for w in said),
+            *(() if refused else words),
         ),
     )
 

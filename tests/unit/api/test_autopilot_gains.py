@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.api.autopilot_gains import STRAYS, AutopilotGains
+from swashplate.api.link import gains_to_write, mapping_of
 from swashplate.control.analysis.cascade_gains import GAIN_KEPT, PEAK_KEPT, PHASE_KEPT
 from swashplate.errors import ControllerError, LinkError, SwashError
 from swashplate.json_text import as_json
@@ -83,6 +86,38 @@ def test_a_growing_mode_is_told(coax: AutopilotGains) -> None:
     names = ("ATC_RAT_RLL_P", "ATC_RAT_RLL_D", "ATC_RAT_PIT_P", "ATC_RAT_PIT_D")
     worse = judged(coax, **{name: 0.05 * coax.parameters[name] for name in names})
     assert any("A mode grows" in problem for problem in worse.problems), "the bar's own mode, hardly held any more"
+
+
+def test_gains_that_grow_and_fly_refute_the_model(coax: AutopilotGains) -> None:
+    names = ("ATC_RAT_RLL_P", "ATC_RAT_RLL_D", "ATC_RAT_PIT_P", "ATC_RAT_PIT_D")
+    worse = judged(coax, **{name: 0.05 * coax.parameters[name] for name in names})
+    told = [text for text in worse.problems if "its flight refutes this model" in text]
+    assert len(told) == 1
+    assert not any("refutes" in text for text in judged(coax).problems)
+
+
+@pytest.mark.parametrize("axis", ["roll", "pitch"])
+def test_a_travel_of_the_wrong_sign_is_named_and_gets_no_gains(tmp_path: Path, axis: str) -> None:
+    """Mutation of the packaged mapping: one command turns the other way, and it is that one which is named."""
+    text = (files("swashplate.links") / "mappings" / "coax.toml").read_text(encoding="utf-8")
+    turned = tmp_path / "turned.toml"
+    turned.write_text(text.replace("[cyclic]", f"[cyclic]\n{axis}_travel = -1.0"), encoding="utf-8")
+    for given in (None, {"ATC_RAT_RLL_P": 0.1}):
+        with pytest.raises(ControllerError, match=f"a positive {axis} command makes . negative, expected positive"):
+            sp.autopilot_gains(sp.vehicle("coax"), servos=turned, parameters=given, fly=False)
+
+
+def test_an_axis_that_was_fitted_though_nothing_moved_it_gets_no_gains(coax: AutopilotGains) -> None:
+    plain = sp.vehicle("coax")
+    unmoved = plain.with_card(replace(plain.card, observer={"unmoved": {"yaw": 1.0}}))
+    with pytest.raises(ControllerError, match="yaw: fitted although no flight moved it from outside"):
+        sp.autopilot_gains(unmoved, fly=False)
+    told: list[str] = []
+    hover = sp.trim(unmoved, voltage=plain.card.values()["voltage_nominal"])
+    assert gains_to_write(mapping_of(unmoved, None, name="coax", suffix=""), unmoved, hover, notice=told.append) == {}
+    assert "no flight moved it" in told[0]
+    only = sp.autopilot_gains(unmoved, parameters=coax.parameters, fly=False)
+    assert any("no flight moved it" in text for text in only.problems)
 
 
 def test_hand_made_gains_miss_their_margins(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ the loop, and so to the suggestion; Rotorflight's are `roll_p_gain` and its like
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
+from swashplate.control.analysis.gain_changes import gain_changes
+from swashplate.control.analysis.gain_premises import refused_by_flight, refused_by_sign
 from swashplate.control.analysis.rate_gain_names import (
-    ARDUPILOT,
     ROTORFLIGHT,
+    axes_of,
     beware,
     filters_of,
-    firmware_of,
     gain_text,
     names_of,
     representable,
@@ -67,7 +68,7 @@ class Suggestion(Shown):
 
     Attributes:
         axis: "RLL", "PIT" or "YAW"; Rotorflight's are "roll", "pitch", "yaw".
-        parameters: by the firmware's names; none where no gains keep the margins.
+        parameters: by the firmware's names; none where they are refused.
         figures: what they are worth on the model, with what the fit's bounds make of the margins.
         flown: the log's own gains (none where it does not hold them), and what they are worth.
         buys, costs: what the suggestion betters and worsens, from flown to suggested.
@@ -84,6 +85,11 @@ class Suggestion(Shown):
     words: str = ""
     buys: tuple[str, ...] = ()
     costs: tuple[str, ...] = ()
+
+    @property
+    def refused(self) -> str:
+        """Why there are no gains; "" where there are."""
+        return "" if self.parameters else self.words
 
     @property
     def margins(self) -> ResponseMargins:
@@ -110,7 +116,8 @@ class Suggestion(Shown):
 
     def steps(self) -> dict[str, RateSteps]:
         """How the loop answers a step of the demand and a disturbance: "suggested" and "flown", where there are any."""
-        structure, sets = self.loop.structure, {"suggested": self.parameters, "flown": self.flown}
+        judged = {"suggested": (self.parameters, self.peak), "flown": (self.flown, self.flown_peak)}
+        structure, sets = self.loop.structure, {n: k for n, (k, peak) in judged.items() if np.isfinite(peak)}
         if structure is None:
             return {}
         return {
@@ -132,7 +139,8 @@ class Suggestion(Shown):
 
         told: dict[str, Any] = {k: v for k, v in vars(self).items() if k != "loop"}
         told |= {"figures_suggested": read(self.figures_suggested), "figures_flown": read(self.figures_flown)}
-        return told | {"margins": margins(self.figures_suggested), "flown_margins": margins(self.figures_flown)}
+        told |= {"margins": margins(self.figures_suggested), "flown_margins": margins(self.figures_flown)}
+        return told | {"refused": self.refused}
 
     def table(self) -> list[tuple[str, str, str]]:
         """What the loop is worth: a name with its unit, suggested, flown."""
@@ -156,14 +164,19 @@ class Suggestion(Shown):
 
 
 def _told(f: LoopFigures) -> list[tuple[str, str]]:
+    judged = np.isfinite(f.peak)
+
     def number(value: float, scale: float = 1.0) -> str:
         return f"{scale * value:.3g}" if np.isfinite(value) else "-"
 
+    def margin(words: str) -> str:
+        return words if judged else "-"
+
     return [
-        ("phase margin [deg]", f"{f.margins.phase_margin!r}"),
-        ("gain margin [dB]", f"{f.margins.gain_margin!r}"),
-        ("delay margin", f.margins.delay_in_words()),
-        ("crossover [rad/s]", f"{f.margins.crossover!r}"),
+        ("phase margin [deg]", margin(f"{f.margins.phase_margin!r}")),
+        ("gain margin [dB]", margin(f"{f.margins.gain_margin!r}")),
+        ("delay margin", margin(f.margins.delay_in_words())),
+        ("crossover [rad/s]", margin(f"{f.margins.crossover!r}")),
         ("largest sensitivity", number(f.peak)),
         ("bandwidth [rad/s]", number(f.bandwidth)),
         ("disturbance rejection [rad/s]", number(f.rejection)),
@@ -177,6 +190,7 @@ def suggest_gains(
     *,
     autopilot: Mapping[str, float] | None = None,
     sources: Mapping[str, str] | None = None,
+    premise: Callable[[str, str], str] | None = None,
 ) -> tuple[Suggestion, ...]:
     """Feed-forward and gains for every axis whose rate and mixer command the model joins, and what they buy.
 
@@ -185,7 +199,8 @@ def suggest_gains(
     disturbances fastest among all that keep 45 degrees, 6 dB and a sensitivity peak below two at every crossing, with
     the model's own delay and the controller's filters. The demand's filter: the fastest with which a step of the demand
     overshoots by no more than 30 %, or least. Other axes are left open while an axis is judged; the coupling is that
-    with all loops closed. Where nothing that was tried is better than the flown gains, these are kept.
+    with all loops closed. Where nothing that was tried is better than the flown gains, these are kept. No gains are
+    given where a premise does not hold (`gain_premises`).
 
     Args:
         model: a model, or a fit, whose bounds the margins then get.
@@ -193,11 +208,13 @@ def suggest_gains(
             Rotorflight's among them the suggestion is in Rotorflight's names and whole numbers.
         sources: the log's channel behind a model's, where their names differ. A rate of SIDD (`p_sid`) has not passed
             the gyro filter, which the loop has.
+        premise: of a rate and its command, why the data behind the model carry no gains, "" where they do; None for a
+            model whose numbers do not come from data.
     """
     known, behind = dict(autopilot or {}), dict(sources or {})
     fit, answering = (model, model.solution) if isinstance(model, Result) else (None, structure_of(model))
     made = []
-    for axis, (rate, command) in (ROTORFLIGHT if firmware_of(known) == "Rotorflight" else ARDUPILOT).items():
+    for axis, (rate, command) in axes_of(known).items():
         rates = [o for o in answering.outputs if behind.get(o, o) in (rate, f"{rate}_sid")]
         commands = [i for i in answering.inputs if behind.get(i, i) == command]
         if rates and commands:
@@ -205,7 +222,7 @@ def suggest_gains(
             gyro = known.get("INS_GYRO_FILTER", 0.0) if raw else 0.0
             filters = filters_of(axis, known)
             loop = RateLoop(answering, axis, rates[0], commands[0], filters, gyro, _in_time(model), fit)
-            made.append(_suggest(loop, known))
+            made.append(_suggest(loop, known, premise(rates[0], commands[0]) if premise else ""))
     return tuple(_with_words(s, beware(s.axis, known)) for s in _with_coupling(made))
 
 
@@ -217,27 +234,31 @@ def _in_time(model: Vehicle | StateSpaceModel | Fitted) -> StateSpaceModel | Non
         return None
 
 
-def _suggest(loop: RateLoop, known: Mapping[str, float]) -> Suggestion:
+def _suggest(loop: RateLoop, known: Mapping[str, float], refused: str) -> Suggestion:
     names = names_of(loop.axis)
     flown = {name: known[name] for name in names.values() if name in known}
-    unstable = loop.unstable
-    if unstable >= _SLOW:
-        words = (
-            f"none: the model has an unstable mode at {unstable:.3g} rad/s, which no margin of a stable loop judges."
+
+    def none(reason: str, as_flown: LoopFigures = NO_FIGURES) -> Suggestion:
+        return Suggestion(loop.axis, {}, NO_FIGURES, flown, as_flown, loop, f"none: {reason}")
+
+    if refused:
+        return none(refused)
+    if loop.unstable >= _SLOW:
+        return none(
+            f"the model has an unstable mode at {loop.unstable:.3g} rad/s, which no margin of a stable loop judges."
         )
-        return Suggestion(loop.axis, {}, NO_FIGURES, flown, NO_FIGURES, loop, words)
     omega = _judged_at(loop)
     as_flown = loop.figures(flown, omega) if names["P"] in flown else NO_FIGURES
+    if refuted := refused_by_flight(flown, as_flown.margins):
+        return none(refuted)
     gains = _best(loop, omega)
     if gains is None:
-        words = (
-            f"none: no gains tried that the firmware can hold keep {PHASE_MARGIN:g} degrees, {GAIN_MARGIN:g} dB and a "
-            f"sensitivity of {PEAK:g}."
-        )
-        return Suggestion(loop.axis, {}, NO_FIGURES, flown, as_flown, loop, words)
+        told = f"{PHASE_MARGIN:g} degrees, {GAIN_MARGIN:g} dB and a sensitivity of {PEAK:g}"
+        return none(f"no gains tried that the firmware can hold keep {told}.", as_flown)
+    if turned := refused_by_sign(short(gains)):
+        return none(turned, as_flown)
     suggestion = Suggestion(loop.axis, gains, loop.figures(gains, omega), flown, as_flown, loop)
-    better = [name for name, good, _ in _changes(suggestion) if good]
-    if flown and not better and bool(_keep(_loops(loop, _as_rows(flown), omega))[0]):
+    if np.isfinite(as_flown.peak) and not any(good for _, good in gain_changes(as_flown, suggestion.figures_suggested)):
         return replace(suggestion, parameters=flown, figures_suggested=as_flown)
     return suggestion
 
@@ -292,10 +313,6 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
     return written(loop.axis, chosen)
 
 
-def _as_rows(gains: Mapping[str, float]) -> dict[str, Array]:
-    return {name: np.array([value]) for name, value in short(gains).items()}
-
-
 def _loops(loop: RateLoop, grid: Mapping[str, Array], omega: Array) -> Complex:
     """Broken loops of m sets of gains, shape (m, n)."""
     size = max(value.size for value in grid.values())
@@ -334,54 +351,14 @@ def _with_coupling(made: Sequence[Suggestion]) -> list[Suggestion]:
     return suggestions
 
 
-_CHANGES = (
-    # what, unit, scale, better if larger, smallest change that is named (of a number, or of its flown size)
-    ("phase margin", "deg", 1.0, True, 3.0, False),
-    ("gain margin", "dB", 1.0, True, 0.5, False),
-    ("delay margin", "ms", 1e3, True, 0.05, True),
-    ("largest sensitivity", "", 1.0, False, 0.05, True),
-    ("bandwidth", "rad/s", 1.0, True, 0.05, True),
-    ("disturbance rejection", "rad/s", 1.0, True, 0.05, True),
-    ("overshoot of a step", "%", 100.0, False, 5.0, False),
-    ("coupling", "", 1.0, False, 0.1, True),
-)
-
-
-def _changes(s: Suggestion) -> list[tuple[str, bool, float]]:
-    """What differs between flown and suggested by more than it matters: words, whether better, by how much."""
-    if not (np.isfinite(s.peak) and np.isfinite(s.flown_peak)):
-        return []
-    changes = []
-    columns = [
-        (f.margins.phase_margin.value, f.margins.gain_margin.value, f.margins.delay_margin.value, f.peak,
-         f.bandwidth, f.rejection, f.overshoot, f.coupling)
-        for f in (s.figures_flown, s.figures_suggested)
-    ]  # fmt: skip
-    for (what, unit, scale, larger, least, relative), before, after in zip(_CHANGES, *columns, strict=True):
-        if unit == "ms" and max(before, after) >= 1.0:
-            scale, unit = 1.0, "s"
-        change = scale * (after - before)
-        if not abs(change) >= (least * abs(scale * before) if relative else least):
-            continue  # NaN is no change either
-        words = f"{what} {_plain(scale * before)} -> {_plain(scale * after)} {unit}".rstrip()
-        changes.append((words, (change > 0.0) == larger, change))
-    return changes
-
-
-def _plain(value: float) -> str:
-    """Three digits, without a power of ten where it is long."""
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
-
-
 def _with_words(s: Suggestion, besides: str) -> Suggestion:
     if s.words:
         return s
     if s.parameters == s.flown:
-        words = "The flown gains are kept: they keep the margins, and nothing that was tried is better."
-        return replace(s, words=words + besides)
-    changes = _changes(s)
-    buys = tuple(words for words, good, _ in changes if good)
-    costs = tuple(words for words, good, _ in changes if not good)
+        return replace(s, words=f"Keep what you fly: nothing that was tried is better.{besides}")
+    changes = gain_changes(s.figures_flown, s.figures_suggested)
+    buys = tuple(words for words, good in changes if good)
+    costs = tuple(words for words, good in changes if not good)
     words = (
         f"Keeps {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g} dB on the model, one axis at a time. Fly the feed-forward "
         "first with P, I and D at a third, then raise them."
@@ -389,6 +366,8 @@ def _with_words(s: Suggestion, besides: str) -> Suggestion:
     if s.figures_suggested.overshoot > OVERSHOOT:
         size = f"{100.0 * s.figures_suggested.overshoot:.0f} %"
         words += f" A step of the demand overshoots by {size} with the slowest filter tried: give it soft demands."
+    if not s.flown:
+        words += " The log holds no flown gains: there is nothing to compare with."
     words += besides
     if not np.isfinite(s.loop.steady):
         words += " Under a steady command the rate settles slowly or not at all: no feed-forward."

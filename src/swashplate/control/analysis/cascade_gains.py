@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.control.analysis.cascade import (
     COARSE,
+    COMMANDS,
     OUTPUTS,
     BrokenLoops,
     CascadePlant,
@@ -24,6 +25,7 @@ from swashplate.control.analysis.cascade import (
     cascade_plant,
     feedback,
 )
+from swashplate.control.analysis.gain_premises import refuse_turned_commands, refused_by_card
 from swashplate.control.analysis.sampled_loop import sampled_loop
 from swashplate.control.analysis.stability import modes_of
 from swashplate.control.laws.ardupilot.law import ArduPilotLaw, FlightMode
@@ -106,6 +108,11 @@ class CascadeGains:
     delays: Mapping[str, float]
 
     @property
+    def grows(self) -> bool:
+        """Whether a mode grows with these gains."""
+        return self.slowest.real > _EPS
+
+    @property
     def problems(self) -> tuple[str, ...]:
         """Where margins are missed or a mode grows, in words."""
         problems = [
@@ -114,7 +121,7 @@ class CascadeGains:
             for loop in self.loops
             if not loop.holds
         ]
-        if self.slowest.real > _EPS:
+        if self.grows:
             problems.append(f"A mode grows: {self.slowest.real:+.3g} +- {abs(self.slowest.imag):.3g}j 1/s.")
         return tuple(problems)
 
@@ -126,9 +133,13 @@ def judge_cascade(vehicle: Vehicle, hover: Trim, law: ArduPilotLaw, *, delays: M
         vehicle, hover: what flies, its hover.
         law: with its gains.
         delays: from command to actuator, by input [s].
+
+    Raises:
+        ControllerError: naming the command that the vehicle turns against.
     """
     k, late = law.parameters, _row(vehicle, delays)
     plant = cascade_plant(vehicle, hover, law.mixer, k, rate=law.rate, delays=late)
+    refuse_turned_commands(plant.omega, plant.response, commands=COMMANDS, outputs=OUTPUTS, where=vehicle.name)
     whole, inner = feedback(plant.omega, k), feedback(plant.omega, k, place=False)
     commands, leans = broken_at_commands(plant, whole, (0, 1, 2, 3)), broken_at_leans(plant, inner, whole)
     names = ("roll", "pitch", "yaw", "height")
@@ -146,12 +157,16 @@ def cascade_gains(vehicle: Vehicle, hover: Trim, start: ArduPilotLaw, *, delays:
         delays: from command to actuator, by input [s].
 
     Raises:
-        ControllerError: naming the stage at which nothing that was tried holds the margins.
+        ControllerError: naming the stage at which nothing that was tried holds the margins, the command that the
+            vehicle turns against, or the axis that was fitted although no flight moved it.
     """
+    if unmoved := refused_by_card(vehicle.card):
+        raise ControllerError(f"no gains are given: {unmoved}", where=vehicle.name)
     late = _row(vehicle, delays)
     open_loops = {f"ATC_RAT_{axis}_{name}": 0.0 for axis in AXES for name in "PID"}
     k: dict[str, float] = {**start.parameters, **open_loops}
     plant = cascade_plant(vehicle, hover, start.mixer, k, rate=start.rate, delays=late, omega=COARSE)
+    refuse_turned_commands(plant.omega, plant.response, commands=COMMANDS, outputs=OUTPUTS, where=vehicle.name)
     law = start
 
     def settle(stage: str, mode: FlightMode, sets: Mapping[str, Array], broken: Callable[..., BrokenLoops]) -> None:

@@ -17,6 +17,8 @@ from swashplate.arrays import Array
 ARDUPILOT = {"RLL": ("p", "mixer_roll"), "PIT": ("q", "mixer_pitch"), "YAW": ("r", "mixer_yaw")}
 """Rate and mixer command by the axis' name."""
 ROTORFLIGHT = {"roll": ("p", "mixer_roll"), "pitch": ("q", "mixer_pitch"), "yaw": ("r", "mixer_yaw")}
+_COPTERS, _UNSAID = ("arducopter", "apm:copter", "apm copter"), "ardupilot"
+"""What a firmware that has ATC_RAT_* calls itself, and what a log of ArduPilot is said to be that names none."""
 _SCALES = {
     "roll": {"P": 6.66666e-6, "I": 2e-4, "D": 1e-7, "FF": 2.5e-5},
     "pitch": {"P": 6.66666e-6, "I": 2e-4, "D": 1e-6, "FF": 2.5e-5},
@@ -32,9 +34,27 @@ _FILTER = 20.0  # Hz: FLTE where the log does not say it, and FLTD of a suggesti
 _GYRO, _SLOPE = (50.0, 50.0, 100.0), (15.0, 15.0, 20.0)  # Hz: Rotorflight's own, where the log does not say them
 
 
-def firmware_of(known: Mapping[str, float]) -> str:
-    """Whose parameters a log holds: "Rotorflight" or, where nothing says so, "ArduPilot"."""
-    return "Rotorflight" if any(f"{axis}_p_gain" in known for axis in ROTORFLIGHT) else "ArduPilot"
+def axes_of(known: Mapping[str, float]) -> Mapping[str, tuple[str, str]]:
+    """Axes with their rate and command, by the names of the firmware whose gains a log holds; else ArduPilot's."""
+    return ROTORFLIGHT if any(f"{axis}_p_gain" in known for axis in ROTORFLIGHT) else ARDUPILOT
+
+
+def untuned(firmware: str, known: Mapping[str, float]) -> str:
+    """Why no gains can be suggested by name for a log, in words; "" where they can.
+
+    Args:
+        firmware: of its autopilot, "" where no autopilot wrote it.
+        known: the gains and filters that the log holds, by name.
+    """
+    ours, whose = axes_of(known), firmware.lower()
+    if ours is ROTORFLIGHT or not firmware or any(word in whose for word in _COPTERS):
+        return ""
+    if "rotorflight" in whose:
+        return f"{firmware}: its header does not hold five gains an axis, and the scales of others are not known."
+    if whose == _UNSAID and any(f"ATC_RAT_{axis}_P" in known for axis in ARDUPILOT):
+        return ""
+    who = "an ArduPilot vehicle that the log does not name" if whose == _UNSAID else firmware
+    return f"{who} flew this log, none that this program tunes: gains have the names of ArduCopter or of Rotorflight."
 
 
 def names_of(axis: str) -> dict[str, str]:

@@ -40,9 +40,10 @@ class LoopFigures:
 
     Attributes:
         margins: of the broken loop, the least of each. peak: largest sensitivity |1 / (1 + L)|.
-        bandwidth: where the rate follows its demand by -3 dB for the first time [rad/s].
+        bandwidth: where the rate follows its demand by -3 dB for the first time [rad/s]; 0 where it never does,
+            infinite where it does to the end of what is judged.
         rejection: up to where a disturbance of the rate is halved in power: |1 / (1 + L)| = -3 dB [rad/s]; the
-            disturbance rejection bandwidth of ADS-79 (definition from memory).
+            disturbance rejection bandwidth of ADS-79 (definition from memory). 0 where none is.
         overshoot: of the rate beyond a demand that steps at once, 1 is all of it; NaN where the loop is unstable or the
             model cannot be stepped.
         coupling: largest answer of another rate to this axis' demand, over the demand, with all axes' loops closed; NaN
@@ -180,11 +181,12 @@ def _first_order(s: Complex, hertz: float) -> Complex | float:
 
 
 def _first_below(omega: Array, size: Array, level: float) -> float:
-    """Where a gain falls through a level for good at the first time; NaN where it starts below or never does."""
+    """Where a gain first falls through a level; 0 where it starts below, infinite where it never does."""
     below = np.flatnonzero(size < level)
-    return float(omega[below[0]]) if below.size and below[0] > 0 else NAN
+    return float(omega[below[0]]) * bool(below[0] > 0) if below.size else np.inf
 
 
 def _first_above(omega: Array, size: Array, level: float) -> float:
+    """Where a gain first rises through a level; 0 where it starts above, infinite where it never does."""
     above = np.flatnonzero(size > level)
-    return float(omega[above[0]]) if above.size and above[0] > 0 else NAN
+    return float(omega[above[0]]) * bool(above[0] > 0) if above.size else np.inf

@@ -28,6 +28,7 @@ ANGLES = {"p": "phi", "q": "theta", "r": "psi"}
 OWN = 0.25
 """Share of an output's power that an input must have made for the output's axis to be its own."""
 
+_NO_LOOP = "no delay margin: a loop that flew is stable, so this is no broken loop, or its sign is turned"
 _WIDE = np.geomspace(0.3, 300.0, 800)
 _Kind = TypeVar("_Kind", Handling, ResponseMargins)
 
@@ -57,7 +58,8 @@ class Line:
         if isinstance(r, ResponseMargins):
             head += f"crossover {r.crossover!r} rad/s, phase margin {r.phase_margin!r} deg, "
             head += f"gain margin {r.gain_margin!r} dB at {r.omega_180!r} rad/s, "
-            return head + f"delay margin {r.delay_in_words()}"
+            flew = self.source == "flight" and r.delay_margin.value == 0.0
+            return head + (_NO_LOOP if flew else f"delay margin {r.delay_in_words()}")
         if r is None:
             return head + self.problem
         return head + f"bandwidth {r.bandwidth!r} rad/s, phase delay {r.phase_delay_line!r} s"

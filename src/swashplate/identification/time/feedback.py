@@ -8,7 +8,7 @@ so the motion that follows then explains it better still, which it does not wher
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -160,6 +160,23 @@ def _words(
         f"{axis}: {share}: it is a controller's answer, and this record cannot tell the {axis} dynamics from the "
         f"controller. Add an independent sweep or multisine to the {axis} reference and log rotor speed and voltage."
     )
+
+
+UNMOVED = "unmoved"
+"""Section of an identified card: axes that were fitted although no flight moved them from outside."""
+
+
+def mark_unmoved(vehicle: Vehicle, free: Collection[str], axes: Sequence[AxisExcitation]) -> Vehicle:
+    """The identified vehicle whose card names the axes that were fitted although no flight moved them by itself.
+
+    Args:
+        free: names that the fit moved. axes: how each record moves each axis.
+    """
+    moved = {item.axis for item in axes if item.identifiable}
+    fitted = [axis.name for axis in vehicle.traits.axes if axes and set(axis.parameters) & set(free)]
+    unmoved = {name: 1.0 for name in fitted if name not in moved}
+    card = vehicle.card
+    return vehicle.with_card(replace(card, observer={**card.observer, UNMOVED: unmoved})) if unmoved else vehicle
 
 
 def hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> tuple[Parameterization, list[str]]:

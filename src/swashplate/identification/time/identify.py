@@ -133,6 +133,7 @@ def identify_flight(
     nuisances = likelihood.nuisances_of(row)
     nuisance = mean_nuisance(nuisances)
     identified = _identified(best, noise, nuisance, began, every, pieces, by.method)
+    identified = feedback.mark_unmoved(identified, [item.name for item in table.free], axes)
     done = "filter by" if isinstance(likelihood, PredictionError) else "simulated by"
     settings: dict[str, Any] = {done: likelihood.compiled_by}
     if residual is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -93,8 +93,8 @@ def identify_sweep(
             *(study.fit.warnings if study.fit else ()),
         ],
         "verification": _verified(study, chosen, seen),
-        "gains": [_gains(suggestion) for suggestion in study.material.gains],
-        "no_gains": gained,
+        "gains": [_gains(suggestion) for suggestion in study.material.gains if not suggestion.refused],
+        "no_gains": " ".join(filter(None, (gained, *(_refused(one) for one in study.material.gains)))),
         "code": code.as_dict(),
     }
     files = _files(study, responses, records[0], flight.between(start, stop), folder)
@@ -106,6 +106,7 @@ def _study(responses: Any, chosen: Channels, unseen: Flight, say: Callable[..., 
     fit_tf = resolve("fit_tf")
     study = fit_tf(responses, input=chosen.input, say=say)
     form = str(study.material.transfer_functions[0].details.form.text)
+    band = study.fit.settings.get("band_hz")
     held = (unseen,) if study.structure is not None else ()
     words, gains = "", True
     try:
@@ -113,7 +114,8 @@ def _study(responses: Any, chosen: Channels, unseen: Flight, say: Callable[..., 
     except SwashError as error:
         words, gains = f"{error.problem} {error.hint or ''}", False
     # Once more with the form that was chosen: the same fit, with what is asked of it.
-    made = fit_tf(responses, input=chosen.input, form=form, gains=gains, hold_out=held)
+    made = fit_tf(responses, input=chosen.input, form=form, band=band, gains=gains, hold_out=held)
+    made = replace(made, material=replace(made.material, transfer_functions=(study.fit,)))
     return made, words
 
 
@@ -182,6 +184,10 @@ def _verified(study: Any, chosen: Channels, seen: Part) -> dict[str, Any] | None
 
 def _margin(reading: Any) -> list[float]:
     return [float(reading.value), float(reading.sigma)]
+
+
+def _refused(suggestion: Any) -> str:
+    return f"{suggestion.axis}: {suggestion.refused}" if suggestion.refused else ""
 
 
 def _gains(suggestion: Any) -> dict[str, Any]:

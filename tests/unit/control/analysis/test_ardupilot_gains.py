@@ -122,7 +122,7 @@ def test_flown_gains_that_nothing_beats_are_kept() -> None:
     again = suggest_gains(model, autopilot=good)
     for found in again:
         assert found.parameters == found.flown
-        assert "flown gains are kept" in found.words
+        assert "Keep what you fly" in found.words
         assert not found.costs
     narrow = suggest_gains(model, autopilot=good | {"ATC_RAT_RLL_P": 2.0 * good["ATC_RAT_RLL_P"]})
     assert narrow[0].parameters != narrow[0].flown  # these keep no 6 dB

@@ -11,7 +11,7 @@ from scipy.signal import butter, chirp, lfilter
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.records import POSE, Record, records
-from swashplate.identification.time.feedback import EXPLAINED, excitation
+from swashplate.identification.time.feedback import EXPLAINED, UNMOVED, excitation, mark_unmoved
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.catalogue import vehicle
@@ -180,3 +180,25 @@ def test_the_july_flight_shows_a_yaw_controller(flight_july: Path) -> None:
     assert found["yaw"].coherence > 0.95
     assert found["yaw"].explained > 0.9
     assert abs(np.degrees(found["yaw"].phase)) > 90.0
+
+
+def test_an_identified_card_names_the_axes_that_were_fitted_though_nothing_moved_them() -> None:
+    own = {axis.name: axis.parameters for axis in COAX.traits.axes if axis.parameters}
+    free = [names[0] for names in own.values()]
+    assert "yaw" in own
+
+    def judged(axis: str, *, moved: bool) -> AxisExcitation:
+        return AxisExcitation("made", axis, "", 0.5, 0.5, 0.0, 1.0, moved, "", 0.5)
+
+    def marked(*told: AxisExcitation) -> dict[str, float]:
+        return dict(mark_unmoved(COAX, free, told).card.observer.get(UNMOVED, {}))
+
+    others = [judged(name, moved=True) for name in own if name != "yaw"]
+    assert marked(*others, judged("yaw", moved=False)) == {"yaw": 1.0}
+    assert marked(*others, judged("yaw", moved=True)) == {}
+    assert marked(*others, judged("yaw", moved=False), judged("yaw", moved=True)) == {}, (
+        "one flight that moves it will do"
+    )
+    assert marked() == {}, "what was not judged is not called unmoved"
+    held = mark_unmoved(COAX, [], (*others, judged("yaw", moved=False)))
+    assert UNMOVED not in held.card.observer, "held, its numbers are the card's"

@@ -17,12 +17,12 @@ from typer.testing import CliRunner
 from swashplate.api import fit_tf
 from swashplate.cli.app import app
 from swashplate.errors import FlightError, SwashError
-from swashplate.flights.maneuvers.sweeps import Sweep
+from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
 from swashplate.identification.frequency.transfer_function_forms import suggest
 from swashplate.links.logs.code_lines import Read
 from swashplate.links.logs.desk import Desk
 from swashplate.links.logs.hold_out import hold_out
-from swashplate.links.logs.identify_sweep import Identified
+from swashplate.links.logs.identify_sweep import Identified, identify_sweep
 from swashplate.links.logs.job import PageJob
 from swashplate.links.logs.sweep_channels import channels_of
 from swashplate.models.linear.transfer_function import Form
@@ -30,15 +30,18 @@ from swashplate.models.linear.transfer_function import Form
 GAIN, POLE, DELAY = 25.0, 6.0, 0.03
 
 
-def flown(path: Path, *, further: bool) -> None:
-    """A roll sweep of 40 s on p / mixer_roll = 25 e^(-0.03 s) / (s + 6), and after it doublets where `further`."""
+def flown(path: Path, *, further: bool, sense: float = 1.0) -> None:
+    """A roll sweep of 40 s on p / mixer_roll = 25 e^(-0.03 s) / (s + 6), and after it doublets where `further`.
+
+    `sense` -1: the stick counts to the left.
+    """
     time = np.arange(0.0, 90.0 if further else 44.0, 0.01)
     sweep = np.where((time > 2.0) & (time < 42.0), chirp(time - 2.0, 0.3, 40.0, 8.0, method="logarithmic"), 0.0)
     doublets = np.where(time > 50.0, np.sign(np.sin(2.0 * np.pi * 0.4 * time)), 0.0)
     u = 0.1 * (sweep + doublets)
     late = np.interp(time - DELAY, time, u)
     p = lsim(([GAIN], [1.0, POLE]), late, time)[1] + 0.005 * np.random.default_rng(3).standard_normal(time.size)
-    rows = np.stack([time, u, p], axis=1).tolist()
+    rows = np.stack([time, sense * u, p], axis=1).tolist()
     path.write_text("time [s],mixer_roll [1],p [rad/s]\n" + "\n".join(",".join(map(repr, row)) for row in rows) + "\n")
 
 
@@ -80,6 +83,25 @@ def test_the_truth_is_recovered_and_gains_are_suggested(made: tuple[Desk, dict[s
     assert axis["before"] is None, "the log holds no gains"
     assert axis["after"]["stable"]
     assert axis["after"]["step"][-1] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_sweep_that_carries_no_gains_says_why_and_offers_no_file(tmp_path: Path) -> None:
+    """The stick to the left: the page shows the reason and its remedy, and nothing to fly is there to take away."""
+    flown(tmp_path / "left.csv", further=False, sense=-1.0)
+    opened = Desk([(tmp_path / "left.csv", Read("left.csv"))])
+    opened.read_given()
+    log = opened.log(1)
+    (sweep,) = sweeps(log.ready)
+    chosen = channels_of(log.ready, sweep)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit_tf, "suggest", functools.partial(suggest, forms=(Form.parse("0/1"),)))
+        result = identify_sweep(log, sweep, chosen, others=[], folder=tmp_path, tell=lambda what, share: None)
+    assert result.document["gains"] == []
+    assert result.document["no_gains"].startswith("RLL: none: a positive mixer_roll turns p negative")
+    assert any("wrong sign" in text and "--unit mixer_roll=-1" in text for text in result.document["warnings"])
+    assert "gains.param" not in result.files
+    assert "report.html" in result.files
+    opened.close()
 
 
 def test_it_is_verified_on_the_doublets_that_the_fit_has_not_seen(made: tuple[Desk, dict[str, Any], Path]) -> None:

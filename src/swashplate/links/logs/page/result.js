@@ -25,14 +25,14 @@ function gains(home, found) {
     home.append(make("p", {}, axis.words));
     answers(home, axis, found);
   }
-  if (found.no_gains) home.append(make("p", { class: "soft" }, `No gains: ${found.no_gains}`));
+  if (found.no_gains) home.append(make("p", { class: "warn", role: "alert", "data-no-gains": "" }, `No gains. ${found.no_gains}`));
 }
 
 function answers(home, axis, found) {
   const those = [["before", "as flown", 7, [6, 4]], ["after", "suggested", 0, []]].filter(([when]) => axis[when]);
   if (!those.length) return;
-  const wild = those.filter(([when]) => !axis[when].stable).map(([, name]) => name);
-  if (wild.length) home.append(make("p", { class: "warn", role: "alert" }, `Unstable on this model: ${wild.join(", ")}. Do not fly these gains.`));
+  if (axis.after && !axis.after.stable) home.append(make("p", { class: "warn", role: "alert" }, "The suggested gains are unstable on this model. Do not fly them."));
+  if (axis.before && !axis.before.stable) home.append(make("p", { class: "warn", role: "alert" }, "On this model the flown gains do not settle, and the aircraft flew with them: do not trust the model."));
   const x = axis[those[0][0]].time;
   const lines = (key) => those.map(([when, name, tint, dash]) => ({ name, values: axis[when][key], colour: tint, dash }));
   curves(home, { title: "Step of the target", x, xLabel: "time [s]", yLabel: "rate / target [1]", lines: lines("step"), level: 1 });
