@@ -19,7 +19,8 @@ function gains(home, found) {
     const head = make("tr", {}, make("th", {}, "parameter"), make("th", { class: "number" }, "flown"), make("th", { class: "number" }, "suggested"));
     const number = (value) => make("td", { class: "number" }, value === null ? "–" : String(+(+value).toPrecision(4)));
     const rows = axis.rows.map(([name, flown, suggested]) => make("tr", {}, make("td", {}, name), number(flown), make("td", { class: "number" }, make("b", {}, suggested === null ? "–" : String(+(+suggested).toPrecision(4))))));
-    const margin = (name, key) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, axis[when] ? (typeof axis[when][key] === "number" ? short(axis[when][key]) : pm(axis[when][key])) : "–")));
+    const read = (value) => (value === undefined || value === null ? "–" : typeof value === "number" ? short(value) : pm(value)); // null: there is none
+    const margin = (name, key) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, read(axis[when]?.[key]))));
     home.append(make("table", { class: "gains" }, make("thead", {}, head), make("tbody", {}, ...rows,
       margin("phase margin [deg]", "phase_margin"), margin("gain margin [dB]", "gain_margin"), margin("delay margin [ms]", "delay_margin"), margin("crossover [rad/s]", "crossover"), margin("largest sensitivity", "peak"), margin("bandwidth [rad/s]", "bandwidth"), margin("disturbance rejection [rad/s]", "rejection"), overshoot(axis))));
     home.append(make("p", {}, axis.words));
