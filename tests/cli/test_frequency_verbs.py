@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal as signals
 import sys
 from collections.abc import Callable
@@ -172,6 +173,23 @@ def test_gains_come_from_transfer_functions_too_and_their_lack_is_said(swept: Pa
     assert "joins no rate with its mixer command" in one_message(swash(*ask, "--outputs", "q", "--gains"))
 
 
+def test_a_turned_command_is_told_mended_by_its_unit_and_gets_no_gains(folder: Path, swept: Path) -> None:
+    """`--unit mixer_roll=-1` on a log that is right makes one that is wrong; the remedy that is said mends it."""
+    asked = ("--inputs", "mixer_roll,mixer_pitch", "--outputs", "p,q", "--band", "0.3-11", "--out", folder / "turned")
+    done = swash("respond", folder / "swept.csv", *asked, "--unit", "mixer_roll=-1")
+    assert done.code == 2
+    assert "p / mixer_roll has the wrong sign: a positive mixer_roll makes p negative" in done.err
+    (remedy,) = re.findall(r"Give --unit (\S+)\.", done.err)
+    assert remedy == "mixer_roll=1"
+    ask = ("fit-tf", folder / "turned", "--input", "mixer_roll", "--outputs", "p", "--form", "2/4", "--gains")
+    done = swash(*ask, "--out", folder / "none")
+    assert done.code == 2
+    assert "RLL: no gains: a positive mixer_roll turns p negative" in done.err
+    assert "ATC_RAT_RLL_P" not in done.out
+    assert "NO GAINS for RLL" in (folder / "none" / "report.html").read_text(encoding="utf-8")
+    assert swash("respond", folder / "swept.csv", *asked, "--unit", remedy).code == 0
+
+
 def test_the_fitted_flight_is_no_hold_out(answered: Path, flown: Path) -> None:
     done = swash("fit-ss", "rotor_body", answered, "--hold-out", flown, "--starts", "1")
     assert "NOT A HOLD-OUT" in done.out
@@ -187,7 +205,7 @@ def test_a_dead_or_doubled_input_is_named_and_the_rest_is_kept(folder: Path, kin
     assert done.code == 2
     assert words in done.err
     assert "Traceback" not in done.err
-    assert "NOT COMPUTED" in (out / "report.html").read_text(encoding="utf-8")
+    assert "PROBLEM" in (out / "report.html").read_text(encoding="utf-8")
 
 
 def test_noise_is_not_a_response(folder: Path) -> None:

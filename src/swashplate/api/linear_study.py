@@ -62,7 +62,7 @@ class LinearStudy(ReportFolder):
     def problems(self) -> tuple[str, ...]:
         """What could not be computed, gains that are refused, logs that are damaged; empty where all is well."""
         own = () if self.fit is None else self.fit.problems
-        refused = tuple(f"{one.axis}: {one.refused}" for one in self.material.gains if one.refused)
+        refused = tuple(f"{one.axis}: no gains: {one.refused}" for one in self.material.gains if one.refused)
         logs = (*(self.fit.data if self.fit else ()), *(self.verification.data if self.verification else ()))
         return (*own, *refused, *dict.fromkeys(damaged(logs)))
 

@@ -77,7 +77,7 @@ def _banners(m: ResponseMaterial) -> tuple[tuple[str, str], ...]:
         banners.append(("bad", f"PROBLEM: {' '.join(m.fit.problems)}"))
     banners += [("bad", f"NO GAINS for {g.axis}: {g.refused}") for g in m.gains if g.refused]
     if m.responses and m.responses.problems:
-        banners.append(("bad", f"NOT COMPUTED: {' '.join(m.responses.problems)}"))
+        banners.append(("bad", f"PROBLEM: {' '.join(m.responses.problems)}"))
     return tuple(banners)
 
 

@@ -89,7 +89,7 @@ class Suggestion(Shown):
     @property
     def refused(self) -> str:
         """Why there are no gains; "" where there are."""
-        return "" if self.parameters else self.words
+        return "" if self.parameters else self.words.removeprefix("none: ")
 
     @property
     def margins(self) -> ResponseMargins:

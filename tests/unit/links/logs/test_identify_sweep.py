@@ -97,7 +97,7 @@ def test_a_sweep_that_carries_no_gains_says_why_and_offers_no_file(tmp_path: Pat
         patch.setattr(fit_tf, "suggest", functools.partial(suggest, forms=(Form.parse("0/1"),)))
         result = identify_sweep(log, sweep, chosen, others=[], folder=tmp_path, tell=lambda what, share: None)
     assert result.document["gains"] == []
-    assert result.document["no_gains"].startswith("RLL: none: a positive mixer_roll turns p negative")
+    assert result.document["no_gains"].startswith("RLL: a positive mixer_roll turns p negative")
     assert any("wrong sign" in text and "--unit mixer_roll=-1" in text for text in result.document["warnings"])
     assert "gains.param" not in result.files
     assert "report.html" in result.files
