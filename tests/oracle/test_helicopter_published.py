@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from published_helicopters import KNOT, lynx_published, lynx_rows, r50_identified
 from swashplate.models.catalogue import vehicle
 from swashplate.models.conventional.buildup import build_up
 from swashplate.models.conventional.derivative_table import DerivativeTable
-from swashplate.models.published import read_published
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.linearize import linearize
@@ -31,27 +31,6 @@ def lynx(speed: float = 0.0, options: dict[str, object] | None = None, **numbers
     card = flown.card.values()
     inertia = {f"inertia_{axis}": card[f"inertia_{axis}"] for axis in ("xx", "zz", "xz")}
     return table(flown, speed=speed)[0].primed(**inertia)
-
-
-def lynx_rows(shared_data: Path) -> dict[str, dict[str, float]]:
-    with (shared_data / "vehicles" / "lynx_validation.csv").open(encoding="utf-8") as lines:
-        return {row.pop("deriv"): {k: float(v) for k, v in row.items()} for row in csv.DictReader(lines)}
-
-
-KNOT = 1.689 * 0.3048
-"""m/s, as Padfield's U_0 in Y_r has it."""
-
-
-def lynx_published(knots: int) -> dict[str, float]:
-    """Padfield's A and B without their kinematic terms; the attitude is in A's gravity terms."""
-    path = Path(__file__).parent / "lynx" / f"padfield_{knots:02d}kn.csv"
-    with path.open(encoding="utf-8") as lines:
-        gravity = {row[""]: row for row in csv.DictReader(line for line in lines if not line.startswith("#"))}
-    roll = -math.atan2(float(gravity["w"]["phi"]), float(gravity["v"]["phi"]))
-    pitch = math.asin(-float(gravity["w"]["theta"]) / 9.81 / math.cos(roll))
-    speed = knots * KNOT
-    flight = {"u": speed * math.cos(pitch), "v": 0.0, "w": speed * math.sin(pitch) * math.cos(roll)}
-    return read_published(path, flight=flight)
 
 
 def test_blade_elements_are_as_near_to_the_published_as_the_reference_calculation(shared_data: Path) -> None:
@@ -307,8 +286,7 @@ def test_closed_hover_forms() -> None:
 
 def test_r50_against_mettlers_identified_hover(shared_data: Path) -> None:
     """Set: L_b, M_a, tau_f, tau_s. Predicted: X_u within 15 %, Z_w 27 % low (the R-50's blade geometry is a guess)."""
-    with (shared_data / "vehicles" / "derivs_mettler_r50.csv").open(encoding="utf-8") as lines:
-        identified = {row["param"]: float(row["hover_SI"]) for row in csv.DictReader(lines)}
+    identified = r50_identified(shared_data)
     flown = vehicle("r50")
     c = flown.card.values()
     found, _ = table(flown)

@@ -1,7 +1,5 @@
-"""A published coupled helicopter, HeLion in hover, by the ready eleven-state structure.
-
-Numbers: Cai, Chen and Lee (2011), the linear model of HeLion about hover, eleven states, as given there (rates of the
-tip-path plane divided by its time constant; the sign of the collective is theirs).
+"""A published coupled helicopter, HeLion in hover, by the ready eleven-state structure (numbers and source:
+`published_helicopters`).
 """
 
 from __future__ import annotations
@@ -9,22 +7,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from published_helicopters import HELION
 from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure
-
-TAU = 1.0 / 8.1222
-HELION = {
-    "g": 9.7807, "Xu": -0.1778, "Yv": -0.3104, "Yped": 0.0,
-    "Lu": -0.3326, "Lv": -0.5353, "Lw": 0.0, "La": 75.764, "Lb": 343.86, "Lped": 0.0,
-    "Mu": 0.1903, "Mv": -0.294, "Mw": 0.0, "Ma": 172.62, "Mb": -59.958, "Mcol": 0.0,
-    "tau_f": TAU, "Ab": 4.6535 * TAU, "Ba": -0.0921 * TAU,
-    "Alat": 0.0632 * TAU, "Alon": 3.339 * TAU, "Blat": 3.1739 * TAU, "Blon": 0.2216 * TAU,
-    "Za": 17.168, "Zb": 7.1018, "Zw": -0.6821, "Zr": -0.107, "Zcol": 19.925,
-    "Nv": 0.0, "Np": -0.2834, "Nw": -0.1446, "Nr": -5.5561, "Nrfb": -36.674 * 2.7492, "Krfb": 11.112,
-    "Nped": -74.364, "Ncol": 2.0816,
-}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Known truth: fits to responses of sweeps in gusts scatter as their own bounds say, and so do models drawn from them."""
+"""Known truth: fits to responses of sweeps in gusts scatter as their bounds say, and so do models drawn from them."""
 
 from __future__ import annotations
 

@@ -31,7 +31,10 @@ def derivatives(
         ),
     ] = None,
     uncertainty: Annotated[
-        bool, typer.Option("--uncertainty", help="Also 5 % and 95 % bounds from the tolerances on the card.")
+        bool,
+        typer.Option(
+            "--uncertainty", help="Also 5 % and 95 % bounds from the tolerances on the card and what such models miss."
+        ),
     ] = False,
     draws: Annotated[
         int, typer.Option("--draws", help="Number of samples of the card for --uncertainty.", min=10, max=100_000)
@@ -94,7 +97,7 @@ def derivatives(
         typer.echo(f"At {at.speed:g} m/s (flapping follows the motion without delay)")
         console().print(tabulate(*derivative_tables.rows(table), left=2))
     if (wide := derivative_tables.bounds) is not None:
-        typer.echo(f"\n5 % and 95 % bounds of {wide.draws} samples of the card ({wide.refused} could not be trimmed).")
+        typer.echo(f"\n{wide.words}")
         _modes(wide)
     if plot is not None:
         typer.echo(f"Written: {plot}")

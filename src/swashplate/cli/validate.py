@@ -136,7 +136,7 @@ def validate(
         if validation.loop_closed:
             typer.echo("\nWith the controller in the place of the recorded command")
             screen.print(closed_table(validation))
-        if validation.bands:
+        if drawn:
             typer.echo(f"\nWhat the bands of {len(drawn)} drawn models hold [%]")
             screen.print(bands_table(validation))
         for words in (*(one.words for one in validation.contacts), *(law.words for law in validation.laws)):

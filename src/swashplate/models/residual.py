@@ -127,16 +127,29 @@ def carrying(vehicle: Vehicle, card: Card) -> Vehicle:
     """A vehicle's equations with another card's numbers, and with the residual where that card has one.
 
     Args:
-        vehicle: without a residual.
+        vehicle: with a residual of its own or without; that on the card counts, and where it has none, none.
 
     Raises:
         CardError: where the card is for other equations, or its residual is incomplete.
     """
+    vehicle = _without_residual(vehicle)
     made = vehicle.with_card(card)
     if not has_residual(card):
         return made
     # The equations' own card has what they fill in where another one is silent.
     return joined(vehicle, replace(card, parameters={**vehicle.card.parameters, **card.parameters}))
+
+
+def _without_residual(vehicle: Vehicle) -> Vehicle:
+    """The equations behind a residual."""
+    rates, force = vehicle.derivatives, vehicle.specific_force
+    if not isinstance(rates, partial) or rates.func is not _derivatives or not isinstance(force, partial):
+        return vehicle
+    own = rates.keywords["own"]
+    added = vehicle.parameters._fields[len(own._fields) :]
+    card = replace(vehicle.card, parameters={n: p for n, p in vehicle.card.parameters.items() if n not in added})
+    of = {"derivatives": rates.keywords["of"], "specific_force": force.keywords["of"]}
+    return replace(vehicle, card=card, parameters=own, **of)
 
 
 def joined(vehicle: Vehicle, card: Card) -> Vehicle:

@@ -86,11 +86,15 @@ def _band_of(validation: Validation) -> str:
     )
 
 
+_PARAMETERS = {True: "the parameters by their posterior, ", False: ""}
+
+
 def _bands(validation: Validation, horizon: float) -> tuple[Block, ...]:
     """How much of the flights the bands hold."""
     rows = {half.channel: (half, most) for half, most in pairs(validation.bands) if half.horizon == horizon}
     if not rows:
         return ()
+    drawn = bool(validation.settings.get("draws"))
     return (
         Table(
             f"What the bands {horizon:g} s ahead hold",
@@ -101,9 +105,9 @@ def _bands(validation: Validation, horizon: float) -> tuple[Block, ...]:
                 if name in rows
             ),
             note="Percent of the starts whose measured motion lies inside, with its 95 % interval (block bootstrap "
-            f"over 4 s of flight). A band holds within {NEAR:g} points of its promise. In it: the parameters by their "
-            "posterior, the observer's error at the start, gusts and drifts to come, the sensors' noise. By "
-            "parameters: part of the variance. Not in it: a wrong structure, and how sure the fit is of the gusts.",
+            f"over 4 s of flight). A band holds within {NEAR:g} points of its promise. In it: {_PARAMETERS[drawn]}the "
+            "observer's error at the start, gusts and drifts to come, the sensors' noise. By parameters: part of the "
+            "variance. Not in it: a wrong structure, and how sure the fit is of the gusts.",
         ),
     )
 

@@ -30,7 +30,7 @@ class Derivatives(Saved):
         vehicle: a single-rotor helicopter.
         trims: where. tables: the derivatives there, SI.
         imperial: shown in feet.
-        bounds: 5 % and 95 % bounds at the one trim, from the card's sigmas; None where not asked.
+        bounds: 5 % and 95 % bounds at the one trim, from the card's sigmas and the model's error; None where not asked.
     """
 
     vehicle: Vehicle
@@ -59,7 +59,7 @@ class Derivatives(Saved):
     def rows(self, table: DerivativeTable) -> tuple[list[str], list[list[str]]]:
         """Heading and cells of a table for the screen; derivatives that are nothing are left out."""
         head = ["derivative", "unit", "total", *(part.replace("_", " ") for part in table.parts)]
-        head += ["5 %", "95 %"] if self.bounds is not None else []
+        head += ["5 %", "95 %", "5 % by card", "95 %"] if self.bounds is not None else []
         rows = []
         for name in table.names():
             factor = self.factor(name)
@@ -68,7 +68,8 @@ class Derivatives(Saved):
             row = [name, self.unit(name), f"{total:.4g}"]
             row += [f"{v:.3g}" if abs(v) > _NOTHING else "-" for v in self.parts(table, name).values()]
             if self.bounds is not None:
-                row += [f"{bound * factor:.4g}" for bound in self.bounds.derivatives[name][1:]]
+                both = (*self.bounds.derivatives[name][1:], *self.bounds.by_card[name])
+                row += [f"{bound * factor:.4g}" for bound in both]
             rows.append(row)
         return head, rows
 
@@ -80,7 +81,7 @@ class Derivatives(Saved):
         told: dict[str, Any] = {"speed": at.speed}
         wide = self.bounds
         if wide is not None:
-            told |= {"modes": wide.modes(), "draws": wide.draws, "refused": wide.refused}
+            told |= {"modes": wide.modes(), "draws": wide.draws, "refused": wide.refused, "words": wide.words}
         entries = {}
         for name in table.names():
             entries[name] = {
@@ -89,8 +90,11 @@ class Derivatives(Saved):
                 "by": self.parts(table, name),
             }
             if wide is not None:
-                low, high = wide.derivatives[name][1:]
-                entries[name] |= {"5 %": low, "95 %": high}
+                factor, error = self.factor(name), wide.model[name]
+                (low, high), (card_low, card_high) = wide.derivatives[name][1:], wide.by_card[name]
+                entries[name] |= {"5 %": low * factor, "95 %": high * factor}
+                entries[name] |= {"5 % by card": card_low * factor, "95 % by card": card_high * factor}
+                entries[name] |= {"model error": error.sigma, "model error of": error.kind}
         return {**told, "derivatives": entries}
 
     def __repr__(self) -> str:
@@ -100,6 +104,7 @@ class Derivatives(Saved):
             widths = [max(len(row[i]) for row in (head, *rows)) + 2 for i in range(len(head))]
             lines.append(f"At {at.speed:g} m/s")
             lines += ["".join(f"{c:>{w}}" for c, w in zip(row, widths, strict=True)) for row in (head, *rows)]
+        lines += [self.bounds.words] if self.bounds is not None else []
         return "\n".join(lines)
 
     def plot(self, *, row: str = "M", theme: Literal["paper", "light", "dark"] = "paper") -> Figure:
@@ -133,7 +138,7 @@ def derivatives(
         trims: one, or several over speed (`sp.trim`, `sp.trim_curve(...).trims`).
         primed: roll and yaw rows mixed by the product of inertia, as most published tables are.
         imperial: shown in feet, as Bhandari et al. (2005) have them.
-        uncertainty: also 5 % and 95 % bounds from the sigmas on the card, at the one trim.
+        uncertainty: also 5 % and 95 % bounds from the sigmas on the card and what such a model misses, at the one trim.
         draws: samples of the card for that. seed: of the samples.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What the sigmas of a card do to its derivatives and modes."""
+"""What the sigmas of a card, and the errors of its equations, do to its derivatives and modes."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.derivatives import derivative_table
 from swashplate.simulation.linearize import linearize
+from swashplate.simulation.model_error import ModelError, model_error
 from swashplate.simulation.trim import Trim, trim
 
 
@@ -25,17 +26,31 @@ class CardSpread:
     """Bounds on derivatives and eigenvalues of one trim.
 
     Attributes:
-        derivatives: by name: value of the card, and the 5 % and 95 % quantiles.
+        derivatives: by name: value of the card, and the 5 % and 95 % quantiles, with the error of the model.
+        by_card: the quantiles that the card's sigmas alone give. model: the error of the model.
         eigenvalues: of the card, shape (n,), [1/s].
         samples: eigenvalues of the samples, each row sorted to the card's, shape (draws, n).
         draws: how many samples could be trimmed; refused: how many could not.
     """
 
     derivatives: Mapping[str, tuple[float, float, float]]
+    by_card: Mapping[str, tuple[float, float]]
+    model: Mapping[str, ModelError]
     eigenvalues: NDArray[np.complexfloating[Any, Any]]
     samples: NDArray[np.complexfloating[Any, Any]]
     draws: int
     refused: int
+
+    @property
+    def words(self) -> str:
+        """What the bounds hold, and what they do not."""
+        told = {one.kind: one for one in self.model.values()}
+        parts = ", ".join(f"{kind} {100.0 * one.sigma:.0f} % of {one.vehicles}" for kind, one in told.items())
+        return (
+            f"5 % and 95 % bounds: of {self.draws} samples of the card ({self.refused} could not be trimmed), and of "
+            f"what such a model misses beside published helicopters (standard deviation, told by how many: {parts}). "
+            "The modes' bounds have the card's samples in them alone."
+        )
 
     def modes(self) -> list[dict[str, dict[str, float]]]:
         """Every mode of the card with the 5 % and 95 % quantiles of the samples' [1/s], fastest first."""
@@ -55,9 +70,17 @@ class CardSpread:
 
 
 def spread(
-    vehicle: Vehicle, at: Trim, *, draws: int = 200, seed: int = 0, environment: Environment | None = None
+    vehicle: Vehicle,
+    at: Trim,
+    *,
+    draws: int = 200,
+    seed: int = 0,
+    environment: Environment | None = None,
+    without: str = "",
 ) -> CardSpread:
     """Samples of the card (independent, normal, within its bounds), each trimmed again, and the quantiles.
+
+    Each derivative is off by the model's error, too (`model_error`).
 
     Args:
         vehicle: a single-rotor helicopter whose card has sigmas.
@@ -65,6 +88,7 @@ def spread(
         draws: how many samples.
         seed: of the draws.
         environment: surroundings, by default the trim's.
+        without: a helicopter whose published derivatives are not to count for the model's error.
 
     Raises:
         SwashError: where no parameter has a sigma.
@@ -110,10 +134,19 @@ def spread(
         modes.append(_matched(np.linalg.eigvals(linearize(other, there).A).astype(complex), values))
     if not tables:
         raise SwashError(f"none of the samples could be trimmed; the last: {why}", where=card.where)
-    low, high = np.quantile(np.array(tables), [0.05, 0.95], axis=0)
+    samples = np.array(tables)
+    low, high = np.quantile(samples, [0.05, 0.95], axis=0)
     centre = derivative_table(vehicle, at).total.ravel()
-    quantiles = {name: (float(c), float(a), float(b)) for name, c, a, b in zip(names, centre, low, high, strict=True)}
-    return CardSpread(quantiles, values, np.array(modes), len(tables), refused)
+    model = {name: model_error(name, without=without) for name in names}
+    return CardSpread(
+        derivatives={n: (float(centre[i]), *model[n].widened(samples[:, i])) for i, n in enumerate(names)},
+        by_card={n: (float(low[i]), float(high[i])) for i, n in enumerate(names)},
+        model=model,
+        eigenvalues=values,
+        samples=np.array(modes),
+        draws=len(tables),
+        refused=refused,
+    )
 
 
 def _matched(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtri
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
@@ -18,8 +19,12 @@ from swashplate.validation import block_bootstrap
 
 SHARES = (50.0, 95.0)
 """Percent of the flights that each band promises to hold."""
+SURE = max(SHARES)
+"""Percent of the band whose failure is part of a verdict."""
 FEWEST_DRAWS = 39
 """Between the outermost of so many paths lie 95 % of the flights that the same law made, exactly."""
+_BY_CHANCE = 0.05
+"""Chance of a widening where nothing is wrong."""
 NEAR = 3.0
 """Points between what a band promises and what it holds that are called kept."""
 _WORDS = {
@@ -36,6 +41,8 @@ class BandedRecord(NamedTuple):
     Attributes:
         below: how many of the `paths` lie below what came (s, 12).
         variance: of the paths about the prediction, and `by_parameters`, that of drawn models without gusts (s, 12).
+        missed: square of what came less the prediction (s, 12).
+        wider: times that the paths were taken from the prediction (12,), see `widening`.
     """
 
     time: Array
@@ -43,6 +50,8 @@ class BandedRecord(NamedTuple):
     paths: int
     variance: Array
     by_parameters: Array
+    missed: Array
+    wider: Array
 
 
 @dataclass(frozen=True)
@@ -57,6 +66,8 @@ class Band:
         by_parameters: percent of its square that the draws of the parameters brought; the rest is the start, the gusts
             to come and the sensors' noise.
         starts: how many.
+        off: root mean square of the predictions' errors, over `sigma`.
+        wider: how many times as wide as its fit says the band was made, see `widening`; the most of any record.
     """
 
     channel: str
@@ -69,6 +80,8 @@ class Band:
     sigma: float
     by_parameters: float
     starts: int
+    off: float = math.nan
+    wider: float = 1.0
 
     @property
     def level(self) -> str:
@@ -88,6 +101,18 @@ class Band:
         scatter = f" ({self.low:.0f} to {self.high:.0f})" if math.isfinite(self.low) else ""
         told = f"the {self.promised:g} % band holds {self.held:.0f} %{scatter}"
         return f"{self.channel}, {self.horizon:g} s ahead: {told}, {_WORDS[self.level]}"
+
+    @property
+    def warning(self) -> str:
+        """Where it is too narrow: by how much; "" for another."""
+        if self.level != "too narrow":
+            return ""
+        known = "" if self.by_parameters else ", as if the model's numbers were known,"
+        return (
+            f"{self.channel}: the {self.promised:g} % band{known} holds {self.held:.0f} % [{self.low:.0f} to "
+            f"{self.high:.0f}], errors are {self.off:.1f} times what it allows for: do not trust it, nor anything that "
+            "is drawn from the model for this channel."
+        )
 
 
 def _told(band: Band) -> str:
@@ -129,6 +154,24 @@ def check_draws(vehicle: Vehicle, draws: Sequence[Vehicle]) -> None:
         raise SwashError("are of another model than the one that is validated.", channel="draws")
 
 
+def widening(errors: Array, sigma: Array, *, seconds: float, horizon: float) -> Array:
+    """How many times as wide as its fit says a band is to be, by what the first seconds of a flight were missed (12,).
+
+    How strong gusts are belongs to a flight and not to the aircraft: one whose first seconds are missed by more than
+    chance allows has stronger ones, or lacks something. Where they are not, one.
+
+    Args:
+        errors: of predictions from starts in those seconds (s, 12). sigma: standard deviations that the fit promises
+            (12,). seconds: that the starts cover. horizon: of the predictions [s]; starts closer together repeat it.
+    """
+    freedom = seconds / horizon
+    if freedom < 1.0 or not len(errors):
+        return np.ones(sigma.size)
+    square = np.mean((errors / np.maximum(sigma, 1e-300)) ** 2, axis=0)
+    by_chance = float(chdtri(freedom, _BY_CHANCE)) / freedom
+    return np.where(square > by_chance, np.sqrt(square), 1.0)
+
+
 def bands(by_horizon: Mapping[float, Sequence[BandedRecord]]) -> tuple[Band, ...]:
     """How much the bands hold, by horizon, promised share and channel.
 
@@ -138,8 +181,9 @@ def bands(by_horizon: Mapping[float, Sequence[BandedRecord]]) -> tuple[Band, ...
     made = []
     for horizon, records in by_horizon.items():
         times = [record.time for record in records]
-        variance, own = (
-            np.concatenate([getattr(r, part) for r in records]).mean(axis=0) for part in ("variance", "by_parameters")
+        variance, own, missed = (
+            np.concatenate([getattr(r, part) for r in records]).mean(axis=0)
+            for part in ("variance", "by_parameters", "missed")
         )
         share = 100.0 * own / np.maximum(variance, 1e-300)
         for promised in SHARES:
@@ -161,6 +205,8 @@ def bands(by_horizon: Mapping[float, Sequence[BandedRecord]]) -> tuple[Band, ...
                         sigma=sigma,
                         by_parameters=float(share[i]),
                         starts=starts,
+                        off=math.sqrt(missed[i] / max(variance[i], 1e-300)),
+                        wider=max(float(record.wider[i]) for record in records),
                     )
                 )
     return tuple(made)
@@ -171,12 +217,35 @@ def _inside(record: BandedRecord, promised: float) -> Array:
     return ((record.below >= outside) & (record.below <= record.paths - outside)).astype(float)
 
 
-def in_brief(judged: Sequence[Band], horizon: float) -> str:
-    """Which bands at one horizon hold and which do not, in a sentence."""
+def in_brief(judged: Sequence[Band], horizon: float, *, drawn: bool = True) -> str:
+    """Which bands at one horizon hold and which do not, in a sentence; "" where nothing is to be said.
+
+    Args:
+        judged: all bands. horizon: seconds ahead.
+        drawn: False for bands of one model, of which only those that are too narrow are named: the others may be so
+            with the spread of its numbers.
+    """
     rows = [band for band in judged if abs(band.horizon - horizon) < 1e-9]
     said = []
     for level, words in _WORDS.items():
+        if not drawn and level != "too narrow":
+            continue
         named = [f"{b.channel} {b.held:.0f} of {b.promised:g} %" for b in rows if b.level == level]
         if named:
             said.append(f"{words[0].upper()}{words[1:]}: {', '.join(named)}.")
-    return f"Bands {horizon:g} s ahead. {' '.join(said)}"
+    if not drawn and not said:
+        return ""
+    by = "" if drawn else " by the model alone, as if its numbers were known"
+    return f"Bands {horizon:g} s ahead{by}. {' '.join(said)}"
+
+
+def widened_words(judged: Sequence[Band]) -> str:
+    """Which bands are wider than the fit says, in words; "" for none."""
+    wide = {band.channel: band.wider for band in judged if band.wider > 1.0}
+    if not wide:
+        return ""
+    named = ", ".join(f"{name} {factor:.1f}" for name, factor in wide.items())
+    return (
+        f"Bands are wider than the fit says, by what the first seconds were missed: {named} times. The gusts of this "
+        "flight are stronger there than those of the fit's, or the model lacks something."
+    )

@@ -30,12 +30,15 @@ class Fan(NamedTuple):
     Attributes:
         below: how many of the `paths` lie below what came (starts, n, 12); nonsense beyond the record's end.
         variance: mean square of the paths about the prediction; by_parameters: that of the drawn models' predictions.
+        missed: square of what came about the prediction. wider: as `spread` was asked (12,).
     """
 
     paths: int
     below: Array
     variance: Array
     by_parameters: Array
+    missed: Array
+    wider: Array
 
     @property
     def sigma(self) -> Array:
@@ -45,9 +48,10 @@ class Fan(NamedTuple):
     def at(self, horizon: float, record: Record, starts: NDArray[np.intp]) -> BandedRecord:
         """One horizon [s], from the first `starts` (those whose horizon lies within the record)."""
         rows, last = slice(len(starts)), round(horizon / record.dt) - 1
-        parts = (part[rows, last] for part in (self.below, self.variance, self.by_parameters))
-        below, variance, own = parts
-        return BandedRecord(record.time[starts], below, self.paths, variance, own)
+        below, variance, own, missed = (
+            part[rows, last] for part in (self.below, self.variance, self.by_parameters, self.missed)
+        )
+        return BandedRecord(record.time[starts], below, self.paths, variance, own, missed, self.wider)
 
 
 def spread(
@@ -58,23 +62,27 @@ def spread(
     nuisance: Nuisance,
     predictions: Predictions,
     truth: Array,
+    longest: int | None = None,
+    wider: Array | float = 1.0,
 ) -> Fan:
     """The fan of drawn models about a model's predictions.
 
     Args:
         draws, record, noise, nuisance: of `paths`. predictions: of the model itself.
         truth: body states (n, 12) that came.
+        longest: samples ahead that count; all of the predictions' where None.
+        wider: how many times as far from the prediction the paths are taken, (12,).
     """
-    starts, about = predictions.starts, predictions.states
+    starts, about = predictions.starts, predictions.states[:, :longest]
     ahead = about.shape[1]
     places = np.minimum(starts[:, None] + np.arange(1, ahead + 1), len(truth) - 1)
     came = truth[places]
     below, variance, own = (np.zeros(about.shape) for _ in range(3))
     for path, plain in paths(draws, record, noise=noise, nuisance=nuisance, starts=starts, ahead=ahead):
-        below += path < came
-        variance += (path - about) ** 2 / len(draws)
-        own += (plain - about) ** 2 / len(draws)
-    return Fan(len(draws), below, variance, own)
+        below += about + wider * (path - about) < came
+        variance += (wider * (path - about)) ** 2 / len(draws)
+        own += (wider * (plain - about)) ** 2 / len(draws)
+    return Fan(len(draws), below, variance, own, (came - about) ** 2, np.broadcast_to(wider, about.shape[-1:]))
 
 
 def paths(
@@ -101,10 +109,14 @@ def paths(
     """
     random, half = np.random.default_rng(seed), samples_smoothed(record.dt) // 2
     length = ahead + half
+    before: Vehicle | None = None
     for vehicle in draws:
-        seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=length)
-        _, _, Q, R, P = uncertainty(vehicle, record, noise=noise, nuisance=nuisance)
-        roots = [_root(part) for part in (P, Q, R)]
+        if vehicle is not before:
+            seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=length)
+            _, _, Q, R, P = uncertainty(vehicle, record, noise=noise, nuisance=nuisance)
+            roots = [_root(part) for part in (P, Q, R)]
+            plain = ahead_of(seen.model, seen.filtered, seen.numbers, seen.commands, seen.voltage, starts, ahead)
+            before = vehicle
         parts = []
         for first in range(0, len(starts), RUNS):
             here = np.pad(starts[first : first + RUNS], (0, max(0, first + RUNS - len(starts))), mode="edge")
@@ -117,12 +129,11 @@ def paths(
             shown = _shown(seen.model, begin, seen.numbers, seen.commands[rows], seen.voltage[rows], aside, kicks)
             parts.append(np.asarray(shown) + shaken)
         readings = np.concatenate(parts)[: len(starts)]
-        before = record.outputs[np.maximum(starts[:, None] + np.arange(1 - half, 1), 0)]  # what the smoothing reaches
-        whole = np.concatenate([before, readings], axis=1)
+        reached = record.outputs[np.maximum(starts[:, None] + np.arange(1 - half, 1), 0)]  # by the smoothing
+        whole = np.concatenate([reached, readings], axis=1)
         flat = whole.reshape(-1, whole.shape[-1])
         side_by_side = replace(record, time=np.linspace(0.0, record.dt * (len(flat) - 1), len(flat)), outputs=flat)
         states = measured_states(side_by_side, nuisance).reshape(*whole.shape[:2], len(PREDICTED))
-        plain = ahead_of(seen.model, seen.filtered, seen.numbers, seen.commands, seen.voltage, starts, ahead)
         # Where the smoothing reaches no neighbour.
         yield states[:, half : half + ahead], plain[..., [vehicle.index(name) for name in PREDICTED]]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +60,21 @@ class Predictions:
     closed: Array | None = None
     laws: tuple[Law, ...] = ()
 
+    def split(self, sample: int) -> tuple[Predictions, Predictions]:
+        """Those from starts before a sample, and the others."""
+        first = int(np.searchsorted(self.starts, sample))
+        parts = (slice(None, first), slice(first, None))
+        early, late = (
+            replace(
+                self,
+                starts=self.starts[part],
+                states=self.states[part],
+                closed=None if self.closed is None else self.closed[part],
+            )
+            for part in parts
+        )
+        return early, late
+
 
 class Observed(NamedTuple):
     """What an observer made of a record: its model and numbers, the states after each reading, innovations (n, outputs)
@@ -83,9 +98,12 @@ def predict(
     horizon: float = max(HORIZONS),
     every: float = 0.1,
     settling: float = SETTLING,
+    early: float | None = None,
     close_loop: Sequence[str] = (),
 ) -> Predictions:
     """Predict `horizon` seconds ahead from starts every `every` seconds, the first after `settling` seconds.
+
+    With `early` starts at the same distance begin before it, from `early` seconds on.
 
     At each start the observer has seen the record up to that sample and nothing after it. From there on the equations
     run on the recorded inputs; gusts fade and drifts stay as the observer last saw them. `close_loop` names axes that
@@ -93,7 +111,10 @@ def predict(
     """
     seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=round(horizon / record.dt))
     n, ahead = record.time.size, round(horizon / record.dt)
-    starts = np.arange(round(settling / record.dt), max(n - 1, 0), max(1, round(every / record.dt)))
+    first, step = round(settling / record.dt), max(1, round(every / record.dt))
+    if early is not None:
+        first -= max(0, (first - round(early / record.dt)) // step) * step
+    starts = np.arange(first, max(n - 1, 0), step)
     kept = [vehicle.index(name) for name in PREDICTED]
     laws = learnt(vehicle, record, seen.filtered.x[:, kept], axes=close_loop, seconds=settling)
     closed = None

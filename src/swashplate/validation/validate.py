@@ -29,16 +29,16 @@ from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.record import monitored
 from swashplate.validation import innovations
-from swashplate.validation.bands import BandedRecord, bands, check_draws
+from swashplate.validation.bands import FEWEST_DRAWS, BandedRecord, bands, check_draws, widening
 from swashplate.validation.black_box import FilteredMotion
 from swashplate.validation.contact import Contact, contact
 from swashplate.validation.controller_law import Law, check_closed
 from swashplate.validation.flight_floors import ClosedRecord, ScoredRecord, closed_floors, flight_floors, motion_of
 from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.paths import spread
-from swashplate.validation.prediction import Predictions, naive, predict, prediction_sigma
+from swashplate.validation.prediction import SETTLING, Predictions, naive, predict, prediction_sigma
 from swashplate.validation.validation import Example, Score, Validation
-from swashplate.validation.verdict import THRESHOLDS, verdict
+from swashplate.validation.verdict import JUDGED_AHEAD, THRESHOLDS, verdict
 
 _JUDGED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 _T = TypeVar("_T", Noise, Nuisance)
@@ -56,6 +56,7 @@ class _Rival:
     vehicle: Vehicle
     nuisance: Nuisance
     predictions: Predictions
+    early: Predictions  # from starts within the calibration
 
 
 def validate(
@@ -87,7 +88,8 @@ def validate(
         close_loop: axes ("yaw", "heave") whose controller, as those seconds tell it, also predicts in the place of the
             recorded command, which answers gusts that no prediction knows.
         draws: models that the fit cannot tell from this one (`fit.draw(39, seed=1)`). Each predicts too; bands of their
-            spread, of the start, of the gusts to come and of the sensors' noise are held against the flights.
+            spread, of the start, of the gusts to come and of the sensors' noise are held against the flights. Without
+            any the model itself makes the bands, at the horizons of the verdict, as if its numbers were known.
         progress: called with the number of records done and their number.
 
     Raises:
@@ -149,9 +151,10 @@ def validate(
                 horizon=ahead,
                 every=every,
                 settling=calibration,
+                early=None if rivals else SETTLING,
                 close_loop=() if rivals else close_loop,
             )
-            rivals[name] = _Rival(flown, nuisance, predictions)
+            rivals[name] = _Rival(flown, nuisance, *reversed(predictions.split(round(calibration / piece.dt))))
         own = rivals["model"]
         laws.extend(own.predictions.laws)
         calibrated.append(own.nuisance)
@@ -160,9 +163,18 @@ def validate(
         judged.extend(excitation(vehicle, piece, measured_states(piece, Nuisance())))
         measured.append(truth)
         sigma = prediction_sigma(vehicle, piece, noise=noise, nuisance=own.nuisance, horizon=ahead)
-        fan = None
-        if draws:
-            fan = spread(draws, piece, noise=noise, nuisance=own.nuisance, predictions=own.predictions, truth=truth)
+        wider = _wider(piece, own, truth, sigma, every=every, horizon=min(horizons))
+        furthest = ahead if draws else min(ahead, JUDGED_AHEAD)
+        fan = spread(
+            draws or (vehicle,) * FEWEST_DRAWS,
+            piece,
+            noise=noise,
+            nuisance=own.nuisance,
+            predictions=own.predictions,
+            truth=truth,
+            longest=round(furthest / piece.dt),
+            wider=wider,
+        )
         for horizon in horizons:
             if horizon <= ahead:
                 starts, made = _at_horizon(piece, rivals, horizon)
@@ -172,12 +184,12 @@ def validate(
                     predicted = own.predictions.closed[: len(starts), round(horizon / piece.dt) - 1]
                     looped.setdefault(horizon, []).append(ClosedRecord(piece.time[starts], predicted, *made["model"]))
                 promised = sigma[round(horizon / piece.dt) - 1]
-                if fan is not None:
+                if horizon <= furthest:
                     banded.setdefault(horizon, []).append(fan.at(horizon, piece, starts))
                 scored.setdefault(horizon, []).append(
                     ScoredRecord(piece.name, motion_of(piece, truth, starts), promised)
                 )
-        shown = np.broadcast_to(sigma, own.predictions.states.shape) if fan is None else fan.sigma
+        shown = fan.sigma if draws else np.broadcast_to(sigma, own.predictions.states.shape)
         examples.extend(_examples(piece, own, shown[:, : round(_EXAMPLE / piece.dt)]))
         settled = round(calibration / piece.dt)
         pushed = contact(piece.name, piece.time[settled:], truth[settled:], own.predictions.disturbances[settled:])
@@ -191,7 +203,7 @@ def validate(
         )
         if progress is not None:
             progress(number + 1, float(len(pieces)))
-    scores = _scores(parts)
+    scores, judged_bands = _scores(parts), bands(banded)
     beside = flight_floors(
         scored,
         {k: v for k, v in parts.items() if not (alone and k[0] == "published card")},
@@ -207,7 +219,9 @@ def validate(
         log_likelihood={
             name: float(np.mean([item[name] for item in likelihoods])) for name in ("model", "published card")
         },
-        verdict=verdict([s for s in scores if not (alone and s.predictor == "published card")], judged, beside),
+        verdict=verdict(
+            [s for s in scores if not (alone and s.predictor == "published card")], judged, beside, judged_bands
+        ),
         thresholds=THRESHOLDS,
         examples=tuple(examples),
         records=tuple(pieces),
@@ -227,13 +241,21 @@ def validate(
         without_contact=_scores(_without_contact(parts, scored, contacts)),
         loop_closed=closed_floors(looped),
         laws=tuple(laws),
-        bands=bands(banded),
+        bands=judged_bands,
         not_logged=tuple(
             name
             for name in (*(s for s in vehicle.state_names if s.startswith("omega")), "voltage")
             if any(name not in flight for flight in flights)
         ),
     )
+
+
+def _wider(piece: Record, own: _Rival, truth: Array, sigma: Array, *, every: float, horizon: float) -> Array:
+    """How much wider the bands of a record are to be, by its first seconds (see `widening`)."""
+    ahead = round(horizon / piece.dt)
+    starts = own.early.starts[own.early.starts + ahead < own.predictions.starts[0]]
+    errors = truth[starts + ahead] - own.early.states[: len(starts), ahead - 1]
+    return widening(errors, sigma[ahead - 1], seconds=len(starts) * every, horizon=horizon)
 
 
 def _without_contact(

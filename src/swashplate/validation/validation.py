@@ -14,7 +14,7 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
-from swashplate.validation.bands import Band, in_brief
+from swashplate.validation.bands import Band, in_brief, widened_words
 from swashplate.validation.contact import Contact
 from swashplate.validation.controller_law import Law
 from swashplate.validation.floors import ROWS, Floor
@@ -112,8 +112,9 @@ class Validation(Shown):
         without_contact: the model's scores from starts that no mask touches.
         loop_closed: fits with controllers in the place of recorded commands, and their lead over the model's on those;
             nothing where no loop was closed. `laws`: the controllers.
-        bands: how much of the flights the bands of the predictions hold; nothing where no draws were given. Then the
-            examples' sigmas have the parameters' part and the sensors' noise in them too.
+        bands: how much of the flights the bands of the predictions hold: with draws at all horizons, and the examples'
+            sigmas have the parameters' part and the sensors' noise in them too; without, those of the model alone at
+            the verdict's.
         not_logged: rotor speeds and voltage that the model has and some flight does not.
     """
 
@@ -153,7 +154,9 @@ class Validation(Shown):
     @property
     def bands_told(self) -> list[str]:
         """Which bands hold and which do not, a sentence by horizon."""
-        return [in_brief(self.bands, horizon) for horizon in dict.fromkeys(band.horizon for band in self.bands)]
+        horizons, drawn = dict.fromkeys(band.horizon for band in self.bands), bool(self.settings.get("draws"))
+        told = [in_brief(self.bands, horizon, drawn=drawn) for horizon in horizons] + [widened_words(self.bands)]
+        return [words for words in told if words]
 
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types (no time histories)."""

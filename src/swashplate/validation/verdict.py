@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.validation.bands import SURE, Band
 from swashplate.validation.floors import Floor
 from swashplate.validation.validation import AxisVerdict, Score
 
@@ -23,10 +25,15 @@ _AXES = {
     "heave": (("w",), 0.5),
     "horizontal": (("u", "v"), 0.5),
 }
+JUDGED_AHEAD = max(horizon for _, horizon in _AXES.values())
+"""Furthest horizon [s] that a verdict looks at."""
 
 
 def verdict(
-    scores: Sequence[Score], excitation: Sequence[AxisExcitation], floors: Sequence[Floor] = ()
+    scores: Sequence[Score],
+    excitation: Sequence[AxisExcitation],
+    floors: Sequence[Floor] = (),
+    bands: Sequence[Band] = (),
 ) -> tuple[AxisVerdict, ...]:
     """Judge every axis whose channels were scored.
 
@@ -34,6 +41,7 @@ def verdict(
         scores: of all predictors.
         excitation: of the flights that were predicted.
         floors: what the model's scores stand beside; the words say whether the model or the flight is poor.
+        bands: of the predictions; the words say which hold less than they promise.
     """
     made = []
     for axis, (channels, horizon) in _AXES.items():
@@ -42,7 +50,10 @@ def verdict(
             continue
         judged = [item for item in excitation if item.axis == axis]
         beside = [f for f in floors if f.channel in channels and abs(f.horizon - horizon) < 1e-9]
-        made.append(_one(axis, channels, horizon, rows, judged, beside))
+        one = _one(axis, channels, horizon, rows, judged, beside)
+        narrow = [b for b in bands if b.channel in channels and abs(b.horizon - horizon) < 1e-9 and b.promised == SURE]
+        told = " ".join([one.words, *(b.warning for b in narrow if b.warning)])
+        made.append(replace(one, words=told))
     return tuple(made)
 
 

@@ -14,7 +14,7 @@ from swashplate.errors import CardError
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import trace_vehicle
 from swashplate.models.nesting import rebuild
-from swashplate.models.residual import ROWS, coefficients, facing, refuse_predictor, with_residual
+from swashplate.models.residual import ROWS, carrying, coefficients, facing, refuse_predictor, with_residual
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
@@ -68,6 +68,17 @@ def test_it_comes_back_from_its_file_with_the_same_equations(tmp_path: Path) -> 
     assert equations_of(again) != equations_of(sp.vehicle("crazyflie"))
     x, u = state(made), [0.8] * 4
     assert again.rates(x, u, again.values()) == made.rates(x, u, made.values())
+
+
+def test_equations_with_a_residual_take_a_card_with_one_or_without() -> None:
+    """As a fit's document is loaded beside the model that it made: its start has no residual, its end another one."""
+    made, plain, other = wider(q_theta=-4.0), sp.vehicle("crazyflie"), wider(w_w=0.5)
+    for card, like in ((plain.card, plain), (other.card, other), (made.card, made)):
+        again = carrying(made, card)
+        assert equations_of(again) == equations_of(like)
+        x, u = state(plain), [0.8] * 4
+        assert again.rates(x, u, again.values()) == like.rates(x, u, like.values())
+        assert again.card.values() == like.card.values()
 
 
 def test_a_coefficient_that_is_missing_or_strange_is_named(tmp_path: Path) -> None:

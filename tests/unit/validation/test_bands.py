@@ -12,18 +12,32 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import records
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.validation.bands import ROWS, BandedRecord, bands, check_draws, in_brief, pairs
+from swashplate.validation.bands import (
+    ROWS,
+    SURE,
+    BandedRecord,
+    bands,
+    check_draws,
+    in_brief,
+    pairs,
+    widened_words,
+    widening,
+)
 from swashplate.validation.paths import paths
 from swashplate.validation.prediction import predict
 
 
-def _record(width: float, *, seconds: float = 300.0, shift: float = 0.0) -> BandedRecord:
+def _record(
+    width: float, *, seconds: float = 300.0, shift: float = 0.0, share: float = 0.25, wider: float = 1.0
+) -> BandedRecord:
     """Truths by a standard normal law, a start every second, among 39 paths of another width."""
     random, starts = np.random.default_rng(3), round(seconds)
     ways = shift + width * random.standard_normal((39, starts, len(PREDICTED)))
-    below = np.sum(ways < random.standard_normal((starts, len(PREDICTED))), axis=0)
+    came = random.standard_normal((starts, len(PREDICTED)))
+    below = np.sum(ways < came, axis=0)
     ones = np.full(below.shape, width**2)
-    return BandedRecord(np.arange(starts) * 1.0, below, 39, ones, 0.25 * ones)
+    wider = np.where(np.arange(len(PREDICTED)) == PREDICTED.index("r"), wider, 1.0)
+    return BandedRecord(np.arange(starts) * 1.0, below, 39, ones, share * ones, (came - shift) ** 2, wider)
 
 
 def _levels(record: BandedRecord) -> dict[float, set[str]]:
@@ -63,6 +77,48 @@ def test_what_a_band_says() -> None:
     cells = [cell(half, most) for _, cell in ROWS]
     assert cells[1] == cells[3] == "too narrow"
     assert cells[4:6] == [f"{np.degrees(0.5):.3g}", "deg/s"]
+
+
+@pytest.mark.parametrize(("width", "warned"), [(0.4, True), (1.0, False), (2.5, False)])
+def test_a_band_that_is_too_narrow_says_by_how_much_and_no_other(width: float, warned: bool) -> None:
+    found = [band for band in bands({0.5: [_record(width)]}) if band.promised == SURE]
+    assert {bool(band.warning) for band in found} == {warned}
+    p = next(band for band in found if band.channel == "p")
+    assert p.off == pytest.approx(1.0 / width, rel=0.1)
+    if warned:
+        assert f"the 95 % band holds {p.held:.0f} % [" in p.warning
+        assert f"errors are {p.off:.1f} times what it allows for" in p.warning
+        alone = next(b for b in bands({0.5: [_record(width, share=0.0)]}) if (b.channel, b.promised) == ("p", SURE))
+        assert "as if the model's numbers were known" in alone.warning
+        assert in_brief([alone], 0.5, drawn=False).startswith("Bands 0.5 s ahead by the model alone")
+    else:
+        assert in_brief(found, 0.5, drawn=False) == ""
+
+
+def test_bands_are_widened_by_first_seconds_that_are_missed_and_only_by_chance_otherwise() -> None:
+    """Five independent starts tell a spread to a third: errors within it change nothing, thrice as large ones do."""
+    random, count = np.random.default_rng(5), len(PREDICTED)
+    sigma = np.geomspace(1e-3, 10.0, count)
+
+    def found(size: float) -> np.ndarray:
+        errors = size * sigma * random.standard_normal((400, 5, count))
+        return np.array([widening(each, sigma, seconds=2.5, horizon=0.5) for each in errors])
+
+    assert np.mean(found(1.0) > 1.0) == pytest.approx(0.05, abs=0.015)
+    missed = found(3.0)
+    assert np.mean(missed > 1.0) > 0.9
+    assert np.sqrt(np.mean(missed**2)) == pytest.approx(3.0, rel=0.05)
+    # Starts closer together than the horizon tell no more.
+    often = np.repeat(1.7 * sigma[None], 50, axis=0)
+    assert np.all(widening(often, sigma, seconds=2.5, horizon=0.5) > 1.0)
+    assert np.all(widening(often, sigma, seconds=2.5, horizon=2.0) == 1.0)
+    assert np.all(widening(often[:0], sigma, seconds=0.0, horizon=0.5) == 1.0)
+
+
+def test_what_was_widened_is_told() -> None:
+    assert widened_words(bands({0.5: [_record(1.0)]})) == ""
+    words = widened_words(bands({0.5: [_record(1.0), _record(1.0, wider=2.5)]}))
+    assert "by what the first seconds were missed: r 2.5 times" in words
 
 
 def test_draws_that_leave_no_whole_number_of_paths_outside_are_refused() -> None:

@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.validation.bands import Band
 from swashplate.validation.innovations import check, log_likelihood
 from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.prediction import naive
@@ -119,6 +120,16 @@ def test_a_model_that_a_rival_beats_is_poor_however_well_it_scores() -> None:
     (found,) = verdict(scores, [_excited("pitch", identifiable=True)])
     assert found.level == "poor"
     assert found.words.endswith("Beaten in theta.")
+
+
+@pytest.mark.parametrize(("held", "ahead", "told"), [(60.0, 0.5, True), (94.0, 0.5, False), (60.0, 2.0, False)])
+def test_a_verdict_says_of_its_axis_that_the_band_is_too_narrow(held: float, ahead: float, told: bool) -> None:
+    """However well the axis is predicted, and whether draws were given or not; other horizons are no part of it."""
+    scores = _scores(psi={"model": 80.0, "hold": 0.0}, r={"model": 80.0, "hold": 0.0})
+    band = Band("r", "rad/s", ahead, 95.0, held, held - 3.0, held + 3.0, 0.3, 0.0, 200, 2.8)
+    (found,) = verdict(scores, [_excited("yaw", identifiable=True)], bands=[band])
+    assert found.level == "good"
+    assert (band.warning != "" and band.warning in found.words) == told
 
 
 def test_an_axis_that_no_record_moves_cannot_be_judged_and_one_that_any_moves_can() -> None:
