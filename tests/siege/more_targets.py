@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Callable, Mapping
 from importlib import resources
@@ -63,7 +62,7 @@ def _use_campaign(path: Path) -> None:
 
 def _result(ending: str) -> bytes:
     table = {"seed": np.arange(4), "verdict": np.array(["found", "lost"] * 2), "tau": np.linspace(0.0, 1.0, 4)}
-    return packed(table, ending=ending)
+    return packed(table, ending=ending, task="task")
 
 
 def _use_result(path: Path) -> None:
@@ -77,7 +76,8 @@ def _plan() -> bytes:
     with tempfile.TemporaryDirectory() as name:
         (Path(name) / "a.toml").write_text(CAMPAIGN)
         made = plan_campaign(Path(name) / "a.toml")
-        return json.dumps({"kind": "campaign-plan", "schema": 1, **made.stored()}).encode()
+        CampaignStore(name).begin(made.text, made.stored(), {})
+        return (Path(name) / PLAN).read_bytes()
 
 
 def _use_plan(path: Path) -> None:
