@@ -97,8 +97,9 @@ def test_one_sweep_cannot_tell_two_inputs_apart_and_no_window_feigns_it(sweeps: 
     alone = respond(sweeps[0], inputs=INPUTS, outputs=OUTPUTS, band=(0.2, 10.0))
     assert np.isfinite(alone.response).any(axis=(1, 2)).mean() < 0.1
     assert all(alone.band(o, i) is None for o in OUTPUTS for i in INPUTS)
-    (text,) = alone.problems
-    assert "'mixer_pitch' and 'mixer_roll' move together" in text
+    answer, together = alone.problems
+    assert "'mixer_pitch' is a controller's answer" in answer
+    assert "'mixer_pitch' and 'mixer_roll' move together" in together
 
 
 def test_collective_to_vertical_acceleration(shared_data: Path) -> None:

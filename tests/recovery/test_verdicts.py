@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import r50
+from swashplate.flights.excitation import excitations
 from swashplate.flights.flight import Flight, stream
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, cost_of
 from swashplate.identification.frequency.state_space_fit import fit_state_space, fit_targets
@@ -52,7 +53,8 @@ def unseen(truth: StateSpaceModel) -> list[Piece]:
 def piece(flight: Flight, model: StateSpaceModel) -> Piece:
     """Every second sample of a record, as deviations from its means."""
     u, y = (flight.array(names)[::2] for names in (model.inputs, model.outputs))
-    return Piece(flight.provenance.source, u - u.mean(axis=0), y - y.mean(axis=0), 2.0 / r50.RATE)
+    moved = any(one.outside for one in excitations(flight, model.inputs, outputs=model.outputs))
+    return Piece(flight.provenance.source, u - u.mean(axis=0), y - y.mean(axis=0), 2.0 / r50.RATE, moved)
 
 
 def said(model: StateSpaceModel, pieces: list[Piece]) -> Judgement:

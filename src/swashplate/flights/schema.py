@@ -148,6 +148,13 @@ def is_known(name: str) -> bool:
     return name in CHANNELS or _family(name) is not None
 
 
+def axis_of(name: str) -> str:
+    """The axis that a command of the schema, or a stick, moves: "roll", "pitch", "yaw", "collective"; "" for others."""
+    last = {"throttle": "collective"}.get(word := name.rpartition("_")[2], word)
+    command = name in CHANNELS or name.startswith("stick_")
+    return last if command and last in ("roll", "pitch", "yaw", "collective") else ""
+
+
 def channel(name: str) -> Channel:
     """The schema's entry for `name`; an unknown name becomes a channel without a promise about its frame."""
     return CHANNELS.get(name) or _family(name) or Channel(name, "", "not in the schema")

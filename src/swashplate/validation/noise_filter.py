@@ -14,13 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
-from swashplate.identification.time.feedback import FOLLOWS
 
 _MEMORY = 2.0
 """Longest fading time [s] of the filter: gusts and attitudes, which the outputs need not hold, last about as long."""
-
-_LAGS = 0.25
-"""Seconds of motion before and after a command that are compared for explaining it."""
 
 _LEAST = 1e-4
 """Innovations below this share of a channel's movement are no noise, but how it was made (derived, or simulated)."""
@@ -34,12 +30,19 @@ _ROWS_PER_NUMBER = 4.0
 
 @dataclass(frozen=True)
 class Piece:
-    """One unbroken record: deviations of the inputs (n, m) and outputs (n, k), step [s]."""
+    """One unbroken record.
+
+    Attributes:
+        source: its name. inputs, outputs: deviations (n, m), (n, k). dt: step [s].
+        moved: whether something from outside moved an input (`flights/excitation.py`). In a loop without a sweep
+            commands and motion are related by minus the controller's inverse, whatever the model.
+    """
 
     source: str
     inputs: Array
     outputs: Array
     dt: float
+    moved: bool
 
 
 @dataclass(frozen=True)
@@ -208,24 +211,6 @@ class NoiseLevel:
         behind = np.maximum(2.0 * INDEPENDENT * self.free, 1.0)
         square = self.floor[record] * fisher.isf(chance, self.freedom[record], behind)
         return np.asarray(np.sqrt(square)[:, None])
-
-
-def moved_by_itself(piece: Piece, every: int) -> bool:
-    """Whether some input is more than a controller's answer: later motion tells it better than past motion does.
-
-    In a loop without a sweep commands and motion are related by minus the controller's inverse, whatever the model.
-    """
-    u, y = averaged(piece.inputs, every), averaged(piece.outputs, every)
-    n, order = len(u), int(np.clip(round(_LAGS / (piece.dt * every)), 3, 12))
-    now = u[order : n - order]
-    left = []
-    for sign in (-1, 1):
-        lags = [y[order + sign * lag : n - order + sign * lag] for lag in range(1, order + 1)]
-        around = np.hstack([*lags, np.ones((len(now), 1))])
-        around = around / np.maximum(np.linalg.norm(around, axis=0), 1e-300)
-        left.append(np.mean((now - around @ np.linalg.lstsq(around, now, rcond=1e-10)[0]) ** 2, axis=0))
-    moved = np.std(now, axis=0) > 0.0
-    return bool(np.any(moved & (left[0] >= FOLLOWS * left[1])))
 
 
 def averaged(values: Array, every: int) -> Array:

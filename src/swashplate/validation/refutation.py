@@ -23,7 +23,7 @@ from swashplate.identification.frequency.response_cost import INDISTINGUISHABLE,
 from swashplate.identification.time.linear_simulation import answers
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.validation.asked_changes import AskedChange, ParameterErrors
-from swashplate.validation.noise_filter import NoiseFilter, NoiseLevel, Piece, averaged, moved_by_itself, spectrum
+from swashplate.validation.noise_filter import NoiseFilter, NoiseLevel, Piece, averaged, spectrum
 
 REFUTED, STANDS, OPEN = "refuted", "not refuted", "cannot be judged"
 
@@ -168,7 +168,7 @@ def judge(
         # No sum of errors is larger than the sum of their sizes.
         allowed = largest + np.maximum(own, MATERIAL * controls) + unsure
         limit = HEARD * largest**2
-        admitted = noise.known & moved_by_itself(piece, every) & np.ones(left.shape, dtype=bool)
+        admitted = noise.known & piece.moved & np.ones(left.shape, dtype=bool)
         heard = (bare > limit) & admitted
         claims |= [bool(np.any(noise.power(r, part) > limit)) for part in np.moveaxis(seen.forced, 2, 0)]
         for share, power in ((loudest, np.ones(controls.shape)), (shares, np.maximum(controls, 1e-300))):
@@ -192,7 +192,7 @@ def judge(
             for k, output in enumerate(outputs)
         ]
     silent = tuple(n for n, told in zip(model.inputs, claims, strict=True) if not told)
-    led = any(moved_by_itself(piece, every) for piece in pieces)
+    led = any(piece.moved for piece in pieces)
     changes = _asked(model, bounded, told, loudest, shares)
     return _in_words(tuple(findings), changes, silent, samples, constants, led=led)
 
@@ -236,7 +236,7 @@ def _in_words(
             if heard
             else "the controls do not stand out of gusts and noise in any output or band: fly a sweep."
             if led
-            else "past motion predicts the commands as well as later motion does: they may be a controller's answer."
+            else "nothing from outside moved the controls: they are a controller's answer, or nobody can tell."
         )
         return Judgement(OPEN, (words,), findings, silent, samples, constants)
     told = [f for f in findings if f.heard]

@@ -95,6 +95,7 @@ def verify_vehicle(
         vehicle,
         shared,
         traces,
+        owners=[piece for flight in flights for piece in flight.split()],
         inputs=vehicle.input_names,
         units=units,
         warnings=warnings,

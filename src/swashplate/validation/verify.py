@@ -18,6 +18,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.filters import filtered
+from swashplate.flights.excitation import excitations
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.records import uniform_table
 from swashplate.identification.core.sources import DataSource, sources_of
@@ -30,7 +31,8 @@ from swashplate.validation.black_box import CROSSED, Ceiling
 from swashplate.validation.ceiling_along import ceiling_along
 from swashplate.validation.floors import Floor, floors
 from swashplate.validation.noise_filter import Piece
-from swashplate.validation.refutation import REFUTED, Judgement, judge
+from swashplate.validation.other_inputs import other_inputs
+from swashplate.validation.refutation import OPEN, REFUTED, Judgement, judge
 from swashplate.validation.verification import GOOD_TIC, OutputVerification, Trace, Verification
 
 _WEIGHT = {"rad": np.degrees(1.0), "rad/s": np.degrees(1.0), "m/s": 1.0 / 0.3048, "m/s^2": 1.0 / 0.3048}
@@ -100,6 +102,7 @@ def verify(
     stretch = PERIODS / (low or (band[0] if band else LOW))
     m = len(model.inputs)
     traces: list[Trace] = []
+    owners: list[Flight] = []
     pieces: list[Piece] = []
     costs: dict[str, list[Array]] = {HOLD: [], HOLD_RATE: [], NO_CONTROL: []}
     constants = 0
@@ -110,7 +113,8 @@ def verify(
             dt = float((time[-1] - time[0]) / (time.size - 1))
             source = piece.provenance.source or "flight"
             moved = table - table.mean(axis=0)
-            pieces.append(Piece(source, moved[:, :m], moved[:, m:], dt))
+            outside = any(one.outside for one in excitations(piece, model.inputs, outputs=shared))
+            pieces.append(Piece(source, moved[:, :m], moved[:, m:], dt, outside))
             if band is not None:
                 table = filtered(table, rate=1.0 / dt, cutoff=(band[0], min(band[1], _TOP / dt)), order=_ORDER)
             count = max(1, round(time.size * dt / stretch))
@@ -118,6 +122,7 @@ def verify(
                 name = f"{source} {time[part][0]:.2f}-{time[part][-1]:.2f} s"
                 trace, still, free = _flown(model, shared, name, time[part], table[part], dt, shifts)
                 traces.append(trace)
+                owners.append(piece)
                 constants += free
                 costs[NO_CONTROL].append(still * weight)
                 ramp = np.linspace(-1.0, 1.0, part.size)[:, None]
@@ -129,16 +134,18 @@ def verify(
             f"the flights have different rates (steps of {sorted({round(p.dt, 9) for p in pieces})} s).",
             hint="Condition all of them to the same rate.",
         )
+    judgement = judge(model, pieces, shared, band=band) if judged else None
     return verified(
         model,
         shared,
         traces,
+        owners=owners,
         inputs=model.inputs,
         units=model.units,
         warnings=warnings,
         data=data,
         settings={"shifts": shifts, "band_hz": list(band) if band else None},
-        judgement=judge(model, pieces, shared, band=band) if judged else None,
+        judgement=judgement,
         rivals={name: float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) for name, parts in costs.items()},
         constants=constants,
     )
@@ -149,6 +156,7 @@ def verified(
     outputs: tuple[str, ...],
     traces: Sequence[Trace],
     *,
+    owners: Sequence[Flight],
     inputs: tuple[str, ...],
     units: Mapping[str, str],
     warnings: Sequence[str],
@@ -161,15 +169,23 @@ def verified(
     """What a model did along records, with its figures.
 
     Args:
-        model: what was flown. outputs: compared. traces: the records. inputs: of the model. units: of both.
+        model: what was flown. outputs: compared. traces: the records. owners: the flight of each trace.
+        inputs: of the model. units: of both.
         warnings, data, settings, judgement, rivals, constants: see `Verification`.
     """
     rows, told = _judged(units, outputs, traces), list(warnings)
     lost = [f"{o.output} ({o.theil:.2f})" for o in rows if o.theil > GOOD_TIC]
+    others: dict[str, str] = {}
+    if lost or (judgement is not None and judgement.verdict == OPEN):
+        errors = {o: [(t.time, t.flight[:, k] - t.model[:, k]) for t in traces] for k, o in enumerate(outputs)}
+        others = other_inputs(owners, inputs, errors)
     if lost:
         refuted = judgement is not None and judgement.verdict == REFUTED
-        why = "The records refute it." if refuted else "What moved them may be no input (gusts)."
+        gusts = "What moved them may be no input (gusts)."
+        why = "The records refute it." if refuted else " ".join(others.values()) or gusts
         told.append(f"Theil's coefficient above {GOOD_TIC:g}: {', '.join(lost)}. The model does not follow. {why}")
+    elif others:
+        told += others.values()
     weight = np.array([_WEIGHT.get(units.get(n, ""), 1.0) for n in outputs])
     errors = np.concatenate([t.flight - t.model for t in traces]) * weight
     cost = float(np.sqrt(np.mean(errors**2)))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from swashplate.flights.conditioning.uniform_records import STICK
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import QUATERNION, channel
 
@@ -32,7 +33,7 @@ def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str,
     """Other commands on the same time base in all flights, which may have moved with the first of the named inputs.
 
     A command has the unit "1", or none where that input has none (a table without units). The terms of a controller
-    (`pid_p_roll`) are no commands: their sum is in the command.
+    (`pid_p_roll`) are no commands: their sum is in the command. Nor are sticks beside what a controller makes of them.
     """
 
     def commands(flight: Flight) -> set[str]:
@@ -48,23 +49,8 @@ def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str,
         }
 
     shared = set.intersection(*(commands(flight) for flight in flights))
-    return tuple(
-        sorted(name for name in shared - set(named) - set(QUATERNION) if not name.startswith((*INJECTED, "pid_")))
-    )
-
-
-def slowest_of(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, float]:
-    """The channel that was logged most slowly, by its flight's history, and its rate [Hz] (infinite for none)."""
-    rates = {
-        name: float(rate)
-        for flight in flights
-        for step in flight.history
-        if step.operation == "resample"
-        for name, rate in step.details.get("slower", {}).items()
-        if name in names
-    }
-    slow = min(rates, key=lambda name: rates[name], default="")
-    return slow, rates.get(slow, np.inf)
+    none = (*INJECTED, "pid_", *(() if named[0].startswith(STICK) else STICK))
+    return tuple(sorted(name for name in shared - set(named) - set(QUATERNION) if not name.startswith(none)))
 
 
 def means(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, float]:

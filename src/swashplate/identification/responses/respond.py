@@ -11,21 +11,19 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
-from swashplate.flights.conditioning.uniform_records import renamed_channels
+from swashplate.flights.conditioning.uniform_records import renamed_channels, slowest_of
 from swashplate.flights.consistency import refuse_inconsistent
+from swashplate.flights.excitation import excitations, of_inputs
 from swashplate.flights.flight import Flight, as_flights
-from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.identification.core.record_facts import (
     INJECTED,
     autopilot_gains,
     bystanders_of,
     means,
-    slowest_of,
     unit_of,
 )
 from swashplate.identification.core.sources import hashes, sources_of
 from swashplate.identification.responses import response_warnings
-from swashplate.identification.responses.answers import answer_words
 from swashplate.identification.responses.composite import composite
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.responses.input_shares import own_shares
@@ -115,6 +113,8 @@ def respond(
     kept = [k for k, piece in enumerate(pieces) if piece.duration >= SHORTEST * longest]
     scraps = [piece.name for k, piece in enumerate(pieces) if k not in kept]
     tracked = None if references or direct else own_references(flights, pieces, inputs)
+    swept = [name for name, seen in zip(inputs, tracked.swept, strict=True) if seen] if tracked else []
+    moved = of_inputs(excitations(flights, inputs, outputs=outputs, references=references, swept=swept))
     pieces, sweep = [pieces[k] for k in kept], [sweep[k] for k in kept]
     n = len(inputs) + len(outputs)
     own = [replace(piece, values=piece.values[:, :n]) for piece in pieces]
@@ -167,10 +167,8 @@ def respond(
         f"reference '{name}' never moves: nothing was injected, so the joint estimate has no number."
         for name in response_warnings.still(flights, references)
     ]
-    told = any(event.kind == "sweep" for flight in flights for event in flight.provenance.events)
-    if not question.references and not told:
-        answers = answer_words(pieces, inputs, outputs)
-        problems += [] if answers and any(map(sweeps, flights)) else answers
+    problems += response_warnings.answers(moved)
+    warnings += response_warnings.unsure(moved)
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
         beside = _composed(matrices, omega, replace(question, references=0), [None] * len(matrices))
@@ -194,7 +192,14 @@ def respond(
         warnings += response_warnings.unused_references(flights, inputs, names=INJECTED, axes=axes)
     if others and not references and not all(name.startswith(INJECTED) for name in inputs):
         warnings += response_warnings.bystander_words(
-            pieces, omega, inputs, outputs, others, window=chosen.lengths[len(chosen.lengths) // 2], overlap=overlap
+            pieces,
+            omega,
+            inputs,
+            outputs,
+            others,
+            window=chosen.lengths[len(chosen.lengths) // 2],
+            overlap=overlap,
+            incoherent=[o for o in outputs if all(made.band(o, name) is None for name in inputs)],
         )
     return replace(
         made,
@@ -208,6 +213,7 @@ def respond(
             "overlap": overlap,
             "references": list(references),
             **({"sweeps": list(tracked.sweeps)} if tracked else {}),
+            "excitation": {name: {"kind": one.kind, "words": one.words} for name, one in moved.items()},
             "averages": [m.averages for m in matrices],
             **({"channels": called} if (called := renamed_channels(flights, (*inputs, *outputs))) else {}),
             **autopilot_gains(flights),

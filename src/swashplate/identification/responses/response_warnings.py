@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.flights.excitation import CONTROLLER, FLY, UNKNOWN, Excitation
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.sources import DataSource
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
@@ -52,6 +53,21 @@ def dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str
         for role, names in (("input", inputs), ("output", outputs))
         for name in still(flights, names)
     ]
+
+
+def answers(moved: Mapping[str, Excitation]) -> list[str]:
+    """Inputs that are a controller's answer."""
+    return [
+        f"{one.record}: input '{name}' is {one.words} Its responses are minus the controller's inverse, not the "
+        f"aircraft's, however coherent. {FLY}"
+        for name, one in moved.items()
+        if one.kind == CONTROLLER
+    ]
+
+
+def unsure(moved: Mapping[str, Excitation]) -> list[str]:
+    """Inputs of which nobody knows whether they are a controller's answer."""
+    return [f"{one.record}: input '{name}': {one.words}" for name, one in moved.items() if one.kind == UNKNOWN]
 
 
 def damaged(logs: Sequence[DataSource]) -> list[str]:
@@ -233,11 +249,13 @@ def bystander_words(
     *,
     window: float,
     overlap: float,
+    incoherent: Sequence[str] = (),
 ) -> list[str]:
     """Commands left out that change the answer: compared in one window, with and without them.
 
     A middle window: enough averages to be sure of a difference, long enough to see the low end. The pieces hold
-    inputs, outputs and the others, in this order.
+    inputs, outputs and the others, in this order. Of outputs that the inputs do not move (`incoherent`), those are
+    named that move them: before gusts are blamed, every command is asked.
     """
     n_in, n_out = len(inputs), len(outputs)
     first = pieces[0].values.shape[1] - len(others)
@@ -256,18 +274,24 @@ def bystander_words(
             # What it adds must be real: its own share, its own effect, and noise that it explains away.
             quieter = (1.0 - both.multiple) < EXPLAINED * (1.0 - alone.multiple)
         for o, output in enumerate(outputs):
+            acts = quieter[:, o] & (both.coherence[:, o, n_in] >= CLEAR)
+            before = len(words)
             for i, mover in enumerate(inputs):
                 h, b = alone.response[:, o, i], both.response[:, o, i]
                 with np.errstate(divide="ignore", invalid="ignore"):
                     apart = np.abs(np.log(h / b))
                 bound = np.maximum(3.0 * both.error[:, o, i], np.log(10.0) / 40.0)
-                off = (both.error[:, o, i] < SURE) & (apart > bound) & quieter[:, o]
-                off &= both.coherence[:, o, n_in] >= CLEAR
+                off = (both.error[:, o, i] < SURE) & (apart > bound) & acts
                 if off.sum() > max(2, 0.05 * np.isfinite(h).sum()):
                     words.append(
                         f"{output} / {mover}: '{name}' moved along and acts on {output} too at {_hertz(omega, off)}; "
                         f"this single response is wrong there. Add '{name}' to the inputs, and logs that move each."
                     )
+            if len(words) == before and output in incoherent and acts.sum() > max(2, 0.05 * omega.size):
+                words.append(
+                    f"{output}: '{name}' explains at {_hertz(omega, acts)} what the inputs leave. Add '{name}' to the "
+                    "inputs."
+                )
     return words
 
 

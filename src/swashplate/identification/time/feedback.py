@@ -1,9 +1,7 @@
 """Does a record move each axis by itself, or is the command only a controller's answer to the motion?
 
-A command that past motion explains carries no information of its own: whatever relates it to the motion is the
-controller, and a fit of the aircraft to it may well find minus the controller's inverse (Ljung 1999, ch. 13). A slow
-sweep is explained by past motion too, because it can be predicted; but what the aircraft does comes after the command,
-so the motion that follows then explains it better still, which it does not where the command is an answer.
+The question of `flights/feedback.py`, asked of the axes of a vehicle. A fit in time can use more than a response can:
+predictions from the past stay right under feedback as long as something of the command is its own (Ljung 1999, ch. 13).
 """
 
 from __future__ import annotations
@@ -14,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.flights.feedback import ANSWER, NOTHING, Told, told_by_motion
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.flight_details import AxisExcitation
@@ -22,19 +21,10 @@ from swashplate.models.traits import Axis
 from swashplate.models.vehicle import Vehicle
 
 EXPLAINED = 0.99
-"""Share of a command's variance that past motion may explain before the axis counts as not excited."""
-
-WEAK = 0.90
-"""Share above which the excitation is called weak: what the axis tells then rests on the noise model and the priors."""
-
-FOLLOWS = 1.5
-"""How many times more of a command past motion must leave unexplained than later motion, for the motion to follow it.
-
-Measured: 1.4 to 4.6 with sweeps and multisines, 0.8 to 1.2 for controllers' answers, real ones included.
-"""
+"""Share of an answer's variance that past motion explains from which the axis counts as not excited. Below it, the axis
+is weakly excited: what it tells rests on the noise model and the priors."""
 
 _BAND = (0.3, 8.0)
-_LAGS = 0.3
 _MOVED = 1e-4
 
 
@@ -74,62 +64,39 @@ def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array])
     rate = 1.0 / record.dt
     high = min(_BAND[1], 0.4 * rate)
     sos = butter(2, (_BAND[0], high), "bandpass", fs=rate, output="sos")
-    banded = sosfiltfilt(sos, command)
-    power = float(np.std(banded))
+    power = float(np.std(sosfiltfilt(sos, command)))
     still = power < _MOVED
-    explained, later, peak, phase = float("nan"), float("nan"), 0.0, float("nan")
+    told, peak, phase = NOTHING, 0.0, float("nan")
     if not still:
         answered, response = MOTION[axis.name]
-        moved = [motion[name] for name in answered]
-        explained = _explained(command, moved, rate)
-        later = _explained(command[::-1], [signal[::-1] for signal in moved], rate)
+        moved = np.stack([motion[name] for name in answered], axis=1)
+        (told,) = told_by_motion(command[:, None], moved, record.dt, memory=False)
         peak, phase = _coherence(command, motion[response], rate, high)
-    follows = 1.0 - explained > FOLLOWS * (1.0 - later)
-    identifiable = not still and (explained < EXPLAINED or follows)
+    # News is not asked: rates that were derived from a tracked pose know a little of what follows.
+    answer = told.known and told.past >= ANSWER and not told.follows
+    identifiable = told.known and not (answer and told.past >= EXPLAINED)
     return AxisExcitation(
         record=record.name,
         axis=axis.name,
         command=_called(axis.inputs),
-        explained=explained,
+        explained=told.past,
         coherence=peak,
         phase=phase,
         power=power,
         identifiable=identifiable,
-        words=_words(axis.name, explained, peak, phase, still=still, identifiable=identifiable, follows=follows),
-        explained_later=later,
+        words=_words(axis.name, told, peak, phase, still=still, answer=answer),
+        answer=answer,
     )
 
 
 def by_itself(axis: AxisExcitation) -> bool:
     """Whether a record moves an axis by more than weakly: what else it shows there may be the controller."""
-    follows = 1.0 - axis.explained > FOLLOWS * (1.0 - axis.explained_later)
-    return axis.identifiable and (axis.explained <= WEAK or follows)
+    return axis.identifiable and not axis.answer
 
 
 def _called(inputs: Mapping[str, float]) -> str:
     """A sum of inputs in words."""
     return "".join(f"{' - ' if share < 0.0 else ' + '}{name}" for name, share in inputs.items()).removeprefix(" + ")
-
-
-def _explained(command: Array, motion: list[Array], rate: float) -> float:
-    """Adjusted R^2 of the command on present and past motion, everything low-passed to the band and decimated."""
-    from scipy.signal import butter, sosfiltfilt
-
-    keep = max(1, round(rate / (4.0 * _BAND[1])))
-    sos = butter(4, min(_BAND[1], 0.4 * rate), fs=rate, output="sos")
-    slow = [sosfiltfilt(sos, signal)[::keep] for signal in (command, *motion)]
-    lags = max(1, round(_LAGS * rate / keep))
-    n = slow[0].size - lags
-    if n < 4 * lags * len(motion):
-        return float("nan")
-    columns = [signal[lags - lag : lags - lag + n] for signal in slow[1:] for lag in range(lags + 1)]
-    trend = np.linspace(-1.0, 1.0, n)
-    table = np.column_stack([np.ones(n), trend, trend**2, *columns])
-    target = slow[0][lags:]
-    residual = target - table @ np.linalg.lstsq(table, target, rcond=None)[0]
-    base = target - table[:, :3] @ np.linalg.lstsq(table[:, :3], target, rcond=None)[0]
-    freedom = (n - 3) / max(n - table.shape[1], 1)
-    return float(max(0.0, 1.0 - freedom * (residual @ residual) / max(base @ base, 1e-30)))
 
 
 def _coherence(command: Array, response: Array, rate: float, high: float) -> tuple[float, float]:
@@ -143,19 +110,19 @@ def _coherence(command: Array, response: Array, rate: float, high: float) -> tup
     return float(squared[best]), float(np.angle(cross[best]))
 
 
-def _words(
-    axis: str, explained: float, peak: float, phase: float, *, still: bool, identifiable: bool, follows: bool
-) -> str:
+def _words(axis: str, told: Told, peak: float, phase: float, *, still: bool, answer: bool) -> str:
     if still:
         return f"{axis}: the command does not move. Fly a sweep or a multisine in {axis}."
-    share = f"past motion explains {100 * explained:.0f} % of the command (coherence up to {peak:.2f}"
+    if not told.known:
+        return f"{axis}: the record is too short to tell what moves the command. Fly longer."
+    share = f"past motion explains {100 * told.past:.0f} % of the command (coherence up to {peak:.2f}"
     share += f" at {np.degrees(phase):+.0f} deg)"
-    if identifiable and follows and explained > WEAK:
+    if not answer and told.past >= ANSWER:
         return f"{axis}: {share}, but the motion after it explains more: the motion follows the command."
-    if identifiable and explained > WEAK:
-        return f"{axis}: {share}: mostly a controller's answer; the axis is weakly excited, believe it with its bound."
-    if identifiable:
+    if not answer:
         return f"{axis}: {share}; the rest moves the axis independently."
+    if told.past < EXPLAINED:
+        return f"{axis}: {share}: mostly a controller's answer; the axis is weakly excited, believe it with its bound."
     return (
         f"{axis}: {share}: it is a controller's answer, and this record cannot tell the {axis} dynamics from the "
         f"controller. Add an independent sweep or multisine to the {axis} reference and log rotor speed and voltage."

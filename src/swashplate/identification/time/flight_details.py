@@ -28,7 +28,8 @@ class AxisExcitation:
         power: standard deviation of the command in the band [1].
         identifiable: False where there is no independent excitation.
         words: the finding, and what to fly instead.
-        explained_later: part of the command's variance that the motion after it explains.
+        answer: whether the motion tells the command as it tells a controller's answer; where the axis is identifiable
+            all the same, it is weakly excited.
     """
 
     record: str
@@ -40,7 +41,7 @@ class AxisExcitation:
     power: float
     identifiable: bool
     words: str
-    explained_later: float = float("nan")
+    answer: bool = False
 
 
 @dataclass(frozen=True)

@@ -131,8 +131,12 @@ def identified(
     seen: tuple[Read, float, float],
     *,
     gains: bool,
+    unseen: bool,
 ) -> Code:
-    """From a sweep to gains; `chosen` are input, output and reference, `seen` what the model is verified on."""
+    """From a sweep to gains; `chosen` are input, output and reference, `seen` what the model is flown along.
+
+    `unseen`: whether the fit has not seen that; else the lines say so.
+    """
     moved, answer, reference = chosen
     other, start, stop = seen
     shell = [
@@ -142,6 +146,8 @@ def identified(
         f"swash fit-tf responses --input {moved}{' --gains' if gains else ''} --hold-out {other.named(start, stop)}"
         + f" --out study {other.words}".rstrip(),
     ]
+    called = "unseen" if unseen else "fitted"
+    said = [] if unseen else ["# The fit has seen this stretch: it verifies nothing."]
     names = [moved, answer, *([reference] if reference else [])]
     references = f"references=[{reference!r}], " if reference else ""
     lines = [
@@ -150,9 +156,10 @@ def identified(
         f"records = sp.uniform_records(flight.between({part[0]:.10g}, {part[1]:.10g}), {names!r})",
         f"responses = sp.respond(records, inputs=[{moved!r}], outputs=[{answer!r}], {references}band={band!r})",
         other.python("other"),
-        f"unseen = other.between({start:.10g}, {stop:.10g})",
-        f"study = sp.fit_tf(responses, input={moved!r}, gains={gains}, hold_out=unseen)",
+        *said,
+        f"{called} = other.between({start:.10g}, {stop:.10g})",
+        f"study = sp.fit_tf(responses, input={moved!r}, gains={gains}, hold_out={called})",
         "print(study)",
         'study.save("study")',
     ]
-    return Code(f"Identify {answer} / {moved}", "\n".join(shell), "\n".join(lines))
+    return Code(f"Identify {answer} / {moved}", "\n".join([shell[0], *said, *shell[1:]]), "\n".join(lines))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.flights.excitation import excitations
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import Sweep
 from swashplate.links.logs.bins import gaps
@@ -57,8 +58,8 @@ def hold_out(opened: Opened, sweep: Sweep, input: str, output: str, others: Sequ
         words = f"another part of the log, {stretch[0]:.1f} to {stretch[1]:.1f} s"
         return Part(opened.read, *stretch, words, True, flight)
     words = (
-        "the sweep itself, which the fit has seen: this is NO verification. The log holds no other part in which "
-        f"{input} moves for {_SHORTEST:g} s; open a second log, and it is used."
+        "the sweep itself, which the fit has seen: this is NO verification. No other part of the open logs has "
+        f"{input} moved from outside for {_SHORTEST:g} s; open a log with such a part, and it is used."
     )
     return Part(opened.read, begin, end, words, False, flight)
 
@@ -72,7 +73,11 @@ def _spread(flight: Flight, name: str, start: float, stop: float) -> float:
 def _longest(
     flight: Flight, input: str, output: str, taken: Sequence[tuple[float, float]], least: float
 ) -> tuple[float, float] | None:
-    """The longest stretch [s] without a gap in either channel, outside `taken`, in which the input moves enough."""
+    """The longest stretch [s] without a gap in either channel, outside `taken`, in which the input moves enough.
+
+    Something from outside must move it there: where another input was swept, a loop only answers, and a model of this
+    input alone explains nothing.
+    """
     edges = {flight.time(name)[k] for name in (input, output) for k in (0, -1)}
     for name in (input, output):
         time, breaks = flight.time(name), gaps(flight.time(name))
@@ -87,7 +92,12 @@ def _longest(
         whole = all(_whole(flight.time(name), start, stop) for name in (input, output))
         if stop - start >= _SHORTEST and free and whole and _spread(flight, input, start, stop) > least:
             stretches.append((round(start + 0.001, 3), round(stop - 0.001, 3)))
-    return max(stretches, key=lambda pair: pair[1] - pair[0], default=None)
+    stretches.sort(key=lambda pair: pair[0] - pair[1])
+    return next((pair for pair in stretches if _moved(flight.between(*pair), input, output)), None)
+
+
+def _moved(part: Flight, input: str, output: str) -> bool:
+    return any(one.outside for one in excitations(part, [input], outputs=[output]))
 
 
 def _whole(time: Array, start: float, stop: float) -> bool:

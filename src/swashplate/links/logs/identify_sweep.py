@@ -73,11 +73,11 @@ def identify_sweep(
     def say(what: str, *, done: float = 0.0, total: float | None = None, note: str = "") -> None:
         tell(f"{what}, structure {done + 1:.0f} of {total:.0f}" if total else what, 0.15 + 0.65 * done / (total or 1e9))
 
-    unseen = seen.flight.between(seen.start, seen.stop)
-    study, gained = _study(responses, chosen, unseen, say)
+    study, gained = _study(responses, chosen, seen.flight.between(seen.start, seen.stop), say)
     tell("closing the loop with the gains", 0.85)
+    stretch = (seen.read, seen.start, seen.stop)
     code = code_lines.identified(
-        opened.read, (start, stop), chosen, band, (seen.read, seen.start, seen.stop), gains=not gained
+        opened.read, (start, stop), chosen, band, stretch, gains=not gained, unseen=seen.unseen
     )
     document = {
         "words": str(sweep),
@@ -101,12 +101,12 @@ def identify_sweep(
     return Identified({**document, "files": list(files)}, files)
 
 
-def _study(responses: Any, chosen: Channels, unseen: Flight, say: Callable[..., None]) -> tuple[Any, str]:
+def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., None]) -> tuple[Any, str]:
     """The fit with its verification and gains, and why there are no gains where there are none."""
     fit_tf = resolve("fit_tf")
     study = fit_tf(responses, input=chosen.input, say=say)
     form = str(study.material.transfer_functions[0].details.form.text)
-    held = (unseen,) if study.structure is not None else ()
+    held = (part,) if study.structure is not None else ()
     words, gains = "", True
     try:
         resolve("suggest_gains")(study.fit, responses)

@@ -40,15 +40,15 @@ def test_words_name_the_physics_that_moved_far() -> None:
 
 
 def test_an_axis_that_its_controller_moves_has_no_residual() -> None:
-    def axis(explained: float, later: float, *, identifiable: bool = True) -> AxisExcitation:
-        return AxisExcitation("record", "heave", "", explained, 1.0, 0.0, 0.01, identifiable, "", later)
+    def axis(explained: float, *, answer: bool, identifiable: bool = True) -> AxisExcitation:
+        return AxisExcitation("record", "heave", "", explained, 1.0, 0.0, 0.01, identifiable, "", answer)
 
     assert residual_fit._moved("heave", [])  # not judged
-    assert residual_fit._moved("heave", [axis(0.5, 0.5)])
-    assert residual_fit._moved("heave", [axis(0.97, 0.99)])  # the motion follows
-    assert not residual_fit._moved("heave", [axis(0.965, 0.971)])  # mostly an answer
-    assert not residual_fit._moved("heave", [axis(np.nan, np.nan, identifiable=False)])  # stands still
-    assert residual_fit._moved("heave", [axis(0.965, 0.971), axis(0.5, 0.5)])
+    assert residual_fit._moved("heave", [axis(0.5, answer=False)])
+    assert residual_fit._moved("heave", [axis(0.97, answer=False)])  # the motion follows
+    assert not residual_fit._moved("heave", [axis(0.965, answer=True)])  # mostly an answer
+    assert not residual_fit._moved("heave", [axis(np.nan, answer=False, identifiable=False)])  # stands still
+    assert residual_fit._moved("heave", [axis(0.965, answer=True), axis(0.5, answer=False)])
 
 
 def test_too_few_blocks_are_refused_before_anything_is_computed() -> None:

@@ -19,7 +19,7 @@ from swashplate.cli.app import app
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.maneuvers.sweeps import Sweep
 from swashplate.identification.frequency.transfer_function_forms import suggest
-from swashplate.links.logs.code_lines import Read
+from swashplate.links.logs.code_lines import Read, identified
 from swashplate.links.logs.desk import Desk
 from swashplate.links.logs.hold_out import hold_out
 from swashplate.links.logs.identify_sweep import Identified
@@ -144,6 +144,57 @@ def test_without_another_part_it_says_that_nothing_was_verified(made: tuple[Desk
     assert other.unseen
     assert other.flight is long.flight
     desk.close()
+
+
+def coupled(path: Path, axis: str, *, doublets: bool = False) -> None:
+    """A sweep of 20 s in one of two coupled axes that rate loops hold in gusts, then perhaps doublets in roll."""
+    time, random = np.arange(0.0, 60.0, 0.01), np.random.default_rng(5)
+    sweep = np.where((time > 2.0) & (time < 22.0), chirp(time - 2.0, 0.3, 20.0, 6.0, method="logarithmic"), 0.0)
+    moved = {"roll": 0.0 * time, "pitch": 0.0 * time} | {axis: 0.1 * sweep}
+    if doublets:
+        moved["roll"] = moved["roll"] + 0.1 * np.where(time > 30.0, np.sign(np.sin(2.0 * np.pi * 0.4 * time)), 0.0)
+    rates, angles, u, rows = np.zeros(2), np.zeros(2), np.zeros(2), []
+    gust = np.zeros(2)
+    for k in range(time.size):
+        gust = 0.98 * gust + 0.02 * random.standard_normal(2)
+        u = np.array([moved["roll"][k], moved["pitch"][k]]) - 0.1 * rates - 0.3 * angles
+        rows.append([time[k], *u, *(rates + 1e-3 * random.standard_normal(2))])
+        rates = rates + 0.01 * (-POLE * rates + GAIN * (u + 0.4 * u[::-1]) + gust)
+        angles = angles + 0.01 * rates
+    head = "time [s],mixer_roll [1],mixer_pitch [1],p [rad/s],q [rad/s]"
+    path.write_text("\n".join([head, *(",".join(map(repr, map(float, row))) for row in rows)]) + "\n")
+
+
+def test_a_part_in_which_only_another_input_was_moved_verifies_nothing(tmp_path: Path) -> None:
+    """In the log of the pitch sweep the roll command moves a lot, as its loop's answer to the coupling."""
+    coupled(tmp_path / "roll.csv", "roll")
+    coupled(tmp_path / "pitch.csv", "pitch")
+    coupled(tmp_path / "both.csv", "pitch", doublets=True)
+    desk = Desk([(tmp_path / name, Read(name)) for name in ("roll.csv", "pitch.csv", "both.csv")])
+    desk.read_given()
+    roll, pitch, both = (desk.log(k) for k in (1, 2, 3))
+    assert roll.inspection is not None
+    assert pitch.flight is not None
+    sweep = Sweep(2.0, 22.0, "roll", 0.3, 6.0, "mixer_roll", "signal")
+    assert np.std(pitch.flight.values("mixer_roll")) > 0.1 * np.std(roll.ready.values("mixer_roll"))
+    found = hold_out(roll, sweep, "mixer_roll", "p", [pitch])
+    assert not found.unseen
+    assert "mixer_roll moved from outside" in found.words
+    assert hold_out(roll, sweep, "mixer_roll", "p", [pitch, both]).flight is both.flight
+    desk.close()
+
+
+@pytest.mark.parametrize("unseen", [True, False])
+def test_the_lines_say_whether_the_fit_has_seen_the_stretch(unseen: bool) -> None:
+    log = Read("flight.csv")
+    code = identified(
+        log, (1.0, 23.0), ("mixer_roll", "p", ""), (0.3, 6.0), (log, 1.0, 23.0), gains=True, unseen=unseen
+    )
+    for text in (code.python, code.shell):
+        assert ("# The fit has seen this stretch: it verifies nothing." in text) is not unseen
+    assert ("unseen = " in code.python) is unseen
+    assert ("hold_out=unseen" in code.python) is unseen
+    compile(code.python, "lines", "exec")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,25 @@
+"""`swash respond` on a log whose command only its loops moved: the reason, what to fly, and exit code 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from commands import swash
+
+import swashplate as sp
+from field_cases import loiter_log
+
+
+def test_it_is_said_with_what_to_fly_and_kept_with_the_responses(shared_data: Path, tmp_path: Path) -> None:
+    log = loiter_log(shared_data, tmp_path / "loiter.bin", rate=25, seconds=60)
+    asked = ("respond", log, "--inputs", "mixer_roll", "--outputs", "p", "--band", "0.5-6")
+    outcome = swash(*asked, "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert "'mixer_roll' is a controller's answer: the log holds the set-points of its loop" in outcome.err
+    assert "Fly a sweep, or move the sticks and name the set-point with --references." in outcome.err
+    kept = sp.FrequencyResponse.load(tmp_path / "out" / "responses.nc").settings["excitation"]
+    assert kept["mixer_roll"]["kind"] == "controller"
+    assert "neither a sweep nor a stick nor a set-point" in kept["mixer_roll"]["words"]
+    outcome = swash(*asked, "--references", "p_demand")
+    assert outcome.code == 2
+    assert "'mixer_roll' is a controller's answer" in outcome.err
