@@ -23,12 +23,12 @@ from swashplate.arrays import Array
 OWN, ANSWER = 0.70, 0.85
 """Share that past motion explains: below the first something else moves a command, from the second it may answer."""
 
-FOLLOWS = 1.5
+FOLLOWS = 1.35
 """How many times more of a command past motion must leave than later motion, for the motion to follow it."""
 
-NO_NEWS, NEWS, FRESH = 0.20, 0.40, 0.01
-"""Share of a command's news that motion explains: below the first, and if the news is a hundredth of the command,
-something else moves it; an answer has the second.
+NO_NEWS, NEWS, FRESH = 0.20, 0.40, 5e-4
+"""Share of a command's news that motion explains: below the first, and if the news is more than rounding and noise (the
+third, of the command's variance), something else moves it; an answer has the second.
 
 How these six numbers were found, and how often they are wrong: `docs/decisions/0156-moved-from-outside.md`.
 """
