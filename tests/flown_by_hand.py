@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.links.live.axes import STICKS
-from swashplate.links.live.recording import LiveRecording, Saved
+from swashplate.links.live.recording import LiveRecording, SavedRecording
 from swashplate.links.live.world import World
 
 X, Y, Z, U, V, PHI, PSI = 0, 1, 2, 3, 4, 6, 8
@@ -32,7 +32,7 @@ def flown_rows(world: World, seconds: float, **sticks: float) -> list[np.ndarray
     return rows
 
 
-def recorded(world: World, rows: list[np.ndarray], folder: Path) -> Saved:
+def recorded(world: World, rows: list[np.ndarray], folder: Path) -> SavedRecording:
     """Rows as a recording on disk."""
     going = LiveRecording(world.vehicle, period=world.period, folder=folder)
     for row in rows:

@@ -20,7 +20,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.flights.conditioning.uniform_records import MOTION, SET_POINT, STICK, renamed_channels, slowest_of
-from swashplate.flights.feedback import NOTHING, Told, share_of, told_by_motion
+from swashplate.flights.feedback import NOTHING, AnswerShares, share_of, told_by_motion
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event
 from swashplate.flights.schema import POSITION, RATES, VELOCITY, axis_of
@@ -71,7 +71,7 @@ class Excitation:
     input: str
     kind: str
     words: str
-    told: Told = NOTHING
+    told: AnswerShares = NOTHING
 
     @property
     def outside(self) -> bool:
@@ -95,18 +95,18 @@ def excitations(
         references: excitations or set-points that are said to have moved the inputs.
         swept: inputs in which a sweep was seen.
     """
-    found = []
+    moved = []
     for flight in (flights,) if isinstance(flights, Flight) else flights:
         for piece in flight.split():
             record = _Record(piece, tuple(inputs), tuple(outputs), tuple(references))
-            found += [record.judged(name, swept=name in swept) for name in inputs]
-    return tuple(found)
+            moved += [record.judged(name, swept=name in swept) for name in inputs]
+    return tuple(moved)
 
 
-def of_inputs(found: Sequence[Excitation]) -> dict[str, Excitation]:
+def of_inputs(moved: Sequence[Excitation]) -> dict[str, Excitation]:
     """The best excitation of each input over all records: one sweep is enough."""
     best: dict[str, Excitation] = {}
-    for one in sorted(found, key=lambda one: _BEST_FIRST.index(one.kind)):
+    for one in sorted(moved, key=lambda one: _BEST_FIRST.index(one.kind)):
         best.setdefault(one.input, one)
     return best
 
@@ -154,15 +154,15 @@ class _Record:
         return tuple(n for n in self.states if n in self.outputs or n not in spare)
 
     @cached_property
-    def told(self) -> dict[str, Told]:
+    def told(self) -> dict[str, AnswerShares]:
         """What the motion tells of each input; what the outputs tell, where the record is too short for more."""
-        found: tuple[Told, ...] = ()
+        moved: tuple[AnswerShares, ...] = ()
         for names in (self.motion, self.outputs or tuple(n for n in self.motion if n in RATES)):
             forces = [str(self.flight[n].attrs.get("units", "")) in _AT_ONCE for n in names]
-            found = told_by_motion(self.at(self.inputs), self.at(names), self.dt, at_once=forces)
-            if any(one.known for one in found):
+            moved = told_by_motion(self.at(self.inputs), self.at(names), self.dt, at_once=forces)
+            if any(one.known for one in moved):
                 break
-        return dict(zip(self.inputs, found, strict=True))
+        return dict(zip(self.inputs, moved, strict=True))
 
     def share(self, name: str, causes: Sequence[str]) -> float:
         """Share of an input that other channels explain."""

@@ -44,7 +44,7 @@ _ROWS, _MOST_ROWS = 3.0, 3000  # rows of the regression per column, and enough o
 
 
 @dataclass(frozen=True)
-class Told:
+class AnswerShares:
     """What motion tells of a command; NaN where nothing can be said (something stands still, the record is short).
 
     Attributes:
@@ -81,12 +81,12 @@ class Told:
         return self.known and not self.own and self.past >= ANSWER and self.news >= NEWS
 
 
-NOTHING = Told(*[float("nan")] * 4)
+NOTHING = AnswerShares(*[float("nan")] * 4)
 
 
 def told_by_motion(
     commands: Array, motion: Array, dt: float, *, at_once: Sequence[bool] = (), memory: bool = True
-) -> tuple[Told, ...]:
+) -> tuple[AnswerShares, ...]:
     """What motion tells of each command.
 
     Args:
@@ -106,7 +106,7 @@ def told_by_motion(
     told = []
     for j in range(commands.shape[1]):
         fresh, news = (float(table.left(f"own {j}", *more)[j]) + _DUST for more in ((), until_then))
-        share = Told(1.0 - float(past[j]), 1.0 - float(later[j]), 1.0 - news / fresh, fresh - _DUST)
+        share = AnswerShares(1.0 - float(past[j]), 1.0 - float(later[j]), 1.0 - news / fresh, fresh - _DUST)
         told.append(share if table.moves[j] else NOTHING)
     return tuple(told)
 

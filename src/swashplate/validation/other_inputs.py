@@ -32,7 +32,7 @@ def other_inputs(
     moved = of_inputs(excitations(flights, others, outputs=tuple(errors))) if others else {}
     told: dict[str, str] = {}
     for output, stretches in errors.items():
-        found = []
+        movers = []
         for name in (n for n in others if moved[n].outside):
             left = whole = 0.0
             for flight, (time, error) in zip(flights, stretches, strict=True):
@@ -41,8 +41,8 @@ def other_inputs(
                 whole += float(np.sum(error**2))
                 left += float(np.sum(error**2)) * (1.0 - max(np.nan_to_num(share), 0.0))
             if whole > 0.0 and 1.0 - left / whole >= MUCH:
-                found.append((1.0 - left / whole, name))
-        if found:
-            names = ", ".join(f"'{name}' ({100.0 * share:.0f} %)" for share, name in sorted(found, reverse=True))
+                movers.append((1.0 - left / whole, name))
+        if movers:
+            names = ", ".join(f"'{name}' ({100.0 * share:.0f} %)" for share, name in sorted(movers, reverse=True))
             told[output] = f"of what the model leaves of {output}, other inputs explain much: {names}. Add them to it."
     return told

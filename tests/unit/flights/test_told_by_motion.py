@@ -11,19 +11,19 @@ from scipy.signal import lfilter
 
 from simulated_loops import Case, Flown, fly
 from swashplate.flights import feedback
-from swashplate.flights.feedback import ANSWER, NO_NEWS, OWN, Told, share_of
+from swashplate.flights.feedback import ANSWER, NO_NEWS, OWN, AnswerShares, share_of
 
 LOOP = Case(1, plant=(40.0, 3.0, 0.04, 0.02), gains=(0.15, 0.1, 0.0, 1.2, 0.0), gust=(1.0, 0.5, 0.0), seconds=30.0)
 OPEN = Case(2, shape="3-2-1-1", size=0.05, gust=(0.5, 1.0, 0.0), sensor=(0.2, 1.0), seconds=30.0)
 
 
-def told_by_motion(command: np.ndarray, motion: np.ndarray, dt: float, **how: Any) -> Told:
+def told_by_motion(command: np.ndarray, motion: np.ndarray, dt: float, **how: Any) -> AnswerShares:
     """Of one command."""
     (told,) = feedback.told_by_motion(command[:, None], motion, dt, **how)
     return told
 
 
-def asked(flown: Flown, *channels: str, backwards: bool = False) -> Told:
+def asked(flown: Flown, *channels: str, backwards: bool = False) -> AnswerShares:
     """What the motion of a flight tells of its command."""
     order = slice(None, None, -1) if backwards else slice(None)
     motion = flown.flight.array(channels)[order]

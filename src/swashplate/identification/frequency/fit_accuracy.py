@@ -93,10 +93,10 @@ def accuracy_of_fit(cost: ResponseCost, row: Array) -> FitAccuracy:
     left = np.diag(covariance) - 2.0 * np.sum(moved * taken, axis=1)
     left = np.maximum(left + np.sum((taken @ (normal.T @ moved)) * taken, axis=1), 0.0)
     of = np.tile(np.repeat(np.arange(len(targets)), [t.omega.size for t in targets]), 2)
-    found, expected = (np.bincount(of, part / spread**2) for part in (residual**2, left))
+    missed, expected = (np.bincount(of, part / spread**2) for part in (residual**2, left))
     unit = covariance / np.outer(spread, spread)
     freedom = np.array([expected[k] ** 2 / np.sum(unit[np.ix_(of == k, of == k)] ** 2) for k in range(len(targets))])
-    misfit = found / np.maximum(expected, np.finfo(float).tiny)
+    misfit = missed / np.maximum(expected, np.finfo(float).tiny)
     factor = np.sqrt(_counted(misfit, freedom, given=_GIVEN if known else 0.0))[of]
 
     score = normal.T @ (covariance * np.outer(factor, factor)) @ normal

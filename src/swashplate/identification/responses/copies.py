@@ -59,7 +59,7 @@ def copies_of(pieces: Sequence[Signals], ones: Mapping[str, int], others: Mappin
     longest = max(smooth, key=len)
     reach = round(_LONGEST / pieces[0].dt)
     spectra = np.asarray(rfft(longest, int(next_fast_len(len(longest) + reach, real=True)), axis=0))
-    found = []
+    copies = []
     for i, one in enumerate(ones):
         for j, other in enumerate(others, start=len(ones)):
             whole = [table[:, [i, j]] for table in plain]
@@ -67,13 +67,13 @@ def copies_of(pieces: Sequence[Signals], ones: Mapping[str, int], others: Mappin
                 continue
             factor, off = _factor(np.concatenate(whole))
             if off < _EXACT:
-                found.append(Copy(one, other, factor, 0.0))
+                copies.append(Copy(one, other, factor, 0.0))
                 continue
             lag = _lag(spectra[:, [i, j]], longest[:, [i, j]], reach)
             late = None if lag is None else _late([table[:, [i, j]] for table in smooth], lag, reach)
             if late is not None:
-                found.append(Copy(one, other, late[0], late[1] * pieces[0].dt))
-    return found
+                copies.append(Copy(one, other, late[0], late[1] * pieces[0].dt))
+    return copies
 
 
 def broken_at(

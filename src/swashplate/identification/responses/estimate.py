@@ -26,7 +26,7 @@ _METHODS = ("direct", "joint")
 
 
 @dataclass(frozen=True)
-class Question:
+class ResponseQuestion:
     """What is asked of records: names, how many references stand behind the outputs, lines per decade.
 
     `tracked`: the sweeps are their own references.
@@ -51,7 +51,7 @@ class Beside(NamedTuple):
     loops: Sequence[int] = ()
 
 
-class Estimate(NamedTuple):
+class EstimateBeside(NamedTuple):
     """Responses of records.
 
     Attributes:
@@ -75,8 +75,8 @@ def estimate_responses(
     lengths: tuple[float, ...],
     overlap: float,
     limits: tuple[float | None, float],
-    question: Question,
-) -> Estimate:
+    question: ResponseQuestion,
+) -> EstimateBeside:
     """Responses in two passes, as the windows blur them and sharpened."""
     # What a loop makes of gusts rules below the sweep: unasked, the book's two periods; asked, down to one.
     lowest = 2.0 / lengths[0] if limits[0] is None else max(limits[0], 1.0 / lengths[0])
@@ -101,7 +101,7 @@ def estimate_responses(
     if question.references:
         direct = composed(matrices, omega, replace(question, references=0), [None] * len(matrices))
     held = np.ones((omega.size, len(question.inputs)), dtype=bool)
-    return Estimate(omega, matrices, notes, blurred, sharpened, direct, held)
+    return EstimateBeside(omega, matrices, notes, blurred, sharpened, direct, held)
 
 
 def estimate_beside(
@@ -109,9 +109,9 @@ def estimate_beside(
     lengths: tuple[float, ...],
     overlap: float,
     limits: tuple[float | None, float],
-    question: Question,
+    question: ResponseQuestion,
     beside: Beside,
-) -> Estimate:
+) -> EstimateBeside:
     """As `estimate_responses`, with some inputs held still only where their own sweeps move them, and not for loops.
 
     Where an input only answers the others' sweeps, it cannot be told from them; there the responses of the others are
@@ -153,10 +153,10 @@ def _without(
     lengths: tuple[float, ...],
     overlap: float,
     limits: tuple[float | None, float],
-    question: Question,
+    question: ResponseQuestion,
     kept: Sequence[int],
     let_go: Sequence[int],
-) -> Estimate:
+) -> EstimateBeside:
     """The estimate with a part of the inputs, from the stretches in which the references `let_go` are silent."""
     n_in, n = len(question.inputs), len(question.inputs) + len(question.outputs)
     references = [n + k for k in range(question.references) if k not in let_go]
@@ -231,7 +231,7 @@ def _matrices(
 def composed(
     matrices: Sequence[SpectralMatrix],
     omega: Array,
-    question: Question,
+    question: ResponseQuestion,
     shares: Sequence[Array | None],
     *,
     guess: Complex | None = None,

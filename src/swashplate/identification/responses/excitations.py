@@ -29,7 +29,7 @@ _SHARE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Excitation:
+class SweepOfCommand:
     """One sweep, or one recorded reference.
 
     Attributes:
@@ -48,17 +48,17 @@ class Excitation:
     channel: str = ""
 
 
-class Told(NamedTuple):
+class ToldSweeps(NamedTuple):
     """What the log says of one unbroken piece: the place of its flight, and the sweeps that lie in it."""
 
     flight: int
     sweeps: tuple[Event, ...]
 
 
-def told_sweeps(flights: Sequence[Flight]) -> list[Told]:
+def told_sweeps(flights: Sequence[Flight]) -> list[ToldSweeps]:
     """The sweeps that the logs tell of, for every unbroken piece of the flights."""
     return [
-        Told(k, tuple(event for event in flight.provenance.events if _swept(event) and _within(event, piece)))
+        ToldSweeps(k, tuple(event for event in flight.provenance.events if _swept(event) and _within(event, piece)))
         for k, flight in enumerate(flights)
         for piece in flight.split()
     ]
@@ -89,7 +89,7 @@ def channel_of(event: Event) -> str:
 
 
 def owners_of(
-    excitations: Sequence[Excitation], commands: Sequence[str], named: int, *, called: Mapping[str, str]
+    excitations: Sequence[SweepOfCommand], commands: Sequence[str], named: int, *, called: Mapping[str, str]
 ) -> list[str]:
     """The command that each excitation belongs to; "" where it is one that is not there.
 
@@ -111,9 +111,9 @@ def owners_of(
     score = np.where(size > 0.0, relative + _SHARE * share, -1.0)
     logged = [called.get(name, name) for name in commands]
     owners = [_owner(one.channel, logged, named, relative[k], score[k]) for k, one in enumerate(excitations)]
-    found = ["" if owner is None else commands[owner] for owner in owners]
-    _refuse_mixtures(excitations, found, {commands[i]: logged[i] for i in range(named)})
-    return found
+    owned = ["" if owner is None else commands[owner] for owner in owners]
+    _refuse_mixtures(excitations, owned, {commands[i]: logged[i] for i in range(named)})
+    return owned
 
 
 def _owner(channel: str, logged: Sequence[str], named: int, relative: Array, score: Array) -> int | None:
@@ -132,7 +132,7 @@ def _owner(channel: str, logged: Sequence[str], named: int, relative: Array, sco
     return best if best is not None and relative[best] > ahead - _CLEAR else rival
 
 
-def _refuse_mixtures(excitations: Sequence[Excitation], owners: Sequence[str], logged: Mapping[str, str]) -> None:
+def _refuse_mixtures(excitations: Sequence[SweepOfCommand], owners: Sequence[str], logged: Mapping[str, str]) -> None:
     for name, source in logged.items():
         axes = {one.axis: one.words for one, owner in zip(excitations, owners, strict=True) if owner == name}
         told = {one.channel for one, owner in zip(excitations, owners, strict=True) if owner == name}
@@ -150,7 +150,7 @@ def listed_sweeps(words: Mapping[str, str]) -> str:
     return ", ".join(f"{name} ({text.partition(',')[0]})" for name, text in words.items())
 
 
-def only_answering(told: Sequence[Told], inputs: Sequence[str], *, called: Mapping[str, str]) -> tuple[str, ...]:
+def only_answering(told: Sequence[ToldSweeps], inputs: Sequence[str], *, called: Mapping[str, str]) -> tuple[str, ...]:
     """The inputs that a rate loop makes, in records of which the log says that only other commands were swept."""
     sweeps = [event for one in told for event in one.sweeps]
     swept = {channel_of(event) for event in sweeps}
@@ -159,7 +159,7 @@ def only_answering(told: Sequence[Told], inputs: Sequence[str], *, called: Mappi
     return tuple(name for name in inputs if called.get(name, name) in _RATE_LOOPS - swept)
 
 
-def answering_words(told: Sequence[Told], answering: Sequence[str]) -> str:
+def answering_words(told: Sequence[ToldSweeps], answering: Sequence[str]) -> str:
     """Why inputs have no response, and which sweeps there are."""
     swept = {
         f"{axis_of(event)} ('{channel_of(event)}')": f"{times_of(event)[0]:.1f} to {times_of(event)[1]:.1f} s"

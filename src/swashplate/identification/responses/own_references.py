@@ -17,14 +17,16 @@ from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.sweep_tracking import Course, Ridge, course_of
 from swashplate.flights.maneuvers.sweeps import all_rising
 from swashplate.flights.provenance import Event
-from swashplate.identification.responses.excitations import Excitation, Told, axis_of, channel_of, times_of
+from swashplate.identification.responses.excitations import SweepOfCommand, ToldSweeps, axis_of, channel_of, times_of
 from swashplate.identification.responses.spectra import Signals
 
 _FOLDED = 0.45
 """Share of the rate up to which a chirp is followed."""
 
 
-def own_references(pieces: Sequence[Signals], told: Sequence[Told], commands: Sequence[int]) -> tuple[Excitation, ...]:
+def own_references(
+    pieces: Sequence[Signals], told: Sequence[ToldSweeps], commands: Sequence[int]
+) -> tuple[SweepOfCommand, ...]:
     """What sweeps in the commands serve as references for.
 
     Args:
@@ -39,7 +41,7 @@ def own_references(pieces: Sequence[Signals], told: Sequence[Told], commands: Se
     )
 
 
-def _sweeps_in(k: int, piece: Signals, commands: Array, events: Sequence[Event]) -> list[Excitation]:
+def _sweeps_in(k: int, piece: Signals, commands: Array, events: Sequence[Event]) -> list[SweepOfCommand]:
     """The sweeps of one record: those that the log tells of, and where it tells none, those that are seen."""
     time: Array = np.asarray(piece.start + np.arange(len(commands)) * piece.dt, dtype=np.float64)
     told = [one for event in events if (one := _told(k, time, commands, event)) is not None]
@@ -75,14 +77,14 @@ def _followed(
     band: tuple[float, float],
     added: Array | None = None,
     event: Event | None = None,
-) -> Excitation:
+) -> SweepOfCommand:
     """A sweep with what each command has of it; what the program added is its reference where that is known."""
     parts = np.stack([course.in_signal(command) for command in commands.T], axis=1)
     inside = course.inside
     power, whole = np.mean(parts[inside] ** 2, axis=0), np.mean(commands[inside] ** 2, axis=0)
     how = "the log's law" if added is not None else "its law" if course.lawful else "its phase"
     start, stop = time[inside][[0, -1]]
-    return Excitation(
+    return SweepOfCommand(
         references={k: parts if added is None else np.repeat(added[:, None], parts.shape[1], axis=1)},
         size=np.sqrt(power),
         share=power / np.where(whole > 0.0, whole, 1.0),
@@ -92,7 +94,7 @@ def _followed(
     )
 
 
-def _told(k: int, time: Array, commands: Array, event: Event) -> Excitation | None:
+def _told(k: int, time: Array, commands: Array, event: Event) -> SweepOfCommand | None:
     """An autopilot's chirp by its law, as far as it was flown; None where it lies outside the record."""
     law = [event.details.get(field.name) for field in fields(Chirp)]
     numbers = [value for value in law if isinstance(value, int | float) and not isinstance(value, bool)]

@@ -13,8 +13,8 @@ from swashplate.errors import FlightError
 from swashplate.flights.provenance import Event
 from swashplate.identification.responses.copies import broken_at
 from swashplate.identification.responses.excitations import (
-    Excitation,
-    Told,
+    SweepOfCommand,
+    ToldSweeps,
     answering_words,
     axis_of,
     channel_of,
@@ -68,12 +68,12 @@ class References:
             pieces: records. place: columns by name. whole: the inputs, named and beside. outputs: names.
         """
         fed = {name: place[name] for name in outputs}
-        found = [
+        words = [
             broken_at(pieces, [columns[:, self.own[i]] for columns in self.columns], place[name], fed)
             for i, name in enumerate(whole[: len(whole) - len(self.beside)])
             if i in self.own
         ]
-        return tuple(dict.fromkeys(name for names in found for name in names))
+        return tuple(dict.fromkeys(name for names in words for name in names))
 
     def words(self, hertz: Array, held: NDArray[np.bool_], outputs: Sequence[str], loops: Sequence[str]) -> list[str]:
         """What a reader must know of sweeps that the named inputs do not own.
@@ -106,7 +106,7 @@ class References:
 
 def references_of(
     pieces: Sequence[Signals],
-    told: Sequence[Told],
+    told: Sequence[ToldSweeps],
     commands: Mapping[str, int],
     named: int,
     recorded: Mapping[str, int],
@@ -167,7 +167,7 @@ def references_of(
             if mine or not recorded:
                 own |= {i: len(columns)} if mine else {}
                 columns.append(parts)
-    found = References(
+    references = References(
         beside,
         tuple(np.stack(parts, axis=1) for parts in zip(*columns, strict=True)),
         swept,
@@ -186,12 +186,12 @@ def references_of(
             hint="Give as many independent references as inputs, or sweeps of each axis, one after the other or in "
             "logs of their own.",
         )
-    return found
+    return references
 
 
 def _recorded(
-    pieces: Sequence[Signals], told: Sequence[Told], commands: Sequence[int], named: int, column: int
-) -> list[Excitation]:
+    pieces: Sequence[Signals], told: Sequence[ToldSweeps], commands: Sequence[int], named: int, column: int
+) -> list[SweepOfCommand]:
     """A recorded reference, split by the log's sweeps where it is one of them, otherwise by flight."""
     stretches: list[tuple[int, Event, NDArray[np.bool_]]] = []
     loud = quiet = 0.0
@@ -220,7 +220,7 @@ def _followed(
     named: int,
     column: int,
     event: Event | None,
-) -> Excitation:
+) -> SweepOfCommand:
     """A stretch of a recorded reference with what each command has of it, by their cross spectra."""
     cut = [replace(piece, values=piece.values[inside][:, [*commands, column]]) for piece, inside in parts.values()]
     window = max(piece.duration for piece in cut) / _WINDOWS
@@ -237,7 +237,7 @@ def _followed(
     (first, begun), (last, _) = records[0], records[-1]
     start = first.start + int(np.argmax(begun)) * first.dt
     stop = (start if last is first else last.start) + cut[-1].duration
-    return Excitation(
+    return SweepOfCommand(
         references={
             k: np.repeat((piece.values[:, column] * inside)[:, None], len(commands), axis=1)
             for k, (piece, inside) in parts.items()

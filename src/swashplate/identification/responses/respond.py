@@ -27,7 +27,7 @@ from swashplate.identification.responses.copies import (
     refuse_copied_references,
     without_copies,
 )
-from swashplate.identification.responses.estimate import Beside, Question, estimate_beside
+from swashplate.identification.responses.estimate import Beside, ResponseQuestion, estimate_beside
 from swashplate.identification.responses.excitations import answering_words, only_answering, told_sweeps
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.responses.references import references_of
@@ -121,7 +121,8 @@ def respond(
     if references or not direct:
         moved = references_of(pieces, logged, commands, len(inputs), recorded, called=called)
     swept = [name for name, seen in zip(inputs, moved.swept, strict=False) if seen] if moved else []
-    excitation = of_inputs(excitations(flights, inputs, outputs=outputs, references=references, swept=swept))
+    motion = [name for name in outputs if all(name != copy.other for copy in copies)]
+    excitation = of_inputs(excitations(flights, inputs, outputs=motion, references=references, swept=swept))
     answering = moved.answering if moved else only_answering(logged, inputs, called=called)
     # What was swept beside the named inputs is held still with them; the named ones are given.
     whole = (*inputs, *(moved.beside if moved else ()))
@@ -146,7 +147,7 @@ def respond(
     chosen = choose_windows([piece.duration for piece in pieces], highest)
     if windows is not None:
         chosen = Windows(tuple(sorted((float(w) for w in windows), reverse=True)), ())
-    question = Question(whole, outputs, own[0].values.shape[1] - n, lines, moved is not None and moved.tracked)
+    question = ResponseQuestion(whole, outputs, own[0].values.shape[1] - n, lines, moved is not None and moved.tracked)
     limits = (band[0] if band else None, highest)
     loops = moved.broken_loops(pieces, place, whole, outputs) if moved else ()
     aside = {i: k for i, k in moved.own.items() if i >= len(inputs)} if moved else {}

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.flights.feedback import ANSWER, NOTHING, Told, told_by_motion
+from swashplate.flights.feedback import ANSWER, NOTHING, AnswerShares, told_by_motion
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.flight_details import AxisExcitation
@@ -110,7 +110,7 @@ def _coherence(command: Array, response: Array, rate: float, high: float) -> tup
     return float(squared[best]), float(np.angle(cross[best]))
 
 
-def _words(axis: str, told: Told, peak: float, phase: float, *, still: bool, answer: bool) -> str:
+def _words(axis: str, told: AnswerShares, peak: float, phase: float, *, still: bool, answer: bool) -> str:
     if still:
         return f"{axis}: the command does not move. Fly a sweep or a multisine in {axis}."
     if not told.known:

@@ -29,7 +29,7 @@ SHORTEST, LONGEST = 2.0, 1800.0
 
 
 @dataclass(frozen=True)
-class Saved:
+class SavedRecording:
     """A recording as flights.
 
     Attributes:
@@ -93,7 +93,7 @@ class LiveRecording:
         except OSError as error:
             self.trouble = f"The recording has stopped after {self.seconds:.1f} s: {self.path}: {error.strerror}."
 
-    def finish(self) -> Saved:
+    def finish(self) -> SavedRecording:
         """Write `recording-N.nc` (with sensor noise, as a log) and `recording-N-truth.nc`; the growing file goes.
 
         Raises:
@@ -129,7 +129,7 @@ def recover(folder: Path, say: Say) -> tuple[Path, ...]:
     return salvage(sorted(grown), keep, say, shortest=SHORTEST)
 
 
-def _save(flown: Flight, vehicle: Vehicle, growing: Path) -> Saved:
+def _save(flown: Flight, vehicle: Vehicle, growing: Path) -> SavedRecording:
     """The flights of a growing file, under its number, or under the first free one where that was taken since.
 
     The number seeds the noise. Nothing is overwritten, whatever other programs do meanwhile.
@@ -151,7 +151,7 @@ def _save(flown: Flight, vehicle: Vehicle, growing: Path) -> Saved:
         if number != own:
             vehicle.save(_card(log))
         inputs = truth.array(vehicle.input_names)
-        return Saved(number, log, vehicle, truth.duration, truth.duration / (len(inputs) - 1), inputs)
+        return SavedRecording(number, log, vehicle, truth.duration, truth.duration / (len(inputs) - 1), inputs)
     raise AssertionError("numbers end")
 
 

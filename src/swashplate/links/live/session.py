@@ -16,7 +16,7 @@ from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.identifying import HOWS, How, Identifying, Job, busiest
 from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
-from swashplate.links.live.recording import LiveRecording, Saved
+from swashplate.links.live.recording import LiveRecording, SavedRecording
 from swashplate.links.live.world import FAN_SECONDS, World
 from swashplate.links.notices import Say
 from swashplate.models.catalogue import from_card
@@ -68,7 +68,7 @@ class LiveSession:
         self.clock = Clock(self._step, period=self.world.period, lock=self.lock)
         self.identifying = Identifying(folder)
         self.recording: LiveRecording | None = None
-        self.recordings: list[Saved] = []
+        self.recordings: list[SavedRecording] = []
         self.notice = ""
         self._jobs: set[asyncio.Task[None]] = set()
         self._wanted_to_run = True

@@ -8,11 +8,11 @@ import pytest
 from swashplate.errors import FlightError
 from swashplate.flights.maneuvers.ardupilot_chirp import AXES, MIXER, MOVED
 from swashplate.flights.provenance import Event
-from swashplate.identification.responses.excitations import Excitation, Told, only_answering, owners_of
+from swashplate.identification.responses.excitations import SweepOfCommand, ToldSweeps, only_answering, owners_of
 
 
-def one(*size: float, axis: str = "", channel: str = "", share: float = 0.5) -> Excitation:
-    return Excitation({}, np.array(size), np.full(len(size), share), "1.0 to 2.0 s, all", axis, channel)
+def one(*size: float, axis: str = "", channel: str = "", share: float = 0.5) -> SweepOfCommand:
+    return SweepOfCommand({}, np.array(size), np.full(len(size), share), "1.0 to 2.0 s, all", axis, channel)
 
 
 def test_every_axis_of_the_firmware_reaches_one_command_first() -> None:
@@ -78,10 +78,10 @@ def test_sweeps_that_the_log_calls_one_axis_have_one_owner() -> None:
 
 def test_only_commands_that_rate_loops_make_answer() -> None:
     event = Event(1.0, "sweep", "roll mixer", {"axis": 10, "start": 1.0, "stop": 9.0, "channel": "mixer_roll"})
-    told = [Told(0, (event,))]
+    told = [ToldSweeps(0, (event,))]
     names = ["mixer_roll", "mixer_pitch", "mixer_yaw", "mixer_collective", "rcout_1"]
     assert only_answering(told, names, called={}) == ("mixer_pitch", "mixer_yaw")
     assert only_answering(told, ["tail"], called={"tail": "mixer_yaw"}) == ("tail",)
-    assert only_answering([Told(0, ())], names, called={}) == ()
+    assert only_answering([ToldSweeps(0, ())], names, called={}) == ()
     unknown = Event(1.0, "sweep", "axis 30", {"axis": 30, "start": 1.0, "stop": 9.0})
-    assert only_answering([Told(0, (event, unknown))], names, called={}) == ()
+    assert only_answering([ToldSweeps(0, (event, unknown))], names, called={}) == ()
