@@ -90,7 +90,7 @@ class StructureSearch:
     def rows(self) -> list[tuple[str, ...]]:
         """Cells of the table, the head first."""
         table: list[tuple[str, ...]] = [
-            ("structure", "J_ave", "worst J", "parameters", "worst CR %", "held-out J_rms", "modes [rad/s]")
+            ("structure", "J_ave", "worst J", "parameters", "worst sigma %", "held-out J_rms", "modes [rad/s]")
         ]
         for c in self.tried:
             name, bound = c.vaguest
