@@ -74,8 +74,8 @@ COMMAND = "Install it with: pip install 'swashplate[model]'"
 def test_the_light_verbs_do_without_what_the_others_name(tmp_path: Path) -> None:
     """One cold process in which the extras' libraries cannot be imported."""
     flown, unseen = (
-        log(tmp_path / f"{name}.csv", seed=seed, seconds=seconds)
-        for name, seed, seconds in (("flown", 1, 60.0), ("unseen", 2, 20.0))
+        log(tmp_path / f"{name}.csv", seed=seed, swept=swept, seconds=seconds)
+        for name, seed, swept, seconds in (("flown", 1, True, 120.0), ("unseen", 2, False, 20.0))
     )
     answers, model = tmp_path / "responses", tmp_path / "model"
     light: list[list[object]] = [

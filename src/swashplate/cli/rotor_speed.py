@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -34,7 +35,12 @@ def rotor_speed(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Measure rotor speed from the vibration that a rotor leaves in motion capture, gyros or accelerometers."""
+    """Tell the rotor speed: as the log has it, else from the vibration that a rotor leaves in gyros, accelerometers or
+    motion capture.
+
+    Refused where the sampling may have folded the line, where two lines cross, and for an aircraft without a main
+    rotor.
+    """
     from swashplate.cli.console import as_json
     from swashplate.cli.reading import asked, read
     from swashplate.flights.rotor_speed import rotor_speed as measure
@@ -57,9 +63,24 @@ def rotor_speed(
         typer.echo(as_json(lines))
     elif not quiet:
         for name, told in lines.items():
+            start, stop = told["runs"]
+            if told.get("logged"):
+                typer.echo(
+                    f"{name}: {told['mean']:.4g} rad/s on average, spread {told['spread']:.2g}, from {start:.1f} to "
+                    f"{stop:.1f} s, as the log has it. Vibration was not asked; --line asks it."
+                )
+                _remark(told)
+                continue
             folded = " or ".join(f"{hertz:+.1f}" for hertz in told["folded_from_hertz"])
             typer.echo(
                 f"{name}: {told['mean']:.1f} ± {told['sigma_of_mean']:.2g} rad/s on average, spread "
-                f"{told['spread']:.2g}; line at {told['hertz']:+.2f} Hz in {', '.join(told['signals'])}, "
-                f"{told['decibel']:.0f} dB over its surroundings. A line at {folded} Hz would look the same."
+                f"{told['spread']:.2g}, from {start:.1f} to {stop:.1f} s; line at {told['hertz']:+.2f} Hz in "
+                f"{', '.join(told['signals'])}, {told['decibel']:.0f} dB over its surroundings. A line at {folded} Hz "
+                "would look the same."
             )
+            _remark(told)
+
+
+def _remark(told: Mapping[str, Any]) -> None:
+    for words in told["remarks"]:
+        typer.echo(f"! {words}.")

@@ -155,8 +155,11 @@ _NUMBERED = re.compile(r"(rcin|rcout)_\d{1,2}")
 _ROTORS = {
     "motor": Channel("motor", "1", "motor command of a multirotor, 0 to 1", largest=_LARGEST["command"]),
     "omega": Channel("omega", "rad/s", "rotor speed of a multirotor", largest=_LARGEST["rotor"]),
+    "omega_motor": Channel(
+        "omega_motor", "rad/s", "speed of a motor, as its speed controller (ESC) tells it", largest=_LARGEST["rotor"]
+    ),
 }
-_ROTOR = re.compile(r"(motor|omega)_\d{1,2}")
+_ROTOR = re.compile(r"(motor|omega|omega_motor)_\d{1,2}")
 
 
 def _family(name: str) -> Channel | None:
@@ -164,7 +167,7 @@ def _family(name: str) -> Channel | None:
     if _NUMBERED.fullmatch(name):
         return Channel(name, "s", _PULSES[name.partition("_")[0]], "", "us", _LARGEST["pulse"])
     if _ROTOR.fullmatch(name):
-        return replace(_ROTORS[name.partition("_")[0]], name=name)
+        return replace(_ROTORS[name.rpartition("_")[0]], name=name)
     if name in _LOGGED:
         return _LOGGED[name]
     base, _, variant = name.partition("_")

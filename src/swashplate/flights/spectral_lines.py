@@ -103,7 +103,7 @@ def track(pieces: list[tuple[Array, Complex]], rate: float, band: tuple[float, f
         np.concatenate(middles),
         _between_bins(rows, place, hertz),
         _sigma(peak, rate),
-        float(10.0 * np.log10(np.mean(peak))),
+        float(10.0 * np.log10(max(np.mean(peak), 1e-12))),
         (scores - usual) / scatter,
         tuple(crossing),
     )

@@ -8,5 +8,5 @@ USUAL = "coax"
 HELICOPTER = "raptor50"
 """The usual single rotor."""
 
-BY_CHANNELS = {USUAL: ("motor_lower", "omega_lower"), "x8": ("motor_8",), "crazyflie": ("motor_4",)}
-"""By channels of which a log of their kind has one; a log without any of them is drawn as the usual single rotor."""
+BY_ROTORS = {4: "crazyflie", 8: "x8"}
+"""Multirotors by their number of rotors."""

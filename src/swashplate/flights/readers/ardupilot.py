@@ -96,6 +96,7 @@ _MESSAGES = (
     _Message("RCIN", "received", {f"C{i}": (f"rcin_{i}", "us") for i in range(1, 17)}),
     _Message("RCOU", "sent", {f"C{i}": (f"rcout_{i}", "us") for i in range(1, 17)}),
     _Message("RPM", "rotor", {"RPM": ("omega_rotor", "rpm"), "rpm1": ("omega_rotor", "rpm")}, "", (_INSTANCE, 0)),
+    *(_Message("ESC", f"esc_{k + 1}", {"RPM": (f"omega_motor_{k + 1}", "rpm")}, "", (_INSTANCE, k)) for k in range(8)),
     _Message("XKF1", "estimate", _ESTIMATE, "", (_INSTANCE, 0)),
     _Message("NKF1", "estimate", _ESTIMATE, "", (_INSTANCE, 0)),
     _Message("BARO", "barometer", {"Alt": ("altitude_baro", "m")}, "", (_INSTANCE, 0)),

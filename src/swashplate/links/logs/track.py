@@ -11,12 +11,9 @@ from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import euler_from_quaternion, quaternion_from_euler, to_body
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION
-from swashplate.links.live.picture import picture
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.opened import Opened
-from swashplate.models.card import packaged_cards
-from swashplate.models.catalogue import vehicle
-from swashplate.models.usual import BY_CHANNELS, HELICOPTER
+from swashplate.links.logs.shapes import shape_of
 
 MOST = 4000
 """Moments of a page."""
@@ -62,29 +59,21 @@ def track(opened: Opened) -> dict[str, Any]:
         notes.append("The log has no attitude: the track is drawn level, with the nose to the north.")
     whole = not notes
     drawn = [name for name in (*POSITION, *ATTITUDE, *QUATERNION) if name in flight]
-    kind = drawn_as(flight)
-    if kind != flight.provenance.vehicle:
-        notes.append(f"The log names no vehicle of swashplate: the shape of {kind} is drawn.")
-    shape = picture(vehicle(kind))
+    shape, words = shape_of(flight)
+    notes += [words] * bool(words)
+    depth = shape["skids"]["depth"] if shape["skids"] else 0.25 * shape["size"]
     return {
         "time": time,
         "places": np.round(places, 4),
         "speeds": np.round(speeds, 3),
         "angles": np.round(angles, 5),
         "placed": len(placed) == len(POSITION),
-        "picture": {**shape, "floor": float(places[:, 2].max()) + float(shape["skids"]["depth"])},
+        "picture": {**shape, "floor": float(places[:, 2].max()) + float(depth)},
         "rotors": len(shape["rotors"]),
         "tail": shape["tail"] is not None,
         "notes": notes,
         "code": code_lines.tracked(opened.read, drawn, whole=whole).as_dict(),
     }
-
-
-def drawn_as(flight: Flight) -> str:
-    """The packaged vehicle whose shape is drawn: the log's own, else one with such motors, else a helicopter."""
-    if flight.provenance.vehicle in packaged_cards():
-        return flight.provenance.vehicle
-    return next((name for name, channels in BY_CHANNELS.items() if any(c in flight for c in channels)), HELICOPTER)
 
 
 def _finite(flight: Flight, name: str) -> tuple[Array, Array]:

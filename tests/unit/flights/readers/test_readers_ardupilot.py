@@ -312,3 +312,21 @@ def test_a_log_without_time_stamps_is_refused_with_the_reason(tmp_path: Path) ->
     rows: list[Row] = [("MSG", ("ArduCopter V3.0.1",)), *[("ATT", (1.0, 0.01 * k)) for k in range(200)]]
     with pytest.raises(FlightError, match=r"time: .*no time stamps \(found ATT, .*firmware before 3\.1"):
         _flight(tmp_path, dataflash(rows, formats))
+
+
+def test_speed_controllers_tell_the_speeds_of_their_motors(tmp_path: Path) -> None:
+    formats = {**ARDUPILOT, "ESC": (90, "QBffff", "TimeUS,Instance,RPM,RawRPM,Volt,Curr")}
+    rows = [
+        *ardupilot_rows(),
+        *(
+            ("ESC", (20_000_000 + 100_000 * k, i, 2460.0 + 10.0 * i, 2460.0, 12.0, 5.0))
+            for k in range(20)
+            for i in (0, 1)
+        ),
+    ]
+    (tmp_path / "a.bin").write_bytes(dataflash(sorted(rows, key=lambda row: row[1][0]), formats))
+    flight = read(tmp_path / "a.bin")
+    assert_allclose(flight.values("omega_motor_1"), 2460.0 * 2.0 * np.pi / 60.0)
+    assert_allclose(flight.values("omega_motor_2"), 2470.0 * 2.0 * np.pi / 60.0)
+    assert flight["omega_motor_1"].attrs["units"] == "rad/s"
+    assert "omega_motor_3" not in flight

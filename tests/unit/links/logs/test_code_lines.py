@@ -111,7 +111,7 @@ def test_the_track(desk: Desk, folder: Path) -> None:
     assert found["code"]["shell"] == "", "a log without a place is nothing for swash replay"
     assert found["notes"] == [
         "The log has no place: the attitude is drawn at one point.",
-        "The log names no vehicle of swashplate: the shape of raptor50 is drawn.",
+        "The log does not say what flew: the shape of raptor50 is drawn.",
     ]
     assert found["angles"][:, 0].max() == pytest.approx(desk.log(1).ready.values("phi").max(), abs=1e-3)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,7 @@ import httpx
 
 from logs_page import Asking, table
 from swashplate.errors import SwashError
-from swashplate.flights.flight import Flight
 from swashplate.links.logs import app, uploads
-from swashplate.links.logs.track import drawn_as
 from swashplate.links.logs.uploads import Uploads, safe_name
 
 
@@ -175,24 +172,6 @@ def test_what_has_no_motion_has_no_track_and_too_short_a_stretch_no_spectrum(ask
     picture = asking.post("/spectra", log=number, channel="p", start=0.0, stop=30.0)["picture"]
     assert {len(row) for row in picture["shade"]} == {len(picture["shade"][0])}
     assert max(max(row) for row in picture["shade"]) == 255
-
-
-@pytest.mark.parametrize(
-    ("vehicle", "channel", "drawn"),
-    [
-        ("crazyflie", "phi", "crazyflie"),
-        ("My quad", "motor_4", "crazyflie"),
-        ("My quad", "motor_8", "x8"),
-        ("", "motor_lower", "coax"),
-        ("Heli 600", "phi", "raptor50"),
-    ],
-)
-def test_what_is_drawn_is_the_vehicle_of_the_log(vehicle: str, channel: str, drawn: str) -> None:
-    names = [f"motor_{k}" for k in range(1, 9)]
-    channels = names[: names.index(channel) + 1] if channel in names else [channel]
-    flight = Flight.from_arrays(np.arange(9.0), {name: np.zeros(9) for name in channels}, source="a.csv")
-    flight = replace(flight, provenance=replace(flight.provenance, vehicle=vehicle))
-    assert drawn_as(flight) == drawn
 
 
 def test_a_log_or_channel_that_is_none_is_told(asking: Asking, tmp_path: Path) -> None:

@@ -72,9 +72,9 @@ export class Helicopter {
     this.group.add(glass);
 
     const top = Math.min(...picture.rotors.map((r) => r.hub[2]), picture.bar ? picture.bar.hub[2] : 0);
-    this.group.add(tube([0, 0, 0], [picture.rotors[0].hub[0], picture.rotors[0].hub[1], top], 0.018 * R, dark));
-    const { length, width, depth } = picture.skids;
-    for (const side of [-1, 1]) {
+    for (const { hub } of picture.rotors) this.group.add(tube([0, 0, 0], [hub[0], hub[1], coaxial ? top : hub[2]], 0.018 * R, dark));
+    const { length, width, depth } = picture.skids ?? {};
+    for (const side of picture.skids ? [-1, 1] : []) {
       this.group.add(tube([-length, side * width, depth], [length, side * width, depth], 0.016 * R, dark));
       for (const end of [-0.5, 0.5])
         this.group.add(tube([end * length, side * 0.1 * R, 0.1 * R], [end * length, side * width, depth], 0.013 * R, dark));

@@ -1,0 +1,59 @@
+"""The shape that a log's aircraft is drawn with: its own, one of its kind, or a plain one, and what is said of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from swashplate.flights.airframe import airframe
+from swashplate.flights.flight import Flight
+from swashplate.links.live.picture import picture
+from swashplate.models.card import packaged_cards
+from swashplate.models.catalogue import vehicle
+from swashplate.models.usual import BY_ROTORS, HELICOPTER, USUAL
+
+_ARM = 0.35
+"""m: from the middle to a rotor of an aircraft whose size is not known."""
+
+
+def shape_of(flight: Flight) -> tuple[dict[str, Any], str]:
+    """What is drawn (as of `swashplate.links.live.picture`), and a sentence where it is not the log's own vehicle."""
+    if flight.provenance.vehicle in packaged_cards():
+        return picture(vehicle(flight.provenance.vehicle)), ""
+    kind = airframe(flight)
+    if kind is None:
+        return _packaged(HELICOPTER, "The log does not say what flew")
+    words = f"The log is of {kind.words} ({kind.told})"
+    if kind.main_rotors:
+        return _packaged(USUAL if kind.coaxial else HELICOPTER, words)
+    if kind.rotors in BY_ROTORS:
+        return _packaged(BY_ROTORS[kind.rotors], words)
+    if kind.multirotor:
+        return plain(kind.rotors or 4), f"{words}: a plain one is drawn."
+    return plain(0), f"{words}: no shape of its kind is known here, a plain body shows how it stood."
+
+
+def _packaged(name: str, words: str) -> tuple[dict[str, Any], str]:
+    return picture(vehicle(name)), f"{words}: the shape of {name} is drawn."
+
+
+def plain(rotors: int) -> dict[str, Any]:
+    """A body with so many rotors around it, the first ahead to the right; nothing but the body where there are none."""
+    angles = 2.0 * np.pi * (np.arange(rotors) + 0.5) / max(rotors, 1)
+    radius = min(0.45 * _ARM, 0.9 * _ARM * float(np.sin(np.pi / max(rotors, 2))))
+    around = [
+        {
+            "name": str(i + 1),
+            "hub": [float(_ARM * np.cos(angle)), float(_ARM * np.sin(angle)), 0.0],
+            "radius": radius,
+            "blades": 2,
+            "sense": 1 if i % 2 else -1,
+            "tilt": 0.0,
+        }
+        for i, angle in enumerate(angles)
+    ]
+    size = _ARM + radius
+    skids = {"length": 0.4 * size, "width": 0.3 * size, "depth": 0.3 * size} if rotors else None
+    parts = {"rotors": around, "bar": None, "tail": None, "skids": skids, "fin": None}
+    return {"size": size, "weight": 1.0, **parts, "ground": True, "rpm": False}
