@@ -14,7 +14,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
-from swashplate.flights.airframe import airframe
+from swashplate.flights.aircraft_kind import aircraft_kind
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.flights.schema import QUATERNION
@@ -180,7 +180,7 @@ def _telemetry(flight: Flight) -> str:
 
 
 def _refuse_without_rotor(flight: Flight) -> None:
-    kind = airframe(flight)
+    kind = aircraft_kind(flight)
     if kind is not None and not kind.main_rotors:
         raise FlightError(
             f"the log is of {kind.words} ({kind.told}), which has no main rotor.{_telemetry(flight)}",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.flights.airframe import airframe
+from swashplate.flights.aircraft_kind import aircraft_kind
 from swashplate.flights.flight import Flight
 from swashplate.links.live.picture import picture
 from swashplate.models.card import packaged_cards
@@ -21,7 +21,7 @@ def shape_of(flight: Flight) -> tuple[dict[str, Any], str]:
     """What is drawn (as of `swashplate.links.live.picture`), and a sentence where it is not the log's own vehicle."""
     if flight.provenance.vehicle in packaged_cards():
         return picture(vehicle(flight.provenance.vehicle)), ""
-    kind = airframe(flight)
+    kind = aircraft_kind(flight)
     if kind is None:
         return _packaged(HELICOPTER, "The log does not say what flew")
     words = f"The log is of {kind.words} ({kind.told})"

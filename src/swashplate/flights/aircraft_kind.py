@@ -15,7 +15,7 @@ from swashplate.flights.flight import Flight
 
 
 @dataclass(frozen=True)
-class Airframe:
+class AircraftKind:
     """What carries an aircraft.
 
     Attributes:
@@ -34,35 +34,35 @@ class Airframe:
     told: str = ""
 
 
-def _rotors(number: int) -> Airframe:
-    return Airframe(f"a multirotor with {number} rotors", multirotor=True, rotors=number)
+def _rotors(number: int) -> AircraftKind:
+    return AircraftKind(f"a multirotor with {number} rotors", multirotor=True, rotors=number)
 
 
-_HELICOPTER = Airframe("a helicopter", main_rotors=1)
-_COAXIAL = Airframe("a coaxial helicopter", main_rotors=2, coaxial=True)
-_TWO, _FOUR = (Airframe(f"a helicopter with {n} main rotors", main_rotors=n) for n in (2, 4))
-_PLANE, _VTOL = Airframe("a plane"), Airframe("a plane that takes off vertically")
-_ROVER, _BOAT, _SUB = Airframe("a rover"), Airframe("a boat"), Airframe("a submarine")
-_FIRMWARES: Mapping[str, Airframe] = {
-    r"Plane": _PLANE, r"Rover": _ROVER, r"Sub": _SUB, r"Blimp": Airframe("a blimp"),
-    r"Tracker": Airframe("an antenna tracker"),
+_HELICOPTER = AircraftKind("a helicopter", main_rotors=1)
+_COAXIAL = AircraftKind("a coaxial helicopter", main_rotors=2, coaxial=True)
+_TWO, _FOUR = (AircraftKind(f"a helicopter with {n} main rotors", main_rotors=n) for n in (2, 4))
+_PLANE, _VTOL = AircraftKind("a plane"), AircraftKind("a plane that takes off vertically")
+_ROVER, _BOAT, _SUB = AircraftKind("a rover"), AircraftKind("a boat"), AircraftKind("a submarine")
+_FIRMWARES: Mapping[str, AircraftKind] = {
+    r"Plane": _PLANE, r"Rover": _ROVER, r"Sub": _SUB, r"Blimp": AircraftKind("a blimp"),
+    r"Tracker": AircraftKind("an antenna tracker"),
 }  # fmt: skip
 """By the word behind Ardu or APM in a firmware's name. ArduCopter flies several kinds: its frame says which."""
-_FRAMES: Mapping[str, Airframe] = {
+_FRAMES: Mapping[str, AircraftKind] = {
     "QUAD": _rotors(4), "HEXA": _rotors(6), "Y6": _rotors(6), "OCTA": _rotors(8),
     "OCTA_QUAD": _rotors(8), "DODECA_HEXA": _rotors(12), "DECA": _rotors(10), "TRI": _rotors(3),
     "HELI": _HELICOPTER, "HELI_DUAL": _TWO, "HELI_QUAD": _FOUR, "COAX": _COAXIAL,
-    "SINGLE": Airframe("a single copter", main_rotors=1),
+    "SINGLE": AircraftKind("a single copter", main_rotors=1),
 }  # fmt: skip
 _CLASSES: Mapping[int, str] = {
     1: "QUAD", 2: "HEXA", 3: "OCTA", 4: "OCTA_QUAD", 5: "Y6", 6: "HELI", 7: "TRI", 8: "SINGLE", 9: "COAX",
     11: "HELI_DUAL", 12: "DODECA_HEXA", 13: "HELI_QUAD", 14: "DECA",
 }  # fmt: skip
-_CONTROL_ALLOCATION: Mapping[int, Airframe] = {
+_CONTROL_ALLOCATION: Mapping[int, AircraftKind] = {
     1: _PLANE, 2: _VTOL, 3: _VTOL, 4: _VTOL, 5: _ROVER, 6: _ROVER, 10: _HELICOPTER, 11: _HELICOPTER, 12: _COAXIAL,
     13: _ROVER,
 }  # fmt: skip
-_MAV_TYPES: Mapping[int, Airframe] = {
+_MAV_TYPES: Mapping[int, AircraftKind] = {
     1: _PLANE, 2: _rotors(4), 3: _COAXIAL, 4: _HELICOPTER, 10: _ROVER, 11: _BOAT, 12: _SUB, 13: _rotors(6),
     14: _rotors(8), 15: _rotors(3), 29: _rotors(12), 35: _rotors(10),
     **dict.fromkeys(range(19, 26), _VTOL),
@@ -71,7 +71,7 @@ _LEAST = 3
 """Motors from which on an aircraft with numbered motors is a multirotor."""
 
 
-def airframe(flight: Flight) -> Airframe | None:
+def aircraft_kind(flight: Flight) -> AircraftKind | None:
     """What the log says that flew; None where it does not."""
     said = flight.provenance
     told = _ardupilot(said.vehicle, said.parameters) if said.reader == "ardupilot" else None
@@ -82,11 +82,11 @@ def airframe(flight: Flight) -> Airframe | None:
         told = (_HELICOPTER, said.vehicle)
     told = told or _of_motors(flight)
     if told is None and said.reader == "blackbox" and re.search(r"\bbetaflight\b", said.vehicle, re.IGNORECASE):
-        told = (Airframe("a multirotor", multirotor=True), said.vehicle)
+        told = (AircraftKind("a multirotor", multirotor=True), said.vehicle)
     return None if told is None else replace(told[0], told=told[1])
 
 
-Told = tuple[Airframe, str]
+Told = tuple[AircraftKind, str]
 
 
 def _ardupilot(vehicle: str, parameters: Mapping[str, float]) -> Told | None:
@@ -104,7 +104,7 @@ def _ardupilot(vehicle: str, parameters: Mapping[str, float]) -> Told | None:
     return (_FRAMES[_CLASSES[number]], f"FRAME_CLASS {number}") if number in _CLASSES else None
 
 
-def _of_parameter(parameters: Mapping[str, float], name: str, kinds: Mapping[int, Airframe]) -> Told | None:
+def _of_parameter(parameters: Mapping[str, float], name: str, kinds: Mapping[int, AircraftKind]) -> Told | None:
     number = int(parameters.get(name, -1.0))
     return (kinds[number], f"{name} {number}") if number in kinds else None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swashplate.flights.airframe import airframe
+from swashplate.flights.aircraft_kind import aircraft_kind
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 
@@ -37,20 +37,20 @@ def log(
     ],
 )
 def test_ardupilot_names_its_firmware_and_its_frame(vehicle: str, words: str | None, main: int, rotors: int) -> None:
-    told = airframe(log(vehicle))
+    told = aircraft_kind(log(vehicle))
     assert (told and told.words) == words
     if told is not None:
         assert (told.main_rotors, told.rotors) == (main, rotors)
         assert told.told in vehicle
-    assert airframe(log(vehicle, reader="delimited")) is None  # a name that a user gave says nothing
+    assert aircraft_kind(log(vehicle, reader="delimited")) is None  # a name that a user gave says nothing
 
 
 def test_parameters_say_it_where_names_do_not() -> None:
     for number, words in ((1.0, "a multirotor with 4 rotors"), (6.0, "a helicopter"), (9.0, "a coaxial helicopter")):
-        told = airframe(log("ArduCopter V4.5.7", FRAME_CLASS=number))
+        told = aircraft_kind(log("ArduCopter V4.5.7", FRAME_CLASS=number))
         assert told is not None
         assert (told.words, told.told) == (words, f"FRAME_CLASS {number:g}")
-    told = airframe(log("ArduPlane V4.5.7", Q_ENABLE=1.0))
+    told = aircraft_kind(log("ArduPlane V4.5.7", Q_ENABLE=1.0))
     assert told is not None
     assert told.words == "a plane that takes off vertically"
     for parameters, words in (
@@ -59,11 +59,11 @@ def test_parameters_say_it_where_names_do_not() -> None:
         ({"MAV_TYPE": 2.0, "CA_AIRFRAME": 11.0}, "a helicopter"),
         ({"MAV_TYPE": 13.0, "CA_AIRFRAME": 0.0}, "a multirotor with 6 rotors"),
     ):
-        told = airframe(log("PX4", reader="ulog", **parameters))
+        told = aircraft_kind(log("PX4", reader="ulog", **parameters))
         assert told is not None
         assert told.words == words
-    assert airframe(log("PX4", reader="ulog")) is None
-    assert airframe(log("a table", reader="delimited", MAV_TYPE=1.0)) is None
+    assert aircraft_kind(log("PX4", reader="ulog")) is None
+    assert aircraft_kind(log("a table", reader="delimited", MAV_TYPE=1.0)) is None
 
 
 def test_firmwares_of_blackbox_logs_and_motors() -> None:
@@ -75,7 +75,7 @@ def test_firmwares_of_blackbox_logs_and_motors() -> None:
         ("INAV 7.1.2", four, "a multirotor with 4 rotors"),
         ("INAV 7.1.2", ("motor_1",), None),
     ):
-        told = airframe(log(vehicle, reader="blackbox", channels=channels))
+        told = aircraft_kind(log(vehicle, reader="blackbox", channels=channels))
         assert (told and told.words) == words
     for channels, words in (
         (four, "a multirotor with 4 rotors"),
@@ -83,5 +83,5 @@ def test_firmwares_of_blackbox_logs_and_motors() -> None:
         (("motor_1",), None),
         (("omega_rotor", "phi"), None),
     ):
-        told = airframe(log("", reader="arrays", channels=channels))
+        told = aircraft_kind(log("", reader="arrays", channels=channels))
         assert (told and told.words) == words
