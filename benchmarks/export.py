@@ -1,6 +1,6 @@
 """What leaves the house: the exported C step (as `swash export --format c` writes it) and the Gymnasium environments.
 
-Held against the compiled scan of `benchmarks.single` and `benchmarks.helicopter`, which fly the same equations.
+Held against `simulate` of `benchmarks.single` and `benchmarks.helicopter`, which fly the same equations.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ void fly(double *x, const double *u, const double *s, const double *p, int n) {
 def step(name: str, *, steps: int, repeats: int, **options: object) -> Result:
     """The exported Runge-Kutta step of a packaged vehicle, double precision, gcc -O2, called in a loop in C.
 
-    `options` as the scan has them that it is held against.
+    `options` as the flight has them that it is held against.
     """
     vehicle = load_vehicle(name, **options)
     model = trace_vehicle(vehicle, trim(vehicle), name=name)

@@ -1,15 +1,13 @@
-"""The single-rotor helicopter: compiled simulation, trims and derivatives over speed, LPV as printed."""
+"""The single-rotor helicopter: simulation, trims and derivatives over speed, LPV as printed."""
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
-from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.models.catalogue import vehicle
 from swashplate.simulation.derivatives import derivative_table
-from swashplate.simulation.integrate import trajectory
+from swashplate.simulation.integrate import simulate
 from swashplate.simulation.lpv import simulate_lpv
 from swashplate.simulation.reduction import PAPER_INPUTS
 from swashplate.simulation.speeds import trims_over_speed
@@ -22,19 +20,15 @@ LPV_TARGET = 100_000.0
 
 
 def scan(*, steps: int, repeats: int) -> Result:
-    """The compiled loop with flapping, bar and dynamic inflow (19 states), Runge-Kutta at 1 kHz."""
+    """`simulate` with flapping, bar and dynamic inflow (19 states), Runge-Kutta at 1 kHz."""
     flown = vehicle("raptor50", bar=True, inflow="pitt-peters")
     hover = trim(flown)
-    row = np.array([*hover.inputs, *(getattr(hover.environment, name) for name in SURROUNDINGS)])
-    p = parameter_row(flown, hover.environment)
-    arguments = jax.device_put((np.array(hover.state), np.tile(row, (steps + 1, 1)), p, 0.001))
+    inputs = np.tile(hover.inputs, (steps + 1, 1))
 
     def run() -> None:
-        jax.block_until_ready(trajectory(equations_of(flown), *arguments, substeps=1, held=True))
+        simulate(flown, inputs, start=hover, rate=1000.0)
 
-    return Result(
-        "helicopter, compiled scan", best_rate(run, steps, repeats=repeats), SCAN_TARGET, "19 states, float64"
-    )
+    return Result("helicopter, simulate", best_rate(run, steps, repeats=repeats), SCAN_TARGET, "19 states, float64")
 
 
 def speeds(*, count: int, repeats: int) -> Result:

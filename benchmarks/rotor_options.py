@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import jax
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
-from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.models.catalogue import vehicle
-from swashplate.simulation.integrate import trajectory
+from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
 
 CASES: tuple[tuple[str, str, dict[str, Any]], ...] = (
@@ -29,11 +27,8 @@ SHORT = CASES[:1]
 def _loop(name: str, options: dict[str, Any], steps: int) -> Any:
     flown = vehicle(name, **options)
     hover = trim(flown)
-    row = np.array([*hover.inputs, *(getattr(hover.environment, each) for each in SURROUNDINGS)])
-    arguments = jax.device_put(
-        (np.array(hover.state), np.tile(row, (steps + 1, 1)), parameter_row(flown, hover.environment), 0.002)
-    )
-    return lambda: jax.block_until_ready(trajectory(equations_of(flown), *arguments, substeps=1, held=True))
+    inputs = np.tile(hover.inputs, (steps + 1, 1))
+    return lambda: simulate(flown, inputs, start=hover, rate=500.0)
 
 
 def rotor_options(*, steps: int, repeats: int, short: bool) -> list[Result]:

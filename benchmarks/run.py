@@ -64,7 +64,7 @@ def measure(*, short: bool) -> list[Result]:
         *([] if short else [closed_loops.observers(count=128, repeats=2)]),
     ]
     jsbsim, scan = results[0], results[1]
-    results[0] = replace(jsbsim, note=f"{jsbsim.note}; the scan is {scan.rate / jsbsim.rate:.1f} times faster")
+    results[0] = replace(jsbsim, note=f"{jsbsim.note}; simulate is {scan.rate / jsbsim.rate:.1f} times faster")
     required = max(scan.target or 0.0, JSBSIM_RATIO * jsbsim.rate)
     results[1] = replace(scan, target=required)
     return results

@@ -1,4 +1,4 @@
-"""One CoaX with classical Runge-Kutta in float64: the compiled loop, a plain NumPy loop, and the limit in C."""
+"""One CoaX with classical Runge-Kutta in float64: `simulate`, a plain NumPy loop, and the limit in C."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-import jax
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row, unpack_rows
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.physics.backend import CasadiBackend
-from swashplate.simulation.integrate import trajectory
+from swashplate.simulation.integrate import simulate
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import trim
 
@@ -60,14 +59,15 @@ def _start() -> tuple:
 
 
 def scan(*, steps: int, repeats: int) -> Result:
-    """The compiled loop that `simulate` runs."""
-    vehicle, x, row, p = _start()
-    arguments = jax.device_put((x, np.tile(row, (steps + 1, 1)), p, DT))
+    """`simulate` as users call it, its checks and its flight included."""
+    vehicle, x, row, _ = _start()
+    inputs = np.tile(row[: len(vehicle.input_names)], (steps + 1, 1))
+    start = dict(zip(vehicle.state_names, x, strict=True))
 
     def run() -> None:
-        jax.block_until_ready(trajectory(equations_of(vehicle), *arguments, substeps=1, held=True))
+        simulate(vehicle, inputs, start=start, rate=1.0 / DT)
 
-    return Result("swashplate, compiled scan", best_rate(run, steps, repeats=repeats), TARGET, "float64, one core")
+    return Result("swashplate, simulate", best_rate(run, steps, repeats=repeats), TARGET, "float64, one core")
 
 
 def numpy_loop(*, steps: int, repeats: int) -> Result:
