@@ -55,7 +55,7 @@ layers: $(STAMP)
 	$(BIN)/lint-imports
 
 unit: $(STAMP)
-	$(QUICK) $(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+	$(QUICK) $(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 speed: $(STAMP)
 	$(QUICK) $(BIN)/python -m benchmarks.run --short

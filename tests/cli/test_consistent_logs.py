@@ -55,7 +55,8 @@ def test_a_channel_that_is_not_used_stops_nothing_and_an_option_takes_the_log_as
     turned = _log(tmp_path, factor=-1.0)
     assert "has the other sign" in one_message(swash("respond", turned, *ASK))
     taken = swash("respond", turned, *ASK, "--as-logged")
-    assert taken.code == 0
+    assert taken.code == 2, "the responses are there, and say that no gains follow from them"
+    assert "turn the unit of that channel" in taken.out
     assert "! log.csv: q: has the other sign" in taken.out
 
 

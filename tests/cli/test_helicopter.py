@@ -137,7 +137,7 @@ def test_uncertainty_bounds_hold_the_cards_value_and_repeat() -> None:
     assert all(mode["real"]["5 %"] < mode["real"]["value"] < mode["real"]["95 %"] for mode in document["modes"][:3])
     for name in ("Lp", "Mq", "Zw", "Xu"):
         assert found[name]["5 %"] < found[name]["value"] < found[name]["95 %"]
-    assert "5 % and 95 % bounds of 10 samples" in swash(*arguments[:-1]).out
+    assert "5 % and 95 % bounds: of 10 samples" in swash(*arguments[:-1]).out
 
 
 def test_a_sweep_in_hover_is_flown_and_saved(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def test_linear_models_are_flown_in_many_versions(law: tuple[str, ...], tmp_path
     assert drawn["u_by_u"] != pytest.approx(-0.05, rel=1e-4)
     for options, said in (
         (("--gusts", "indoor", "--payload", "0.1"), "--gusts, --payload: a linear model has no equations for wind"),
-        (("--tolerances",), "no number of the file has a Cramér-Rao bound"),
+        (("--tolerances",), "has a standard deviation (cramer_rao)"),
         (("--vary", "Mq=5%"), "Mq: is no parameter of the model"),
         (("--fit", worst), "is no text file, expected JSON. `swash identify"),
     ):

@@ -63,7 +63,7 @@ def _use_campaign(path: Path) -> None:
 
 def _result(ending: str) -> bytes:
     table = {"seed": np.arange(4), "verdict": np.array(["found", "lost"] * 2), "tau": np.linspace(0.0, 1.0, 4)}
-    return packed(table, ending=ending)
+    return packed(table, ending=ending, task="task")
 
 
 def _use_result(path: Path) -> None:
@@ -77,7 +77,7 @@ def _plan() -> bytes:
     with tempfile.TemporaryDirectory() as name:
         (Path(name) / "a.toml").write_text(CAMPAIGN)
         made = plan_campaign(Path(name) / "a.toml")
-        return json.dumps({"kind": "campaign-plan", "schema": 1, **made.stored()}).encode()
+        return json.dumps({"kind": "campaign-plan", "schema": 2, **made.stored()}).encode()
 
 
 def _use_plan(path: Path) -> None:

@@ -16,7 +16,10 @@ from swashplate.errors import ExportError
 
 _BINARY = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/"}
 _COMPARED = {"LT": "<", "LE": "<=", "EQ": "==", "NE": "!=", "AND": "&&", "OR": "||"}
-_LIBRARY = {"SQRT": "sqrt", "SIN": "sin", "COS": "cos", "TAN": "tan", "FABS": "fabs", "ATAN2": "atan2"}
+_LIBRARY = {
+    **{name.upper(): name for name in ("sqrt", "sin", "cos", "tan", "fabs", "atan2", "pow")},
+    "CONSTPOW": "pow",  # by a constant
+}
 _OWN = {
     "NEG": "-{0}",
     "SQ": "{0} * {0}",

@@ -267,7 +267,7 @@ class _Record:
     def _by_motion(self, name: str, *, stick: bool, swept: bool) -> Excitation:
         told = self.told[name]
         share = f"the motion until then explains {100.0 * told.past:.1f} % of it"
-        if told.answer:
+        if told.answer and not (swept and told.foretold):
             words = f"a controller's answer: {share}, and the motion that follows tells it no better."
             return Excitation(self.name, name, CONTROLLER, words, told)
         if swept or stick:

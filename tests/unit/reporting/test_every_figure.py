@@ -86,7 +86,6 @@ WITHOUT = {
     "Maneuver": "words; `plan_maneuver` shows it",
     "Margins": "two numbers",
     "MeasurementPlan": "a list to print",
-    "ObserverTrial": "the flights in it show themselves",
     "OmissionStudy": "a table in words",
     "PublishedComparison": "a table in words",
     "RecursiveRegression": "an estimator that has not begun; `track` shows what it finds",

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.rate_gain_names import gain_text, untuned
 from swashplate.errors import ControllerError
-from swashplate.flights.excitation import OUTSIDE
+from swashplate.flights.excitation import FLY, OUTSIDE
 from swashplate.identification.frequency.handling import ResponseMargins
 from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.identification.frequency.response_cost import ACCEPTABLE
@@ -29,7 +29,6 @@ from swashplate.models.card import Card
 _SEEN = (12.0, 120.0)
 """rad/s: where the sense of a vehicle's answer is read off."""
 _SIGNED = {1: "positive", -1: "negative"}
-_FLY = "Fly a sweep of this axis, or name what moved the command with --references in `swash respond`."
 
 
 def refused_by_data(fit: Fitted, responses: FrequencyResponse, rate: str, command: str) -> str:
@@ -54,11 +53,13 @@ def _not_moved(responses: FrequencyResponse, command: str) -> str:
     told = responses.settings.get("excitation", {})
     name = next((n for n in (command, responses.settings.get("channels", {}).get(command)) if n in told), None)
     if name is None:
-        return f"nothing tells what moved '{command}': it may be the controller's answer to the motion. {_FLY}"
+        return f"nothing tells what moved '{command}': it may be the controller's answer to the motion. {FLY}"
     if told[name]["kind"] in OUTSIDE:
         return ""
+    words = told[name]["words"]
     return (
-        f"'{command}' was not moved from outside, as far as the log tells ({told[name]['kind']}): {told[name]['words']}"
+        f"'{command}' was not moved from outside, as far as the log tells ({told[name]['kind']}): {words}"
+        f"{'' if FLY in words else f' {FLY}'}"
     )
 
 

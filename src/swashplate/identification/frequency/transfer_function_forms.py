@@ -70,7 +70,9 @@ def suggest(
     trials = _trials(wanted, forms, responses, seed=seed, tell=tell)
     best = _pick(trials)
     if best.unstable:
-        low = float(2.0 * best.unstable / TWO_PI)
+        # Of all that follow better, too: a simple form puts its mode anywhere.
+        closest = min((t for t in trials if t.unstable and t.cost <= best.cost), key=lambda t: t.cost)
+        low = float(2.0 * closest.unstable / TWO_PI)
         stable: list[TriedStructure] = []
         if responses.method != "joint" and all(t.omega[-1] >= _WIDE * TWO_PI * low for t in wanted):
             ends = (low, _highest(wanted))
@@ -78,7 +80,7 @@ def suggest(
             upper = _trials(above, forms, responses, seed=seed)
             stable = [t for t in upper if not t.unstable and not t.unsound and t.cost <= ACCEPTABLE]
         if stable:
-            best = _said(_pick(stable), _BELOW.format(low, best.unstable, best.cost))
+            best = _said(_pick(stable), _BELOW.format(low, closest.unstable, closest.cost))
             best = replace(best, fit=replace(best.fit, settings={**best.fit.settings, BAND: [low, _highest(wanted)]}))
         else:
             others = min((t.cost for t in trials if not t.unstable), default=float("inf"))

@@ -186,7 +186,7 @@ def test_a_fleet_of_logs_is_one_table(tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     logs.mkdir()
     log(logs / "a.nc", noise=0.01, seed=1)
-    log(logs / "b.nc", noise=30.0, seed=2)
+    log(logs / "b.nc", noise=20.0, seed=2)
     (logs / "c.nc").write_bytes(b"this is no log")
     (logs / "notes.txt").write_text("not asked for")
     file = tmp_path / "fleet.toml"
