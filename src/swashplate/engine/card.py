@@ -5,17 +5,18 @@ The only use of JAX in this package. It runs on any device that JAX computes on;
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.engine.c_expression import Statement, statements
+from swashplate.engine.c_expression import statements
 from swashplate.engine.c_text import Precision
 from swashplate.engine.equations import Equations, equations_of
 from swashplate.engine.fly import FlightPlan
+from swashplate.engine.on_arrays import columns_of, in_order, operations, value_of
 from swashplate.engine.trace import unrolled_rates
 from swashplate.errors import SwashError
 from swashplate.extras import library
@@ -76,56 +77,13 @@ def rates_by_jax(equations: Equations) -> Callable[[Any, Any, Any], Any]:
     jnp: Any = library("jax.numpy", what="A batch on a card")
     function = unrolled_rates(equations)
     code = statements(function, precision="double", inputs=_NAMES)
-    wide = _operations(jnp)
+    steps = in_order(code, operations(jnp))
 
     def rates(x: Any, w: Any, p: Any) -> Any:
-        known: dict[str, Any] = {
-            f"{name}[{i}]": column[i]
-            for name, column in zip(_NAMES, (x, w, p), strict=True)
-            for i in range(column.shape[0])
-        }
-        for s in code.body:
-            known[s.name] = _evaluated(s, [_value(known, text) for text in s.reads], wide)
-        told = [_value(known, code.outputs[0, i]) for i in range(function.size1_out(0))]
+        known = columns_of(_NAMES, (x, w, p))
+        for name, call, reads, _ in steps:
+            known[name] = call(*[known[read] if isinstance(read, str) else read for read in reads])
+        told = [value_of(known, code.outputs[0, i]) for i in range(function.size1_out(0))]
         return jnp.stack([jnp.broadcast_to(jnp.asarray(value, x.dtype), x.shape[1:]) for value in told])
 
     return rates
-
-
-def _value(known: dict[str, Any], text: str) -> Any:
-    return known[text] if text in known else float(text.strip("()"))
-
-
-def _evaluated(s: Statement, of: Sequence[Any], wide: dict[str, Callable[..., Any]]) -> Any:
-    return wide[s.operation](*of)
-
-
-def _operations(jnp: Any) -> dict[str, Callable[..., Any]]:
-    return {
-        "ADD": lambda a, b: a + b,
-        "SUB": lambda a, b: a - b,
-        "MUL": lambda a, b: a * b,
-        "DIV": lambda a, b: a / b,
-        "NEG": lambda a: -a,
-        "SQ": lambda a: a * a,
-        "TWICE": lambda a: a + a,
-        "INV": lambda a: 1.0 / a,
-        "ASSIGN": lambda a: a,
-        "SQRT": jnp.sqrt,
-        "SIN": jnp.sin,
-        "COS": jnp.cos,
-        "TAN": jnp.tan,
-        "FABS": jnp.abs,
-        "ATAN2": jnp.arctan2,
-        "SIGN": jnp.sign,
-        "FMIN": jnp.minimum,
-        "FMAX": jnp.maximum,
-        "LT": lambda a, b: jnp.where(a < b, 1.0, 0.0),
-        "LE": lambda a, b: jnp.where(a <= b, 1.0, 0.0),
-        "EQ": lambda a, b: jnp.where(a == b, 1.0, 0.0),
-        "NE": lambda a, b: jnp.where(a != b, 1.0, 0.0),
-        "AND": lambda a, b: jnp.where((a != 0) & (b != 0), 1.0, 0.0),
-        "OR": lambda a, b: jnp.where((a != 0) | (b != 0), 1.0, 0.0),
-        "NOT": lambda a: jnp.where(a == 0, 1.0, 0.0),
-        "IF_ELSE_ZERO": lambda a, b: jnp.where(a != 0, b, 0.0),
-    }

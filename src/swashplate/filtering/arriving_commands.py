@@ -3,39 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.jax_on_demand import jnp
 from swashplate.models.vehicle import Vehicle
 
 
-def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance) -> Any:
-    """What reaches the vehicle at each sample, to be held there: trimmed, and later than logged (n, n_inputs).
+def lengthened(rows: Array, length: int) -> Array:
+    """Rows (n, ...) with the last one repeated up to `length` of them."""
+    return np.concatenate([rows, np.repeat(rows[-1:], length - len(rows), axis=0)])
+
+
+def commands_moved(vehicle: Vehicle, dt: float, inputs: Array, nuisance: Nuisance) -> tuple[Array, Array]:
+    """What reaches the vehicle at each sample, to be held there: trimmed, and later than logged; and its slopes by each
+    input's delay [1/s]. Both (n, n_inputs).
 
     A smooth curve through the samples; before the first and after the last sample the nearest one holds.
     """
-    return commands_moved(vehicle, dt, inputs, nuisance, jnp)[0]
-
-
-def commands_moved(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, xp: Any) -> tuple[Any, Any]:
-    """`commands`, and their slopes by each input's delay [1/s], both (n, n_inputs); `xp` is `numpy` or `jax.numpy`."""
     n = inputs.shape[0]
-    trims = xp.stack([xp.asarray(getattr(nuisance, f"trim_{name}", 0.0), dtype=float) for name in vehicle.input_names])
-    delay = xp.where(xp.asarray(motors(vehicle)), nuisance.delay_motor, nuisance.delay_servo)
+    trims = np.stack([np.asarray(getattr(nuisance, f"trim_{name}", 0.0), dtype=float) for name in vehicle.input_names])
+    delay = np.where(np.asarray(motors(vehicle)), nuisance.delay_motor, nuisance.delay_servo)
     trimmed = inputs + trims
-    wanted = xp.arange(n)[:, None] - delay[None, :] / dt
-    place = xp.clip(wanted, 0.0, n - 1.0)
-    below = xp.clip(xp.floor(place), 0, n - 2).astype(int)
-    a, b, c, d = (xp.take_along_axis(trimmed, xp.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
+    wanted = np.arange(n)[:, None] - delay[None, :] / dt
+    place = np.clip(wanted, 0.0, n - 1.0)
+    below = np.clip(np.floor(place), 0, n - 2).astype(int)
+    a, b, c, d = (np.take_along_axis(trimmed, np.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
     t = place - below
     # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
     first, second, third = c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a
     slope = 0.5 * (first + t * (2.0 * second + t * (3.0 * third)))
-    return b + 0.5 * t * (first + t * (second + t * third)), xp.where(wanted == place, -slope / dt, 0.0)
+    return b + 0.5 * t * (first + t * (second + t * third)), np.where(wanted == place, -slope / dt, 0.0)
 
 
 def commands_by(vehicle: Vehicle, late: Array, names: Sequence[str]) -> Array:

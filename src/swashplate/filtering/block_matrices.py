@@ -1,28 +1,26 @@
-"""Matrices made of rows and of blocks, with any axes in front, for NumPy and JAX."""
+"""Matrices made of rows and of blocks, with any axes in front."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
+from swashplate.arrays import Array
 
-def diagonal(rows: Any, xp: Any) -> Any:
+
+def diagonal(rows: Array) -> Array:
     """Diagonal matrices of rows (..., n)."""
-    return rows[..., None] * xp.eye(rows.shape[-1])
+    return rows[..., None] * np.eye(rows.shape[-1])
 
 
-def blocks(rows: Any, sizes: tuple[int, ...], xp: Any) -> Any:
+def blocks(rows: Sequence[Sequence[Array | None]], sizes: tuple[int, ...]) -> Array:
     """Matrices of blocks of these sizes, with any axes in front; None is zeros."""
     front = np.broadcast_shapes(*(block.shape[:-2] for row in rows for block in row if block is not None))
-    whole = [
-        xp.concatenate(
-            [
-                xp.zeros((*front, high, wide)) if block is None else xp.broadcast_to(block, (*front, high, wide))
-                for block, wide in zip(row, sizes, strict=True)
-            ],
-            axis=-1,
-        )
-        for row, high in zip(rows, sizes, strict=True)
-    ]
-    return xp.concatenate(whole, axis=-2)
+    whole = np.zeros((*front, sum(sizes), sum(sizes)))
+    ends = np.concatenate([[0], np.cumsum(sizes)])
+    for i, row in enumerate(rows):
+        for j, block in enumerate(row):
+            if block is not None:
+                whole[..., ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = block
+    return whole

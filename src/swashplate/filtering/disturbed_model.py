@@ -11,27 +11,21 @@ turned into the heading first, so that the gain does not depend on where the nos
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from swashplate.engine.equations import CONSTANTS, Equations, equations_of
+from swashplate.arrays import Array
+from swashplate.engine.equations import Equations, equations_of
 from swashplate.filtering.block_matrices import blocks, diagonal
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
-from swashplate.filtering.filter_loop import filtered
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.filtering.riccati import kalman_gain
 from swashplate.flights.schema import POSITION, RATES
-from swashplate.jax_on_demand import jax, jnp
-from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 from swashplate.simulation.discretisation import held_series
-from swashplate.simulation.dynamics import jax_backend, row_rates
-from swashplate.simulation.runge_kutta import rk4_step
 
 N_DISTURBANCES = len(DISTURBED)
 
@@ -45,10 +39,6 @@ class FilterGain(NamedTuple):
     drift: Any
     covariance: Any
     line: Any = ()
-
-
-Advance = Callable[[Any, Any, Any], Any]
-"""A state row one sample later, from the row, the disturbances that act and what holds at this sample."""
 
 
 class FilterState(NamedTuple):
@@ -96,35 +86,9 @@ class StochasticModel:
         """A rotor's line: a pair that turns for roll and pitch, and one for height."""
         return 2 * len(_LINE) * self.lined
 
-    # ---- one sample --------------------------------------------------------------------------------------------
-    def step(self, x: Any, gust: Any, u: Any, parameters: Any, voltage: Any) -> Any:
-        """The state one sample later, with commands and disturbances held.
-
-        Disturbances are accelerations as in `DISTURBED`, and perhaps the wind.
-        """
-        rates, push = self._rates(parameters), self._push(gust)
-        driving = self._driving(gust, u, voltage)
-        return rk4_step(lambda x, w: rates(x, w) + push, x, lambda _: driving, self.dt, looped=True)
-
-    def _rates(self, parameters: Any) -> Any:
-        rates = row_rates(self.equations, padded=False)
-        around = environment_of(self.vehicle, parameters=parameters)
-        constants = [getattr(around, name) for name in CONSTANTS]
-        numbers = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
-        return lambda x, w: rates(x, w, numbers)
-
-    def _push(self, gust: Any) -> Any:
-        """The accelerations of a gust as rates of a whole state row."""
-        units = np.eye(len(self.vehicle.state_names))[self.disturbed]
-        return sum(gust[i] * unit for i, unit in enumerate(units))
-
-    def _driving(self, gust: Any, u: Any, voltage: Any) -> Any:
-        """Inputs, wind and voltage side by side."""
-        return jnp.concatenate([u, gust[N_DISTURBANCES:], jnp.zeros(3 - 2 * self.windy), voltage[None]])
-
-    def measure(self, x: Any, nuisance: Nuisance, xp: Backend | None = None) -> Any:
-        """The measured channels of a state, whose entries come first; JAX's operations where `xp` is None."""
-        xp = xp or jax_backend()
+    # ---- what is seen ------------------------------------------------------------------------------------------
+    def measure(self, x: Any, nuisance: Nuisance, xp: Backend) -> Any:
+        """The measured channels of a state, whose entries come first."""
         here = {name: x[self.vehicle.index(name)] for name in self.output_names}
         attitude = Euler(*(x[self.vehicle.index(name)] for name in ("phi", "theta", "psi")))
         lever = body_to_local(Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z), attitude, xp)
@@ -145,91 +109,57 @@ class StochasticModel:
         return [self.vehicle.index(name) for name in DISTURBED]
 
     # ---- the filter --------------------------------------------------------------------------------------------
-    def linear(
-        self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance
-    ) -> tuple[Any, Any, Any, Any]:
-        """A, C, Q, R of the joined system (states, gusts, drifts, line) around an equilibrium with the nose north.
+    def places(self, x: Array, noise: Noise) -> list[Array]:
+        """Where slopes are taken and averaged, by row: the equilibrium itself, four points about it with wind.
 
         Wind acts through terms that grow with the square of the speed and have no slope at rest; with wind, slopes are
         averaged over a normal distribution of the horizontal air speed by four points (statistical linearisation,
         Gelb 1974, sec. 6.2; cubature of the third degree).
         """
-        places, still = jnp.stack(self.places(x, noise, jnp)), jnp.zeros(self.n_gusts)
-        by_x, by_gust = (
-            jnp.mean(part, axis=0)
-            for part in jax.vmap(lambda x: self.slopes(x, still, u=u, parameters=parameters, voltage=voltage))(places)
-        )
-        by_state = jax.jacfwd(lambda x: self.measure(x, nuisance))(x)
-        return self.joined(by_x, by_gust, by_state, noise, jnp)
-
-    def places(self, x: Any, noise: Noise, xp: Any) -> list[Any]:
-        """Where slopes are taken and averaged: the equilibrium itself, four points about it with wind."""
         if not self.windy:
             return [x]
-        sigma = xp.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
+        sigma = np.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
         along = np.sqrt(2.0) * np.eye(x.shape[-1])[self.disturbed[:2]]
         return [x + sign * sigma[..., None] * way for sign in (1.0, -1.0) for way in along]
 
-    def joined(self, by_x: Any, by_gust: Any, by_state: Any, noise: Noise, xp: Any) -> tuple[Any, Any, Any, Any]:
-        """A, C, Q, R of the joined system.
+    def joined(self, by_x: Array, by_gust: Array, by_state: Array, noise: Noise) -> tuple[Array, Array, Array, Array]:
+        """A, C, Q, R of the joined system (states, gusts, drifts, line), about steady flight with the nose north.
 
         Args:
             by_x, by_gust: slopes of the rates by states and disturbances, with any axes in front.
             by_state: slopes of the measured channels by the states.
             noise: numbers, or rows of them along the axes in front.
-            xp: `numpy` or `jax.numpy`.
         """
         n, g, d, k = by_x.shape[-1], self.n_gusts, N_DISTURBANCES, self.n_line
         by_x, held = held_series(by_x, self.dt, np.eye(n))  # as `step` makes it of a linear system
         by_gust = self.dt * held @ by_gust
         by_push = by_gust[..., :d]
-        moves = xp.concatenate([by_gust, by_push, xp.zeros((*by_push.shape[:-1], k))], axis=-1)
-        A = blocks([[by_x, moves], [None, self.lasting(noise, xp)]], (n, g + d + k), xp)
-        shaken = xp.broadcast_to(self.line_seen, (*by_state.shape[:-1], k))
-        C = xp.concatenate([by_state, xp.zeros((*by_state.shape[:-1], g + d)), shaken], axis=-1)
-        return A, C, self.process_noise(by_push, noise, xp), diagonal(self.sensor_variances(noise, xp), xp)
+        moves = np.concatenate([by_gust, by_push, np.zeros((*by_push.shape[:-1], k))], axis=-1)
+        A = blocks([[by_x, moves], [None, self.lasting(noise)]], (n, g + d + k))
+        shaken = np.broadcast_to(self.line_seen, (*by_state.shape[:-1], k))
+        C = np.concatenate([by_state, np.zeros((*by_state.shape[:-1], g + d)), shaken], axis=-1)
+        return A, C, self.process_noise(by_push, noise), diagonal(self.sensor_variances(noise))
 
-    def rates(self, x: Any, gust: Any, *, u: Any, parameters: Any, voltage: Any) -> Any:
-        """Rates of a state row under commands and disturbances."""
-        return self._rates(parameters)(x, self._driving(gust, u, voltage)) + self._push(gust)
-
-    def slopes(self, x: Any, gust: Any, *, u: Any, parameters: Any, voltage: Any) -> tuple[Any, Any]:
-        """Slopes of the rates by the state (states, states) and by the disturbances (states, gusts)."""
-        push, wind = gust[:N_DISTURBANCES], gust[N_DISTURBANCES:]
-
-        def moved(x: Any, wind: Any) -> Any:
-            return self.rates(x, jnp.concatenate([push, wind]), u=u, parameters=parameters, voltage=voltage)
-
-        by_x, by_wind = jax.jacfwd(moved, argnums=(0, 1))(x, wind)
-        pushed = np.eye(x.shape[0])[:, self.disturbed]  # an acceleration is the rate of one state
-        return by_x, jnp.concatenate([pushed, by_wind], axis=1)
-
-    def process_noise(self, by_push: Any, noise: Noise, xp: Any = jnp) -> Any:
+    def process_noise(self, by_push: Any, noise: Noise) -> Any:
         """Covariance of what a sample adds to states, gusts, drifts and the line.
 
         Args:
             by_push: how an acceleration that is held over the sample moves the states (..., states, accelerations).
             noise: intensities.
-            xp: `numpy` or `jax.numpy`.
         """
         n, g, d = by_push.shape[-2], self.n_gusts, N_DISTURBANCES
         tilt, yaw, horizontal, vertical = noise[:4]
-        white = xp.stack(on_axes(horizontal, vertical, tilt, yaw), axis=-1)
+        white = np.stack(on_axes(horizontal, vertical, tilt, yaw), axis=-1)
         tilt, yaw, horizontal, vertical = noise[4:8]
-        gust = xp.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind][:g], axis=-1)
-        drift = xp.stack(on_axes(*_shared_or_own(noise, "drift", xp)), axis=-1)
+        gust = np.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind][:g], axis=-1)
+        drift = np.stack(on_axes(*_shared_or_own(noise, "drift")), axis=-1)
         # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
-        spread = (by_push * (white**2 / self.dt)[..., None, :]) @ xp.swapaxes(by_push, -1, -2) + self._floor(n)
-        gusts, drifts = (diagonal(row**2 * self.dt, xp) for row in (gust, drift))
-        rms = xp.stack([noise.line_angle, noise.line_angle, noise.line_height, noise.line_height], axis=-1)
-        line = diagonal((1.0 - self._line_kept(noise, xp) ** 2)[..., None] * rms[..., : self.n_line] ** 2, xp)
+        spread = (by_push * (white**2 / self.dt)[..., None, :]) @ np.swapaxes(by_push, -1, -2) + self._floor(n)
+        gusts, drifts = (diagonal(row**2 * self.dt) for row in (gust, drift))
+        rms = np.stack([noise.line_angle, noise.line_angle, noise.line_height, noise.line_height], axis=-1)
+        line = diagonal((1.0 - self._line_kept(noise) ** 2)[..., None] * rms[..., : self.n_line] ** 2)
         rows = [[spread, None, None, None], [None, gusts, None, None], [None, None, drifts, None], [None] * 3 + [line]]
-        return blocks(rows, (n, g, d, self.n_line), xp)
-
-    def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> FilterGain:
-        """Steady gain at an equilibrium with the nose north."""
-        K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
-        return self.gain_of(K, S)
+        return blocks(rows, (n, g, d, self.n_line))
 
     def gain_of(self, K: Any, S: Any) -> FilterGain:
         """The parts of a joined gain (..., joined, outputs)."""
@@ -238,26 +168,26 @@ class StochasticModel:
         line = K[..., k:, :] if self.lined else ()
         return FilterGain(K[..., :n, :], K[..., n:d, :], K[..., d:k, :], S, line)
 
-    def fade(self, noise: Noise, xp: Any = jnp) -> Any:
+    def fade(self, noise: Noise) -> Any:
         """What is left of each gust after one sample."""
-        taus = [*on_axes(*_shared_or_own(noise, "tau_gust", xp)), noise.tau_wind, noise.tau_wind]
-        return xp.exp(-self.dt / xp.stack(taus[: self.n_gusts], axis=-1))
+        taus = [*on_axes(*_shared_or_own(noise, "tau_gust")), noise.tau_wind, noise.tau_wind]
+        return np.exp(-self.dt / np.stack(taus[: self.n_gusts], axis=-1))
 
-    def lasting(self, noise: Noise, xp: Any = jnp) -> Any:
+    def lasting(self, noise: Noise) -> Any:
         """How gusts, drifts and the line together go on for one sample (..., all three, all three)."""
-        fade, turn = diagonal(self.fade(noise, xp), xp), self.line_turn(noise, xp)
+        fade, turn = diagonal(self.fade(noise)), self.line_turn(noise)
         rows = [[fade, None, None], [None, np.eye(N_DISTURBANCES), None], [None, None, turn]]
-        return blocks(rows, (self.n_gusts, N_DISTURBANCES, self.n_line), xp)
+        return blocks(rows, (self.n_gusts, N_DISTURBANCES, self.n_line))
 
-    def line_turn(self, noise: Noise, xp: Any = jnp) -> Any:
+    def line_turn(self, noise: Noise) -> Any:
         """The line one sample later (..., n_line, n_line): pairs that turn by its frequency, and forget their phase."""
         angle, quarter = 2.0 * np.pi * self.dt * noise.line_hertz, [[0.0, -1.0], [1.0, 0.0]]
-        along, across = (self._line_kept(noise, xp) * part for part in (xp.cos(angle), xp.sin(angle)))
+        along, across = (self._line_kept(noise) * part for part in (np.cos(angle), np.sin(angle)))
         over = np.kron(np.eye(self.n_line // 2), quarter)
         return along[..., None, None] * np.eye(self.n_line) + across[..., None, None] * over
 
-    def _line_kept(self, noise: Noise, xp: Any) -> Any:
-        return xp.exp(-self.dt / xp.asarray(noise.line_time))
+    def _line_kept(self, noise: Noise) -> Any:
+        return np.exp(-self.dt / np.asarray(noise.line_time))
 
     @property
     def line_seen(self) -> Any:
@@ -271,87 +201,52 @@ class StochasticModel:
         speeds = [name.startswith("omega") for name in self.vehicle.state_names]
         return np.diag(np.where(np.array(speeds), 1e-4, 1e-10)[:n])
 
-    def sensor_variances(self, noise: Noise, xp: Any = jnp) -> Any:
+    def sensor_variances(self, noise: Noise) -> Any:
         """Variances of the measured channels."""
         sigma = dict.fromkeys(POSITION, noise.sensor_position)
-        sigma |= dict.fromkeys(RATES, xp.where(noise.sensor_rate > 0.0, noise.sensor_rate, noise.sensor_angle))
-        sigma["psi"] = xp.where(noise.sensor_heading > 0.0, noise.sensor_heading, noise.sensor_angle)
-        return xp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names], axis=-1)
+        sigma |= dict.fromkeys(RATES, np.where(noise.sensor_rate > 0.0, noise.sensor_rate, noise.sensor_angle))
+        sigma["psi"] = np.where(noise.sensor_heading > 0.0, noise.sensor_heading, noise.sensor_angle)
+        return np.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names], axis=-1)
 
     @property
     def n_outputs(self) -> int:
         return len(self.output_names)
 
     def correct(
-        self, state: FilterState, y: Any, gain: FilterGain, nuisance: Nuisance, xp: Backend | None = None
+        self, state: FilterState, y: Any, gain: FilterGain, nuisance: Nuisance, xp: Backend
     ) -> tuple[FilterState, Any]:
-        """The state after a measurement, and the innovation with its horizontal part in heading axes.
-
-        JAX's operations where `xp` is None.
-        """
-        xp = xp or jax_backend()
+        """The state after a measurement, and the innovation with its horizontal part in heading axes."""
         psi = state.x[self.vehicle.index("psi")]
         expected = self.measure(state.x, nuisance, xp)
         expected = expected + self.line_seen @ state.line if self.lined else expected
         innovation = _turn(y - expected, self.output_names, -psi, xp)
         x, gust, drift = (rows @ innovation for rows in (gain.state, gain.gust, gain.drift))
-        return self._moved(state, x, gust, drift, gain.line @ innovation if self.lined else (), xp), innovation
-
-    def moved(self, state: FilterState, joined: Any) -> FilterState:
-        """A state and what is added to it, a joined row (states, gusts, drifts, line) with the nose north."""
-        ends = np.cumsum([len(self.vehicle.state_names), self.n_gusts, N_DISTURBANCES])
-        x, gust, drift, line = jnp.split(joined, ends)
-        return self._moved(state, x, gust, drift, line, jax_backend())
-
-    def _moved(self, state: FilterState, x: Any, gust: Any, drift: Any, line: Any, xp: Backend) -> FilterState:
-        psi = state.x[self.vehicle.index("psi")]
         x, gust = _turn(x, self.vehicle.state_names, psi, xp), _turn(gust, _GUST_NAMES[: self.n_gusts], psi, xp)
+        line = state.line + gain.line @ innovation if self.lined else ()
+        return FilterState(state.x + x, state.gust + gust, state.drift + drift, line), innovation
+
+    def moved(self, state: FilterState, joined: Array) -> FilterState:
+        """States by row, and what is added to them, joined rows (states, gusts, drifts, line) with the nose north."""
+        n, g = len(self.vehicle.state_names), self.n_gusts
+        psi, added = state.x[:, self.vehicle.index("psi")], joined.copy()
+        c, s = np.cos(psi), np.sin(psi)
+        for first, names in ((0, self.vehicle.state_names), (n, _GUST_NAMES[:g])):
+            if "x" in names and "y" in names:
+                i, j = first + names.index("x"), first + names.index("y")
+                added[:, i], added[:, j] = c * joined[:, i] - s * joined[:, j], s * joined[:, i] + c * joined[:, j]
+        x, gust, drift, line = np.split(added, [n, n + g, n + g + N_DISTURBANCES], axis=1)
         line = state.line + line if self.lined else ()
         return FilterState(state.x + x, state.gust + gust, state.drift + drift, line)
 
-    def acting(self, state: FilterState, xp: Backend | None = None) -> Any:
+    def acting(self, state: FilterState, xp: Backend) -> Any:
         """The disturbances that act: gusts and drifts together, and perhaps the wind."""
-        xp = xp or jax_backend()
         return state.gust + xp.arrays.concatenate([state.drift, np.zeros(2 * self.windy)])
 
-    def predict(self, state: FilterState, noise: Noise, advance: Advance, now: Any) -> FilterState:
-        """The state one sample later."""
-        line = self.line_turn(noise) @ state.line if self.lined else ()
-        return FilterState(advance(state.x, self.acting(state), now), self.fade(noise) * state.gust, state.drift, line)
 
-    def run(
-        self,
-        start: FilterState,
-        y: Any,
-        advance: Advance,
-        along: Any,
-        noise: Noise,
-        nuisance: Nuisance,
-        gain: FilterGain,
-    ) -> tuple[FilterState, tuple[Any, FilterState]]:
-        """The state predicted after the last sample; innovations (n, n_outputs) and the states after each measurement.
-
-        Args:
-            start: predicted state at the first sample.
-            y: measurements (n, n_outputs).
-            advance: a state row one sample later.
-            along: what `advance` is told, by sample.
-            noise, nuisance, gain: of this record.
-        """
-
-        return filtered(
-            start,
-            y,
-            along,
-            correct=lambda state, measured, _: self.correct(state, measured, gain, nuisance),
-            predict=lambda state, now: self.predict(state, noise, advance, now),
-        )
-
-
-def _shared_or_own(noise: Noise, kind: str, xp: Any = jnp) -> tuple[Any, Any, Any, Any]:
+def _shared_or_own(noise: Noise, kind: str) -> tuple[Any, Any, Any, Any]:
     """A number of level, downward, tilting and yawing disturbances: down and yaw have their own, where there is one."""
     force, down, moment, yaw = (getattr(noise, f"{kind}_{name}") for name in ("force", "vertical", "moment", "yaw"))
-    return force, xp.where(down > 0.0, down, force), moment, xp.where(yaw > 0.0, yaw, moment)
+    return force, np.where(down > 0.0, down, force), moment, np.where(yaw > 0.0, yaw, moment)
 
 
 _LINE = ("roll and pitch", "height")

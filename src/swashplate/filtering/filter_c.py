@@ -1,8 +1,7 @@
 """A filter along a record in C, with its slopes: the same equations, traced by CasADi, differentiated in print.
 
-XLA compiles a helicopter's slopes for a quarter of a minute, a C compiler for seconds (decision 139). Each sample is a
-correction, a straight line of statements, and a Runge-Kutta step of the vehicle. A run keeps the roots that it found;
-slopes go along the same run again, some directions at a time.
+Each sample is a correction, a straight line of statements, and a Runge-Kutta step of the vehicle. A run keeps the roots
+that it found; slopes go along the same run again, some directions at a time.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ _FOUND = ("nu", "corrected", "acting", "rest")
 
 
 def filter_source(model: StochasticModel) -> str:
-    """C of `run_along`, `run_moved`, `run_ahead` and `rates_and_slopes`.
+    """C of `run_along`, `run_moved`, `run_steps`, `run_steps_moved` and `rates_and_slopes`.
 
     Raises:
         ExportError: for equations that CasADi cannot trace or that are not printed as C.
@@ -34,8 +33,8 @@ def filter_source(model: StochasticModel) -> str:
     """
     vehicle = model.vehicle
     n, m = len(vehicle.state_names), len(vehicle.input_names)
-    correction = _correction(model)
-    corrected = statements(correction, precision="double", inputs=["s", "y", "g"])
+    correct = correction(model)
+    corrected = statements(correct, precision="double", inputs=["s", "y", "g"])
     of_sample = Tangents({"s": ("ds", None), "g": ("dg", None)})
     correcting = [*of_sample.body(corrected.body), *of_sample.stores(corrected, dict(enumerate(_FOUND)))]
     rates = traced_rates(model.equations)
@@ -60,9 +59,9 @@ def filter_source(model: StochasticModel) -> str:
         "N": str(n),
         "M": str(m),
         "P": str(len(vehicle.parameter_names) + 2),
-        "G": str(correction.size1_in(2)),
+        "G": str(correct.size1_in(2)),
         "Y": str(model.n_outputs),
-        "S": str(correction.size1_in(0)),
+        "S": str(correct.size1_in(0)),
         "A": str(model.n_gusts),
         "WINDY": str(int(model.windy)),
         "R": str(max(1, len(rates.steps))),
@@ -94,7 +93,7 @@ class _Symbols(CasadiBackend):
         self.stack = self.concatenate = lambda parts: casadi.vertcat(*parts)
 
 
-def _correction(model: StochasticModel) -> Any:
+def correction(model: StochasticModel) -> Any:
     """(predicted, reading, given) to (innovation, corrected, acting, what of the state goes on by itself).
 
     `given` is the gain row by row, `Nuisance`, what is left of gusts after a sample, and how the line turns.
@@ -213,14 +212,22 @@ static void gathered(vec *to, const double *rows, long size, long first, long co
     for (int l = 0; l < V; ++l) to[i][l] = first + l < count ? rows[(first + l) * size + i] : 0;
 }
 
+/* The same of row `i` of `rows` in every direction. */
+static void gathered_row(vec *to, const double *from, long size, long rows, long i, long first, long count) {
+  for (long j = 0; j < size; ++j)
+    for (int l = 0; l < V; ++l) to[j][l] = first + l < count ? from[((first + l) * rows + i) * size + j] : 0;
+}
+
 void run_along(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
                const double *commands, const double *voltage, double *innovations, double *states, double *roots);
 void run_moved(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
                const double *commands, const double *voltage, const double *roots, long first, long count,
                const double *d_start, const double *d_g, const double *d_p, long arriving, long late,
-               const double *d_commands, double *out);
-void run_ahead(long runs, long ahead, double dt, const double *states, const double *g, const double *p,
-               const double *commands, const double *voltage, const long *starts, double *out);
+               const double *d_commands, double *out, long marks, const long *at, double *d_states);
+void run_steps(long rows, double dt, long each, double *x, const double *w, const double *push, const double *p);
+void run_steps_moved(long rows, long count, double dt, double *x, const double *w, const double *push, const double *p,
+                     double *dx, const double *d_w, const double *d_push, const double *d_p);
+void run_rates(long rows, const double *x, const double *w, const double *p, double *k);
 void rates_and_slopes(long rows, const double *x, const double *w, const double *p, double *k, double *by_x,
                       double *by_w);
 int directions(void);
@@ -242,11 +249,12 @@ void run_along(long n, double dt, const double *start, const double *g, const do
 }
 
 /* Slopes of the innovations (count, n, Y) along V directions from `first` on; commands of directions `arriving` and the
-   `late` - 1 after it move (late, n, M). */
+   `late` - 1 after it move (late, n, M). Slopes of the corrected states at the samples `at` (count, marks, S). */
 void run_moved(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
                const double *commands, const double *voltage, const double *roots, long first, long count,
                const double *d_start, const double *d_g, const double *d_p, long arriving, long late,
-               const double *d_commands, double *out) {
+               const double *d_commands, double *out, long marks, const long *at, double *d_states) {
+  long mark = 0;
   double s[S], corrected[S], acting[A], rest[S - N + 1], w[W], cp[CP], nu[Y];
   vec ds[S], dcorrected[S], dacting[A], drest[S - N + 1], dw[W], dcp[CP], dnu[Y], dg[G], dp[P];
   memset(dw, 0, sizeof dw);
@@ -259,6 +267,9 @@ void run_moved(long n, double dt, const double *start, const double *g, const do
     correct_moved(s, readings + i * Y, g, nu, corrected, acting, rest, ds, dg, dnu, dcorrected, dacting, drest);
     for (int l = 0; l < V && first + l < count; ++l)
       for (int o = 0; o < Y; ++o) out[((first + l) * n + i) * Y + o] = dnu[o][l];
+    for (; mark < marks && at[mark] == i; ++mark)
+      for (int l = 0; l < V && first + l < count; ++l)
+        for (int j = 0; j < S; ++j) d_states[((first + l) * marks + mark) * S + j] = dcorrected[j][l];
     memcpy(s, corrected, N * sizeof *s), memcpy(ds, dcorrected, N * sizeof *ds);
     memcpy(s + N, rest, (S - N) * sizeof *s), memcpy(ds + N, drest, (S - N) * sizeof *ds);
     driving(commands + i * M, acting, voltage[i], w);
@@ -271,22 +282,38 @@ void run_moved(long n, double dt, const double *start, const double *g, const do
   }
 }
 
-/* States (runs, ahead, N) 1, 2, ... samples after some of the corrected `states`, with nothing measured any more. */
-void run_ahead(long runs, long ahead, double dt, const double *states, const double *g, const double *p,
-               const double *commands, const double *voltage, const long *starts, double *out) {
-  const double *fade = g + G - A - (S - N - A - 6) * (S - N - A - 6);
-  double x[N], gust[A], acting[A], w[W], cp[CP], root[4][R];
-  of_card(p, cp);
-  for (long run = 0; run < runs; ++run) {
-    const double *from = states + starts[run] * S;
-    memcpy(x, from, sizeof x), memcpy(gust, from + N, sizeof gust);
-    for (long i = starts[run]; i < starts[run] + ahead; ++i) {
-      for (int j = 0; j < A; ++j) acting[j] = gust[j] + (j < 6 ? from[N + A + j] : 0), gust[j] *= fade[j];
-      driving(commands + i * M, acting, voltage[i], w);
-      step(x, w, acting, p, cp, dt, root);
-      memcpy(out, x, sizeof x), out += N;
+/* States (rows, N) one sample later, under commands and air (rows, W) and push (rows, 6); numbers of all, or of
+   `each`. */
+void run_steps(long rows, double dt, long each, double *x, const double *w, const double *push, const double *p) {
+  double cp[CP], root[4][R];
+  for (long i = 0; i < rows; ++i) {
+    if (!i || each) of_card(p + i * each * P, cp);
+    step(x + i * N, w + i * W, push + i * 6, p + i * each * P, cp, dt, root);
+  }
+}
+
+/* The same, with slopes of states (count, rows, N) along directions of commands and air (count, rows, W), of the push
+   (count, rows, 6) and of the numbers (count, P), which are those of all. */
+void run_steps_moved(long rows, long count, double dt, double *x, const double *w, const double *push, const double *p,
+                     double *dx, const double *d_w, const double *d_push, const double *d_p) {
+  double at[N], cp[CP], root[4][R];
+  vec v[N], vw[W], vpush[6], vp[P], vcp[CP];
+  for (long first = 0; first < count; first += V) {
+    gathered(vp, d_p, P, first, count);
+    of_card_moved(p, cp, vp, vcp);
+    for (long i = 0; i < rows; ++i) {
+      memcpy(at, x + i * N, sizeof at);
+      step(at, w + i * W, push + i * 6, p, cp, dt, root);
+      memcpy(at, x + i * N, sizeof at);
+      gathered_row(v, dx, N, rows, i, first, count);
+      gathered_row(vw, d_w, W, rows, i, first, count);
+      gathered_row(vpush, d_push, 6, rows, i, first, count);
+      step_moved(at, w + i * W, push + i * 6, p, cp, dt, root, v, vw, vpush, vp, vcp);
+      for (int l = 0; l < V && first + l < count; ++l)
+        for (int j = 0; j < N; ++j) dx[((first + l) * rows + i) * N + j] = v[j][l];
     }
   }
+  run_steps(rows, dt, 0, x, w, push, p);
 }
 
 static void slopes_at(const double *x, const double *w, const double *p, double *k, double *by_x, double *by_w) {
@@ -305,6 +332,15 @@ static void slopes_at(const double *x, const double *w, const double *p, double 
       for (int l = 0; l < V && first + l < N + W; ++l)
         if (first + l < N) by_x[i * N + first + l] = dk[i][l];
         else by_w[i * W + first + l - N] = dk[i][l];
+  }
+}
+
+/* By row: the rates (N). */
+void run_rates(long rows, const double *x, const double *w, const double *p, double *k) {
+  double cp[CP], c[C], root[R];
+  for (long i = 0; i < rows; ++i) {
+    of_card(p + i * P, cp), of_inputs(w + i * W, p + i * P, cp, c);
+    moving(x + i * N, w + i * W, p + i * P, cp, c, root, 0, k + i * N);
   }
 }
 

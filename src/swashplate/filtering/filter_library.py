@@ -1,19 +1,23 @@
-"""The C of `filter_c`, compiled and loaded, where there is a compiler."""
+"""The C of `filter_c`, compiled and loaded, where there is a compiler; otherwise the same by NumPy and CasADi."""
 
 from __future__ import annotations
 
 import ctypes
 import math
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
-from swashplate.errors import SwashError
+from swashplate.errors import ExportError
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_c import filter_source
+from swashplate.filtering.filter_code import FilterCode, Fixed, Pushed, Series
+from swashplate.filtering.filter_virtual import VirtualFilter
 
 _OPTIONS = ("-O2", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
 _QUIET = (
@@ -31,14 +35,16 @@ _KINDS = {
 }
 _ARGUMENTS = {
     "run_along": "ld" + 9 * "*",
-    "run_moved": "ld" + 7 * "*" + "ll" + 3 * "*" + "ll" + 2 * "*",
-    "run_ahead": "lld" + 5 * "*" + "i*",
+    "run_moved": "ld" + 7 * "*" + "ll" + 3 * "*" + "ll" + 2 * "*" + "li*",
+    "run_steps": "ldl" + 4 * "*",
+    "run_steps_moved": "lld" + 8 * "*",
+    "run_rates": "l" + 4 * "*",
     "rates_and_slopes": "l" + 6 * "*",
 }
 
 
 class FilterLibrary:
-    """The functions of one model's C; their arguments are as its text has them.
+    """The functions of one model's C.
 
     Args:
         model: whose filter.
@@ -48,16 +54,63 @@ class FilterLibrary:
         MissingLibraryError: without CasADi.
     """
 
+    compiled_by = "C"
+
     def __init__(self, model: StochasticModel) -> None:
         self._c = loaded(filter_source(model), options=(*_OPTIONS, *_QUIET))
         for name, kinds in _ARGUMENTS.items():
             function = getattr(self._c, name)
             function.argtypes, function.restype = [_KINDS[kind] for kind in kinds], None
-        self.run_along, self.run_moved, self.run_ahead = self._c.run_along, self._c.run_moved, self._c.run_ahead
-        self.directions, self.roots = int(self._c.directions()), int(self._c.roots())
+        self._directions, self._roots = int(self._c.directions()), int(self._c.roots())
+        self._outputs = model.n_outputs
+
+    def along(self, dt: float, fixed: Fixed, series: Series) -> tuple[Array, Array, Array]:
+        n = len(series.readings)
+        told = np.empty((n, self._outputs)), np.empty((n, fixed.start.size)), np.empty((n, 4, self._roots))
+        self._c.run_along(n, dt, *map(flat, fixed), *map(flat, series), *told)
+        return told
+
+    def moved(
+        self,
+        dt: float,
+        fixed: Fixed,
+        series: Series,
+        went: Array,
+        directions: Fixed,
+        late: tuple[int, Array],
+        marks: NDArray[np.intp],
+    ) -> tuple[Array, Array]:
+        n, count, (arriving, commands) = len(series.readings), len(directions.start), late
+        slopes, states = np.empty((count, n, self._outputs)), np.empty((count, len(marks), fixed.start.size))
+        here = *map(flat, fixed), *map(flat, series), went
+        moving, pushed = tuple(map(flat, directions)), flat(commands)
+        at = np.ascontiguousarray(marks, np.dtype("l"))
+        for first in range(0, count, self._directions):
+            where = first, count, *moving, arriving, len(pushed), pushed, slopes, len(at), at, states
+            self._c.run_moved(n, dt, *here, *where)
+        return slopes, states
+
+    def step(self, dt: float, x: Array, pushed: Pushed, numbers: Array) -> Array:
+        after = np.array(x, dtype=np.float64, order="C")
+        self._c.run_steps(len(after), dt, int(numbers.ndim == 2), after, *map(flat, pushed), flat(numbers))
+        return after
+
+    def step_moved(
+        self, dt: float, x: Array, pushed: Pushed, numbers: Array, directions: tuple[Array, Pushed, Array]
+    ) -> tuple[Array, Array]:
+        after, (dx, d_pushed, d_numbers) = np.array(x, dtype=np.float64, order="C"), directions
+        moved = np.array(dx, dtype=np.float64, order="C")
+        here = after, *map(flat, pushed), flat(numbers), moved, *map(flat, d_pushed), flat(d_numbers)
+        self._c.run_steps_moved(len(after), len(moved), dt, *here)
+        return after, moved
+
+    def rates(self, x: Array, w: Array, p: Array) -> Array:
+        told = np.empty(x.shape)
+        self._c.run_rates(math.prod(x.shape[:-1]), *map(flat, (x, w, p)), told)
+        return told
 
     def rates_and_slopes(self, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
-        """As `dynamics.rates_and_slopes`, with any axes in front; slopes by the voltage are left at zero."""
+        """As `engine.slopes.rates_and_slopes`, with any axes in front; slopes by the voltage are left at zero."""
         front, n, m = x.shape[:-1], x.shape[-1], w.shape[-1]
         results = np.empty((*front, n)), np.empty((*front, n, n)), np.empty((*front, n, m))
         self._c.rates_and_slopes(math.prod(front), *map(flat, (x, w, p)), *results)
@@ -70,11 +123,14 @@ def flat(rows: Any) -> Array:
 
 
 @lru_cache(maxsize=16)
-def filter_library(model: StochasticModel) -> FilterLibrary | None:
-    """A model's filter in C; None where it cannot be had here: then it is XLA's."""
-    if not can_compile():
-        return None
-    try:
-        return FilterLibrary(model)
-    except (SwashError, OSError):  # no C of these equations, a compiler that refuses, a library that does not load
-        return None
+def filter_code(model: StochasticModel) -> FilterCode:
+    """A model's filter: in C, or by NumPy where there is no compiler, or one that does not compile it.
+
+    Raises:
+        ExportError: for equations that CasADi cannot trace.
+        MissingLibraryError: without CasADi.
+    """
+    if can_compile():
+        with suppress(ExportError, OSError):  # a compiler that refuses, a library that does not load
+            return FilterLibrary(model)
+    return VirtualFilter(model)

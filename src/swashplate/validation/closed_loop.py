@@ -10,10 +10,9 @@ axis is used.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
@@ -21,10 +20,9 @@ from swashplate.filtering.arriving_commands import motors
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.time.beginning import FilterNumbers
+from swashplate.identification.time.beginning import FilterNumbers, numbers_and_constants
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.record_filter import RUNS, whole
-from swashplate.jax_on_demand import jax, jit, jnp
+from swashplate.identification.time.record_filter import record_filter
 from swashplate.validation.controller_law import Law, shares_of
 
 _REFERENCE = 0.5
@@ -37,11 +35,11 @@ class _Loops(NamedTuple):
     """What one run needs of the closed axes: shares of the inputs (axes, inputs) and back (axes, inputs), gains on the
     body's states (axes, 12), samples from motion to aircraft (axes,), and from when each input answers (inputs,)."""
 
-    shares: Any
-    back: Any
-    gains: Any
-    late: Any
-    since: Any
+    shares: Array
+    back: Array
+    gains: Array
+    late: NDArray[np.intp]
+    since: NDArray[np.intp]
 
 
 def closed_ahead(
@@ -88,44 +86,35 @@ def closed_ahead(
     answers = np.any(np.array(shares) != 0.0, axis=0)
     since = np.where(answers, known, ahead)
     loops = _Loops(np.array(shares), np.array(back), np.array(gains), np.array(behind), since)
-    parts = []
-    for first in range(0, len(starts), RUNS):
-        here = np.pad(starts[first : first + RUNS], (0, max(0, first + RUNS - len(starts))), mode="edge")
-        rows = here[:, None] + np.arange(ahead)
-        begin = jax.tree.map(lambda part, at=here: np.asarray(part)[at], filtered)
-        past = before[here[:, None] + np.arange(1, reach + 1)]
-        reference = np.stack(references, axis=1)[np.minimum(np.arange(first, first + RUNS), len(starts) - 1)]
-        parts.append(_closed_ahead(model, begin, numbers, loops, past, reference, reaching[rows], voltage[rows]))
-    return whole(parts, len(starts))
+    past = before[starts[:, None] + np.arange(1, reach + 1)]
+    return _closed_ahead(
+        model, filtered, numbers, loops, past, np.stack(references, axis=1), (reaching, voltage), starts, ahead
+    )
 
 
-@jit(static_argnums=0)
 def _closed_ahead(
     model: StochasticModel,
-    begin: FilterState,
+    filtered: FilterState,
     numbers: FilterNumbers,
     loops: _Loops,
-    past: Float[jax.Array, "runs reach states"],
-    reference: Float[jax.Array, "runs axes"],
-    recorded: Float[jax.Array, "runs samples inputs"],
-    voltage: Float[jax.Array, "runs samples"],
-) -> Any:
-    vehicle, noise = model.vehicle, Noise(*numbers.noise)
-    parameters = vehicle.parameters(*numbers.parameters)
-    body = jnp.array([vehicle.index(name) for name in PREDICTED])
-
-    def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
-        return model.step(x, acting, now[0], parameters, now[1])
-
-    def run(state: FilterState, past: Any, wanted: Any, recorded: Any, voltage: Any) -> Any:
-        def sample(carried: tuple[FilterState, Any], now: tuple[Int[jax.Array, ""], Any, Any]) -> Any:
-            (state, past), (k, u, volts) = carried, now
-            answer = wanted + jnp.sum(loops.gains * past[past.shape[0] - 1 - loops.late], axis=1)
-            # The part of the inputs that is the axis's command becomes the answer, all else stays as recorded.
-            u = jnp.where(k >= loops.since, u + (answer - loops.shares @ u) @ loops.back, u)
-            following = model.predict(state, noise, advance, (u, volts))
-            return (following, jnp.concatenate([past[1:], following.x[body][None]])), following.x
-
-        return jax.lax.scan(sample, (state, past), (jnp.arange(len(recorded)), recorded, voltage))[1]
-
-    return jax.vmap(run)(begin, past, reference, recorded, voltage)
+    past: Array,
+    reference: Array,
+    recorded: tuple[Array, Array],
+    starts: NDArray[np.intp],
+    ahead: int,
+) -> Array:
+    """As `closed_ahead`; past: body states (starts, reach, 12), reference: (starts, axes), recorded: what reached the
+    vehicle and the voltage by sample."""
+    body, step = [model.vehicle.index(name) for name in PREDICTED], record_filter(model).step
+    fade, told = model.fade(Noise(*numbers.noise)), numbers_and_constants(model.vehicle, numbers.parameters)
+    x, gust, drift = (np.asarray(part)[starts] for part in filtered[:3])
+    states = np.empty((len(starts), ahead, x.shape[1]))
+    for k in range(ahead):
+        u = recorded[0][starts + k]
+        answer = reference + np.sum(loops.gains * past[:, past.shape[1] - 1 - loops.late], axis=2)
+        # The part of the inputs that is the axis's command becomes the answer, all else stays as recorded.
+        u = np.where(k >= loops.since, u + (answer - u @ loops.shares.T) @ loops.back, u)
+        states[:, k] = x = step(x, gust, drift, u, recorded[1][starts + k], told)
+        gust = fade * gust
+        past = np.concatenate([past[:, 1:], x[:, None, body]], axis=1)
+    return states

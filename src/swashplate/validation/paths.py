@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import FilterState, StochasticModel
+from swashplate.filtering.disturbed_model import FilterState
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
-from swashplate.identification.time.beginning import FilterNumbers
+from swashplate.identification.time.beginning import numbers_and_constants
 from swashplate.identification.time.kinematics import PREDICTED, measured_states, samples_smoothed
-from swashplate.identification.time.record_filter import RUNS, ahead_of
-from swashplate.jax_on_demand import jax, jit
+from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import ArrayBackend
 from swashplate.validation.bands import BandedRecord
-from swashplate.validation.prediction import Predictions, observed, uncertainty
+from swashplate.validation.prediction import Observed, Predictions, observed, uncertainty
+
+_ARRAYS = ArrayBackend()
 
 
 class Fan(NamedTuple):
@@ -115,20 +116,13 @@ def paths(
             seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=length)
             _, _, Q, R, P = uncertainty(vehicle, record, noise=noise, nuisance=nuisance)
             roots = [_root(part) for part in (P, Q, R)]
-            plain = ahead_of(seen.model, seen.filtered, seen.numbers, seen.commands, seen.voltage, starts, ahead)
+            plain = seen.ahead(starts, ahead)
             before = vehicle
-        parts = []
-        for first in range(0, len(starts), RUNS):
-            here = np.pad(starts[first : first + RUNS], (0, max(0, first + RUNS - len(starts))), mode="edge")
-            aside, kicks, shaken = (
-                random.standard_normal((RUNS, *count, len(root))) @ root.T
-                for root, count in zip(roots, ((), (length,), (length,)), strict=True)
-            )
-            rows = here[:, None] + np.arange(length)
-            begin = jax.tree.map(lambda part, at=here: np.asarray(part)[at], seen.filtered)
-            shown = _shown(seen.model, begin, seen.numbers, seen.commands[rows], seen.voltage[rows], aside, kicks)
-            parts.append(np.asarray(shown) + shaken)
-        readings = np.concatenate(parts)[: len(starts)]
+        aside, kicks, shaken = (
+            random.standard_normal((len(starts), *count, len(root))) @ root.T
+            for root, count in zip(roots, ((), (length,), (length,)), strict=True)
+        )
+        readings = _shown(seen, starts, aside, kicks) + shaken
         reached = record.outputs[np.maximum(starts[:, None] + np.arange(1 - half, 1), 0)]  # by the smoothing
         whole = np.concatenate([reached, readings], axis=1)
         flat = whole.reshape(-1, whole.shape[-1])
@@ -143,29 +137,19 @@ def _root(covariance: Array) -> Array:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-@jit(static_argnums=0)
-def _shown(
-    model: StochasticModel,
-    begin: FilterState,
-    numbers: FilterNumbers,
-    commands: Float[jax.Array, "runs samples inputs"],
-    voltage: Float[jax.Array, "runs samples"],
-    aside: Float[jax.Array, "runs joined"],
-    kicks: Float[jax.Array, "runs samples joined"],
-) -> Any:
-    """Readings without the sensors' noise (runs, samples, outputs)."""
-    parameters = model.vehicle.parameters(*numbers.parameters)
-    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
-
-    def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
-        return model.step(x, acting, now[0], parameters, now[1])
-
-    def sample(state: FilterState, now: tuple[Any, Any, Any]) -> tuple[FilterState, Any]:
-        following = model.moved(model.predict(state, noise, advance, now[:2]), now[2])
-        seen = model.measure(following.x, nuisance)
-        return following, seen + model.line_seen @ following.line if model.lined else seen
-
-    def run(state: FilterState, aside: Any, told: tuple[Any, Any, Any]) -> Any:
-        return jax.lax.scan(sample, model.moved(state, aside), told)[1]
-
-    return jax.vmap(run)(begin, aside, (commands, voltage, kicks))
+def _shown(seen: Observed, starts: NDArray[np.intp], aside: Array, kicks: Array) -> Array:
+    """Readings without the sensors' noise (runs, samples, outputs), of states that begin `aside` (runs, joined) and are
+    kicked at every sample (runs, samples, joined)."""
+    model, numbers = seen.model, numbers_and_constants(seen.model.vehicle, seen.numbers.parameters)
+    noise, nuisance = Noise(*seen.numbers.noise), Nuisance(*seen.numbers.nuisance)
+    fade, turn, step = model.fade(noise), model.line_turn(noise), record_filter(model).step
+    state = FilterState(*(np.asarray(part)[starts] if isinstance(part, np.ndarray) else () for part in seen.filtered))
+    state, shown = model.moved(state, aside), []
+    for k in range(kicks.shape[1]):
+        here = starts + k
+        x = step(state.x, state.gust, state.drift, seen.commands[here], seen.voltage[here], numbers)
+        line = state.line @ turn.T if model.lined else ()
+        state = model.moved(FilterState(x, fade * state.gust, state.drift, line), kicks[:, k])
+        measured = model.measure(state.x.T, nuisance, _ARRAYS).T
+        shown.append(measured + state.line @ model.line_seen.T if model.lined else measured)
+    return np.stack(shown, axis=1)

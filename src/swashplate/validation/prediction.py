@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.filtering.arriving_commands import commands_moved
+from swashplate.filtering.arriving_commands import commands_moved, lengthened
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel, stochastic_model
+from swashplate.filtering.filter_code import Series
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import gain_at, steady_gain
 from swashplate.identification.core.records import Record
@@ -26,9 +27,8 @@ from swashplate.identification.time.beginning import (
 )
 from swashplate.identification.time.calibration import as_begun
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.record_filter import ahead_of, along
+from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import lengthened
 from swashplate.validation.closed_loop import closed_ahead
 from swashplate.validation.controller_law import Law, learnt
 
@@ -88,6 +88,11 @@ class Observed(NamedTuple):
     commands: Array
     voltage: Array
 
+    def ahead(self, starts: NDArray[np.intp], ahead: int) -> Array:
+        """States 1, 2, ... samples after some starts, with nothing measured any more (starts, ahead, states)."""
+        told = self.filtered, self.numbers, self.commands, self.voltage
+        return record_filter(self.model).ahead_of(*told, starts, ahead)
+
 
 def predict(
     vehicle: Vehicle,
@@ -124,7 +129,7 @@ def predict(
         closed = answered[..., kept]
     return Predictions(
         starts=starts,
-        states=ahead_of(seen.model, seen.filtered, seen.numbers, seen.commands, seen.voltage, starts, ahead)[..., kept],
+        states=seen.ahead(starts, ahead)[..., kept],
         filtered=seen.filtered.x[:, kept],
         innovations=seen.innovations,
         covariance=np.asarray(seen.covariance),
@@ -140,11 +145,12 @@ def observed(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisan
     model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
     n = record.time.size
     inputs, voltage = (lengthened(rows, n + beyond) for rows in (record.inputs, record.voltage))
-    reaching, _ = commands_moved(vehicle, record.dt, inputs, nuisance, np)
+    reaching, _ = commands_moved(vehicle, record.dt, inputs, nuisance)
     starting = reaching[: starting_samples(record.dt)].mean(axis=0)
     numbers = FilterNumbers(*(np.array(row, dtype=np.float64) for row in (vehicle.values(), noise, nuisance, starting)))
     begin = begun(model, numbers, seen_at_start(vehicle, record))
-    innovations, filtered, _ = along(model, begin, numbers, record.outputs, reaching[:n], record.voltage)
+    series = Series(record.outputs, reaching[:n], record.voltage)
+    innovations, filtered, _ = record_filter(model).along(begin, numbers, series)
     return Observed(model, numbers, filtered, innovations, begin.gain.covariance, reaching, voltage)
 
 

@@ -2,35 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import jax
-import jax.numpy as jnp
 import numpy as np
-import pytest
 
-from swashplate.filtering.arriving_commands import commands
+from swashplate.filtering.arriving_commands import commands_moved, lengthened
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.models.catalogue import vehicle
-from swashplate.simulation.dynamics import enable_double_precision
 
 COAX = vehicle("coax")
 DT = 0.01
 
 
-@pytest.fixture(autouse=True)
-def _double() -> None:
-    enable_double_precision()
-
-
 INPUTS = np.random.default_rng(5).standard_normal((40, 4))
 
 
-_late = jax.jit(lambda inputs, nuisance: commands(COAX, DT, inputs, nuisance))
-
-
 def _commands(nuisance: Nuisance, inputs: np.ndarray = INPUTS) -> np.ndarray:
-    return np.asarray(_late(inputs, nuisance))
+    return commands_moved(COAX, DT, inputs, nuisance)[0]
 
 
 def test_commands_on_time_are_the_logged_ones() -> None:
@@ -54,11 +40,9 @@ def test_a_delay_between_samples_follows_a_smooth_command() -> None:
 def test_the_cost_of_a_delay_has_no_kink() -> None:
     """The slope of a late command by its delay is continuous across a whole sample."""
 
-    def late(delay: Any) -> Any:
-        return commands(COAX, DT, jnp.asarray(INPUTS), Nuisance(delay_servo=delay))[:, 2]
-
-    slope = jax.jit(jax.jacfwd(late))
-    before, after = (np.asarray(slope(2 * DT + side)) for side in (-1e-9, 1e-9))
+    before, after = (
+        commands_moved(COAX, DT, INPUTS, Nuisance(delay_servo=2 * DT + side))[1][:, 2] for side in (-1e-9, 1e-9)
+    )
     np.testing.assert_allclose(before[3:], after[3:], atol=1e-3)
     assert np.abs(before).max() > 100.0
 
@@ -68,3 +52,22 @@ def test_trims_are_added_to_their_own_command() -> None:
     for i, name in enumerate(names):
         trimmed = _commands(Nuisance(**{f"trim_{name}": 0.03}))
         np.testing.assert_allclose(trimmed - INPUTS, np.tile(0.03 * np.eye(4)[i], (40, 1)), atol=1e-15)
+
+
+def test_slopes_by_a_delay_are_those_of_the_commands() -> None:
+    late, step = Nuisance(delay_servo=0.034, delay_motor=0.0617, trim_servo_roll=0.01), 1e-6
+    _, slope = commands_moved(COAX, DT, INPUTS, late)
+    sides = [
+        _commands(late._replace(delay_servo=late.delay_servo + side, delay_motor=late.delay_motor + side))
+        for side in (step, -step)
+    ]
+    np.testing.assert_allclose(slope, (sides[0] - sides[1]) / (2.0 * step), rtol=1e-6, atol=1e-5)
+
+
+def test_series_are_lengthened_by_their_last_sample() -> None:
+    assert lengthened(np.array([[1.0, 2.0], [3.0, 4.0]]), 4).tolist() == [
+        [1.0, 2.0],
+        [3.0, 4.0],
+        [3.0, 4.0],
+        [3.0, 4.0],
+    ]

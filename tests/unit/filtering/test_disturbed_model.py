@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
-from typing import Any
+from functools import lru_cache
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from swashplate.arrays import Array
 from swashplate.filtering.disturbances import DISTURBED, Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel, stochastic_model
+from swashplate.filtering.filter_code import Series
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.riccati import steady_gain
 from swashplate.identification.core.records import POSE
-from swashplate.identification.time.start_states import steady_flight
+from swashplate.identification.time.beginning import (
+    Begun,
+    FilterNumbers,
+    FirstMotion,
+    joined_at,
+    numbers_and_constants,
+)
+from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.catalogue import vehicle
-from swashplate.physics.backend import FloatBackend
+from swashplate.physics.backend import ArrayBackend, FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local
-from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
 
@@ -29,12 +34,7 @@ COAX = vehicle("coax")
 DT = 0.01
 TILTED = Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1, level_phi=0.02, level_theta=-0.03, level_psi=0.4)
 VOLTAGE = 12.0
-once = partial(jax.jit, compiler_options=RUN_RARELY)
-
-
-@pytest.fixture(autouse=True)
-def _double() -> None:
-    enable_double_precision()
+STILL = FirstMotion(np.zeros(6), np.zeros(6), np.zeros(3), np.array([VOLTAGE, VOLTAGE]))
 
 
 @lru_cache(maxsize=1)
@@ -42,29 +42,32 @@ def _model() -> StochasticModel:
     return stochastic_model(COAX, POSE, DT)
 
 
-@lru_cache(maxsize=1)
-def _step() -> Any:
-    """One compiled sample for every test: `(x, push, u, parameters, voltage)`."""
-    model = _model()
-    return once(lambda x, push, u, voltage: model.step(x, push, u, COAX.values(), voltage))
+def _step(x: Array, push: Array, u: Array, model: StochasticModel | None = None) -> Array:
+    """One sample of each row."""
+    rows, push = np.atleast_2d(x), np.atleast_2d(push)
+    size, numbers = len(rows), numbers_and_constants(COAX, np.array(COAX.values(), dtype=np.float64))
+    gust, drift = np.broadcast_to(push, (size, push.shape[1])), np.zeros((size, 6))
+    commands, voltage = np.broadcast_to(u, (size, len(u))), np.full(size, VOLTAGE)
+    return record_filter(model or _model()).step(rows, gust, drift, commands, voltage, numbers).reshape(x.shape)
+
+
+def _measured(x: Array, nuisance: Nuisance) -> Array:
+    return np.asarray(_model().measure(x, nuisance, ArrayBackend()), dtype=np.float64)
 
 
 @lru_cache(maxsize=1)
-def _measure() -> Any:
-    return once(_model().measure)
+def _steady() -> tuple[Array, Array]:
+    hover = trim(COAX, voltage=VOLTAGE)
+    return np.array(hover.state), np.array(hover.inputs)
 
 
-@lru_cache(maxsize=1)
-def _steady() -> tuple[jax.Array, jax.Array]:
-    x, u = once(lambda voltage: steady_flight(COAX, COAX.values(), voltage))(VOLTAGE)
-    return x, u
+def _numbers(noise: Noise, nuisance: Nuisance) -> FilterNumbers:
+    return FilterNumbers(*(np.array(row, dtype=np.float64) for row in (COAX.values(), noise, nuisance, _steady()[1])))
 
 
-@lru_cache(maxsize=1)
-def _linear() -> tuple[np.ndarray, ...]:
-    x, u = _steady()
-    found = once(_model().linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), Noise(), TILTED)
-    return tuple(np.asarray(part) for part in found)
+def _linear(model: StochasticModel, noise: Noise) -> tuple[Array, ...]:
+    rows = FilterNumbers(*(part[None] for part in _numbers(noise, TILTED)))
+    return tuple(part[0] for part in joined_at(model, rows, STILL))
 
 
 def _state(seed: int) -> np.ndarray:
@@ -80,16 +83,16 @@ def test_a_calm_step_is_what_simulate_does() -> None:
     flight = simulate(
         COAX, {**row, "servo_roll": np.full(2, 0.1)}, start=start, environment=Environment(voltage=VOLTAGE)
     )
-    found = _step()(x, np.zeros(6), np.array(list(row.values())), VOLTAGE)
+    found = _step(x, np.zeros(6), np.array(list(row.values())))
     np.testing.assert_allclose(np.asarray(found), flight.array(COAX.state_names)[1], rtol=1e-12, atol=1e-13)
 
 
 def test_a_disturbance_is_an_acceleration() -> None:
     """Over one short sample a push of a on a rate changes it by a dt, and nothing else to first order."""
     x, u = _state(2), np.array(trim(COAX, voltage=VOLTAGE).inputs)
-    calm = np.asarray(_step()(x, np.zeros(6), u, VOLTAGE))
+    calm = np.asarray(_step(x, np.zeros(6), u))
     for i, name in enumerate(DISTURBED):
-        pushed = np.asarray(_step()(x, 0.5 * np.eye(6)[i], u, VOLTAGE))
+        pushed = np.asarray(_step(x, 0.5 * np.eye(6)[i], u))
         change = pushed - calm
         assert change[COAX.index(name)] == pytest.approx(0.5 * DT, rel=0.02)
         others = np.delete(change, COAX.index(name))
@@ -99,7 +102,7 @@ def test_a_disturbance_is_an_acceleration() -> None:
 def test_the_tracked_point_lies_at_its_lever_in_body_axes() -> None:
     x = _state(3)
     at = dict(zip(COAX.state_names, x, strict=True))
-    found = np.asarray(_measure()(x, TILTED))
+    found = np.asarray(_measured(x, TILTED))
     lever = body_to_local(Vector(0.05, 0.18, -0.1), Euler(at["phi"], at["theta"], at["psi"]), FloatBackend())
     expected = [at["x"] + lever.x, at["y"] + lever.y, at["z"] + lever.z]
     attitude = Rotation.from_euler("ZYX", [at["psi"], at["theta"], at["phi"]])
@@ -110,18 +113,18 @@ def test_the_tracked_point_lies_at_its_lever_in_body_axes() -> None:
 
 def test_the_joined_system_is_the_slope_of_one_sample() -> None:
     """A and C against central differences of the nonlinear step; gusts fade, drifts stay, both push alike."""
-    A, C, _, _ = _linear()
+    A, C, _, _ = _linear(_model(), Noise())
     x, u = (np.asarray(part) for part in _steady())
     n, step = x.size, 1e-5
     for i in range(n):
         away = step * np.eye(n)[i]
-        slope = (_step()(x + away, np.zeros(6), u, VOLTAGE) - _step()(x - away, np.zeros(6), u, VOLTAGE)) / (2 * step)
+        slope = (_step(x + away, np.zeros(6), u) - _step(x - away, np.zeros(6), u)) / (2 * step)
         np.testing.assert_allclose(A[:n, i], np.asarray(slope), atol=1e-7)
-        seen = (_measure()(x + away, TILTED) - _measure()(x - away, TILTED)) / (2 * step)
+        seen = (_measured(x + away, TILTED) - _measured(x - away, TILTED)) / (2 * step)
         np.testing.assert_allclose(C[:, i], np.asarray(seen), atol=1e-9)
     for i in range(6):
         away = 0.1 * np.eye(6)[i]
-        slope = (_step()(x, away, u, VOLTAGE) - _step()(x, -away, u, VOLTAGE)) / 0.2
+        slope = (_step(x, away, u) - _step(x, -away, u)) / 0.2
         np.testing.assert_allclose(A[:n, n + i], np.asarray(slope), atol=2e-8)  # p |p| bends the difference
         np.testing.assert_array_equal(A[:n, n + 6 + i], A[:n, n + i])
     np.testing.assert_allclose(np.diag(A[n : n + 6, n : n + 6]), np.exp(-DT / 0.5))
@@ -129,34 +132,31 @@ def test_the_joined_system_is_the_slope_of_one_sample() -> None:
     assert not C[:, n:].any()
 
 
-@pytest.mark.proof
 def test_wind_acts_through_the_equations_with_the_slope_of_the_speeds_flown() -> None:
     """Against central differences of the step with the wind in its surroundings, averaged over many drawn speeds."""
     noise = Noise(wind=0.4, tau_wind=0.5, speed=0.1)
     model = stochastic_model(COAX, POSE, DT, noise=noise)
     x, u = _steady()
-    A, C, Q, _ = once(model.linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), noise, TILTED)
+    A, C, Q, _ = _linear(model, noise)
     n = x.size
     assert A.shape == (n + 8 + 6, n + 8 + 6)
     assert C.shape == (6, n + 8 + 6)
     np.testing.assert_allclose(np.diag(A)[n + 6 : n + 8], np.exp(-DT / 0.5))
     np.testing.assert_allclose(np.diag(Q)[n + 6 : n + 8], 0.4**2 * DT)
-    volts = jnp.asarray(VOLTAGE)
-    air = jax.jit(jax.vmap(lambda x, w: model.step(x, jnp.append(jnp.zeros(6), w), u, COAX.values(), volts)))
     sigma, tiny = np.sqrt(0.1**2 + 0.4**2 * 0.5 / 2.0), 1e-4
     drawn = np.tile(np.asarray(x), (4000, 1))
     drawn[:, [COAX.index("u"), COAX.index("v")]] += sigma * np.random.default_rng(5).standard_normal((4000, 2))
     rows = np.array([COAX.index(name) for name in ("u", "v", "p", "q")])
     for i in range(2):
-        away = np.tile(tiny * np.eye(2)[i], (4000, 1))
-        slope = np.mean((air(drawn, away) - air(drawn, -away)) / (2.0 * tiny), axis=0)[rows]
+        away = np.tile(tiny * np.eye(8)[6 + i], (4000, 1))
+        slope = np.mean((_step(drawn, away, u, model) - _step(drawn, -away, u, model)) / (2.0 * tiny), axis=0)[rows]
         # Four points stand for a bell: |speed| has a kink, and their mean of it is 1.13 times that of the bell.
         np.testing.assert_allclose(A[rows, n + 6 + i], slope, rtol=0.2, atol=0.05 * np.abs(slope).max())
 
 
 def test_the_noise_has_its_units() -> None:
     """Per square root of hertz: over one second a white push of w leaves a velocity of scatter w, a walk of d, d."""
-    _, _, Q, R = _linear()
+    _, _, Q, R = _linear(_model(), Noise())
     n, noise = len(COAX.state_names), Noise()
     p, u = COAX.index("p"), COAX.index("u")
     assert Q[p, p] / DT == pytest.approx(noise.white_tilt**2, rel=0.05)
@@ -168,28 +168,13 @@ def test_the_noise_has_its_units() -> None:
     assert np.linalg.eigvalsh(Q).min() > -1e-18
 
 
-def _filtered(y: np.ndarray, u: np.ndarray, nuisance: Nuisance, heading: float) -> tuple[np.ndarray, FilterState]:
-    model = _model()
-    x0, u0 = _steady()
-
-    def run(y: Any, u: Any, heading: Any) -> Any:
-        gain = model.gain(x0, u0, COAX.values(), jnp.asarray(VOLTAGE), Noise(), nuisance)
-        start = FilterState(x0.at[COAX.index("psi")].set(heading), jnp.zeros(6), jnp.zeros(6))
-
-        def advance(x: Any, acting: Any, u: Any) -> Any:
-            return model.step(x, acting, u, COAX.values(), jnp.asarray(VOLTAGE))
-
-        return model.run(start, y, advance, u, Noise(), nuisance, gain)[1]
-
-    innovations, states = _compiled(run)(y, u, heading)
-    return np.asarray(innovations), states
-
-
-_RUNS: dict[str, Any] = {}
-
-
-def _compiled(run: Any) -> Any:
-    return _RUNS.setdefault("run", jax.jit(run))
+def _filtered(y: Array, u: Array, nuisance: Nuisance, heading: float) -> tuple[Array, FilterState]:
+    model, numbers, (x, _) = _model(), _numbers(Noise(), nuisance), _steady()
+    rows = FilterNumbers(*(part[None] for part in numbers))
+    K, S, _ = steady_gain(*(part[0] for part in joined_at(model, rows, STILL)))
+    begin = Begun(model.gain_of(K, S), x + heading * (np.arange(x.size) == COAX.index("psi")))
+    run = record_filter(model).along(begin, numbers, Series(y, u, np.full(len(y), VOLTAGE)))
+    return run.innovations, run.states
 
 
 def _turned(y: np.ndarray, heading: float) -> np.ndarray:
@@ -219,7 +204,7 @@ def test_without_a_surprise_the_filter_is_the_simulation_and_a_steady_push_becom
     n = 150
     u = np.tile(trim(COAX, voltage=VOLTAGE).inputs, (n, 1))
     x0 = np.asarray(_steady()[0])
-    still = np.tile(np.asarray(_measure()(x0, Nuisance())), (n, 1))
+    still = np.tile(np.asarray(_measured(x0, Nuisance())), (n, 1))
     innovations, states = _filtered(still, u, Nuisance(), 0.0)
     assert np.abs(innovations).max() < 1e-9
     # Something pushes north with 0.3 m/s^2: what the filter believes of it is a gust or a drift of that size.

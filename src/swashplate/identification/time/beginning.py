@@ -1,14 +1,13 @@
 """Where a filter begins, its constant gain, and how both move with its numbers: by NumPy, from slopes of the equations.
 
-The gain takes slopes of the equations, its own slopes take second ones. XLA compiles those for longer than all the rest
-of a filter, and they are wanted at one place only. So what is compiled are the rates and their first slopes; they are
-taken a little to either side, and Riccati's equation gives what follows from them for all directions at once.
+The gain takes slopes of the equations, its own slopes take second ones, which are wanted at one place only. So the
+first slopes are taken a little to either side, and Riccati's equation gives what follows from them for all directions
+at once.
 """
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from swashplate.arrays import IMAGINARY, Array, Complex
 from swashplate.engine.equations import CONSTANTS
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
-from swashplate.filtering.filter_library import filter_library
+from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import PUSHES, Nuisance
 from swashplate.filtering.riccati import steady_gain, steady_gain_moved
 from swashplate.identification.core.records import Record
@@ -28,19 +27,13 @@ from swashplate.identification.time.start_states import (
     mean_velocity,
     measured_start,
     slopes,
-    start_state,
-    steady_flight,
 )
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import rates_and_slopes
-from swashplate.simulation.steady import Slopes, assemble, unrest_at
-
-if TYPE_CHECKING:
-    import jax
+from swashplate.simulation.steady import assemble, unrest_at
 
 _XP = ArrayBackend()
 _BODY = len(RigidBody._fields)
@@ -113,10 +106,10 @@ def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> 
     """The gain and the start of a run."""
     rows = FilterNumbers(*(np.asarray(row)[None] for row in numbers))
     K, S, _ = steady_gain(*(part[0] for part in joined_at(model, rows, seen)))
-    return Begun(model.gain_of(K, S), _starts(model, rows, seen)[0])
+    return Begun(model.gain_of(K, S), starting_rows(model, rows, seen)[0])
 
 
-def first_state(model: StochasticModel, x: Any, nuisance: Array | jax.Array) -> FilterState:
+def first_state(model: StochasticModel, x: Any, nuisance: Array) -> FilterState:
     """State rows (..., states) with nothing known of the air yet, and drifts where the records' numbers have them."""
     front = x.shape[:-1]
     line = np.zeros((*front, model.n_line)) if model.lined else ()
@@ -130,19 +123,19 @@ def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotio
     here = A, C, Q, R = tuple(part[0] for part in matrices)
     P = steady_gain(A, C, Q, R)[2]
     dK, dS = steady_gain_moved(here, P, tuple(map(_slope_aside, matrices)))  # pyrefly: ignore[bad-argument-type]
-    return Begun(model.gain_of(dK, dS), _slope_aside(_starts(model, rows, seen)))
+    return Begun(model.gain_of(dK, dS), _slope_aside(starting_rows(model, rows, seen)))
 
 
 def starting_row(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Array:
     """The state that a run begins with; noise and mean velocity do not count."""
-    return np.asarray(_starts(model, FilterNumbers(*(np.asarray(row)[None] for row in numbers)), seen)[0])
+    return np.asarray(starting_rows(model, FilterNumbers(*(np.asarray(row)[None] for row in numbers)), seen)[0])
 
 
 def starting_row_moved(
     model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers
 ) -> Array:
     """Slopes of `starting_row` along directions, which come first."""
-    return _slope_aside(_starts(model, _aside(numbers, directions), seen))
+    return _slope_aside(starting_rows(model, _aside(numbers, directions), seen))
 
 
 def _aside(numbers: FilterNumbers, directions: FilterNumbers) -> FilterNumbers:
@@ -161,27 +154,6 @@ def _slope_aside(rows: Array) -> Array:
     return np.asarray(np.tensordot(_WEIGHTS, around, 1) / _ASIDE)
 
 
-def traced_begin(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
-    """The gain and the start of a run (traceable)."""
-    parameters = model.vehicle.parameters(*numbers.parameters)
-    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
-    first, mean = seen.voltage
-    around, held = steady_flight(model.vehicle, parameters, mean, seen.velocity)
-    gain = model.gain(around, held, parameters, mean, noise, nuisance)
-    x = start_state(
-        model.vehicle,
-        model.output_names,
-        parameters,
-        nuisance,
-        value=seen.value,
-        rate=seen.rate,
-        inputs=numbers.inputs,
-        voltage=first,
-        running=seen.running,
-    )
-    return Begun(gain, x)
-
-
 def joined_at(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> tuple[Array, Array, Array, Array]:
     """A, C, Q and R of the joined system in steady flight, one of each for every row of numbers."""
     noise, nuisance = Noise(*rows.noise.T), Nuisance(*rows.nuisance.T)
@@ -190,11 +162,11 @@ def joined_at(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) ->
     own = np.flatnonzero(np.any(decisive != decisive[0], axis=1))
     which = np.zeros(len(decisive), dtype=np.intp)
     which[own], own = 1 + np.arange(own.size), np.concatenate([[0], own])
-    x, u = _steady(model.vehicle, rows.parameters[own], mean, seen.velocity, model)
-    places = model.places(x, Noise(*rows.noise[own].T), np)
+    x, u = steady_rows(model, rows.parameters[own], mean, seen.velocity)
+    places = model.places(x, Noise(*rows.noise[own].T))
     taken = [_slopes(model, place, u, rows.parameters[own], mean) for place in places]
     by_x, by_gust = (np.mean(parts, axis=0)[which] for parts in zip(*taken, strict=True))
-    return model.joined(by_x, by_gust, _measured_slopes(model, x[which], nuisance), noise, np)
+    return model.joined(by_x, by_gust, measured_slopes(model, x[which], nuisance), noise)
 
 
 def numbers_and_constants(vehicle: Vehicle, parameters: Array) -> Array:
@@ -204,10 +176,11 @@ def numbers_and_constants(vehicle: Vehicle, parameters: Array) -> Array:
     return np.concatenate([parameters, np.stack(constants, axis=-1)], axis=-1)
 
 
-def _rates_and_slopes(model: StochasticModel) -> Slopes:
-    """The rates of the equations and their slopes: in C, where that can be had."""
-    library = filter_library(model)
-    return partial(rates_and_slopes, model.equations) if library is None else library.rates_and_slopes
+def numbers_moved(vehicle: Vehicle, parameters: Array) -> Array:
+    """Directions of `numbers_and_constants` (count, numbers), from those of the parameters (count, parameters)."""
+    places = [vehicle.parameter_names.index(a) if a in vehicle.parameter_names else None for a in CONSTANTS]
+    around = [np.zeros(len(parameters)) if place is None else parameters[:, place] for place in places]
+    return np.column_stack([parameters, *around])
 
 
 def _driving(inputs: Array, voltage: float) -> Array:
@@ -217,26 +190,22 @@ def _driving(inputs: Array, voltage: float) -> Array:
 
 def _slopes(model: StochasticModel, x: Array, inputs: Array, parameters: Array, voltage: float) -> tuple[Array, Array]:
     """Slopes of the rates by states and disturbances, by row."""
-    vehicle, library = model.vehicle, filter_library(model)
+    vehicle = model.vehicle
     driving = np.column_stack([inputs, np.zeros((len(x), 3)), np.full(len(x), voltage)])
     rows = x, driving, numbers_and_constants(vehicle, parameters)
-    if library is None:
-        each = [rates_and_slopes(model.equations, *row) for row in zip(*rows, strict=True)]
-        _, by_x, by_driving = (np.array(parts) for parts in zip(*each, strict=True))
-    else:
-        _, by_x, by_driving = library.rates_and_slopes(*rows)
+    _, by_x, by_driving = filter_code(model).rates_and_slopes(*rows)
     pushes = np.broadcast_to(np.eye(len(vehicle.state_names))[:, model.disturbed], (*by_x.shape[:2], N_DISTURBANCES))
     wind = len(vehicle.input_names) + np.arange(model.n_gusts - N_DISTURBANCES)
     return by_x, np.concatenate([pushes, by_driving[:, :, wind]], axis=2)
 
 
-def _measured_slopes(model: StochasticModel, x: Array, nuisance: Nuisance) -> Array:
+def measured_slopes(model: StochasticModel, x: Array, nuisance: Nuisance) -> Array:
     """Slopes of the measured channels by the states, by row: by complex steps in the angles, plain in the others."""
     names = model.vehicle.state_names
     measured = np.tile(np.eye(len(names))[[names.index(name) for name in model.output_names]], (len(x), 1, 1))
     for place in (names.index(name) for name in ("phi", "theta", "psi")):
         turned = x + 1j * IMAGINARY * np.eye(len(names))[place]
-        measured[:, :, place] = np.imag(model.measure(turned.T, nuisance, _ComplexArrays())).T / IMAGINARY
+        measured[:, :, place] = np.imag(model.measure(turned.T, nuisance, COMPLEX_ARRAYS)).T / IMAGINARY
     return measured
 
 
@@ -253,13 +222,16 @@ class _ComplexArrays(ArrayBackend):
         return np.arctan2(np.real(y), np.real(x)) + 1j * slope
 
 
-def _steady(
-    vehicle: Vehicle, parameters: Array, voltage: float, velocity: Array, model: StochasticModel
-) -> tuple[Array, Array]:
+COMPLEX_ARRAYS = _ComplexArrays()
+"""NumPy's operations, where imaginary parts are slopes."""
+
+
+def steady_rows(model: StochasticModel, parameters: Array, voltage: float, velocity: Array) -> tuple[Array, Array]:
     """States and inputs of steady flight by row: in closed form, or by Newton's method at the first row.
 
     The other rows lie beside the first: one step from there with its slope is right to first order.
     """
+    vehicle = model.vehicle
     if vehicle.traits.hover is not None:
         states, inputs = vehicle.traits.hover(vehicle.parameters(*parameters.T), voltage, _XP)
         row = [np.broadcast_to(states.get(name, 0.0), len(parameters)) for name in vehicle.state_names]
@@ -270,7 +242,7 @@ def _steady(
     z = np.array([0.0, 0.0, *middle, *list(leaves(vehicle.state))[_BODY:]])
     calm = np.array([0.0, 0.0, 0.0, voltage])
 
-    slopes = _rates_and_slopes(model)
+    slopes = filter_code(model).rates_and_slopes
 
     def unrest(row: Array) -> tuple[Array, Array]:
         return unrest_at(model.equations, z, course, calm, numbers_and_constants(vehicle, row), slopes)
@@ -288,8 +260,8 @@ def _steady(
     return np.array([state for state, _ in rows]), np.array([inputs for _, inputs in rows])
 
 
-def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> Array:
-    """The states that runs begin with, by row; the inner ones of the rows beside the first as in `_steady`."""
+def starting_rows(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> Array:
+    """The states that runs begin with, by row; the inner ones of the rows beside the first as in `steady_rows`."""
     vehicle, first = model.vehicle, seen.voltage[0]
     starts = measured_start(
         vehicle,
@@ -307,7 +279,7 @@ def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> A
     if vehicle.traits.settled is not None:
         return starts
 
-    taken = _rates_and_slopes(model)
+    taken = filter_code(model).rates_and_slopes
 
     def unrest(row: int, inner: Array) -> tuple[Array, Array]:
         state = np.concatenate([starts[row, :_BODY], inner])

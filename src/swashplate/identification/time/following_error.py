@@ -12,45 +12,43 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
+from swashplate.filtering.block_matrices import diagonal
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel
+from swashplate.filtering.filter_code import Pushed
+from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.filtering.riccati import predicted_covariance
+from swashplate.filtering.riccati import steady_gain
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time.beginning import (
     FilterNumbers,
     FirstMotion,
     first_state,
+    joined_at,
+    measured_slopes,
+    numbers_and_constants,
+    starting_rows,
     starting_samples,
-    traced_begin,
 )
 from swashplate.identification.time.innovations import Filtered, RecordRun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
-from swashplate.identification.time.record_filter import STRETCH, stretches, whole
-from swashplate.identification.time.start_states import measured_start, slopes_ahead, steady_flight
-from swashplate.jax_on_demand import jax, jit, jnp
+from swashplate.identification.time.start_states import measured_start, slopes_ahead
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.compilation import FEW_PASSES, RUN_RARELY, lengthened
 from swashplate.simulation.discretisation import held_series
 
-_LANES = 8
-"""Rows whose filters run side by side, where there is more than one."""
-
-_BODY = len(RigidBody._fields)
+_BODY, _ARRAYS = len(RigidBody._fields), ArrayBackend()
 
 _STEP = 1e-4
 """Of a scaled entry, for slopes by differences."""
@@ -92,19 +90,14 @@ class FollowingError(PredictionError):
         """The likelihood of the same row with a constant gain."""
         return self._constant
 
-    @property
-    def compiled_by(self) -> str:
-        """XLA, always."""
-        return "XLA"
-
     @cached_property
     def _spread(self) -> tuple[Array, ...]:
         """How far off the states may be that each record begins with, (states, states)."""
         went = self._constant.runs(self.row.starts())
         return tuple(_off(self.table.vehicle, *each) for each in zip(self.pieces, self._runs, went, strict=True))
 
-    def traced(self) -> TracedCost:
-        """None: what JAX can differentiate as a whole has a constant gain, which is another likelihood.
+    def slope(self, row: Array) -> tuple[float, Array]:
+        """None: samplers draw from a constant gain, which is another likelihood.
 
         Raises:
             IdentificationError: always.
@@ -196,12 +189,18 @@ class FollowingError(PredictionError):
         followed = []
         for run, readings, spread in zip(self._runs, self._readings, self._spread, strict=True):
             placed = [run.placed(*given, row * self.row.scale) for row in rows]
-            lanes = 1 if len(rows) == 1 else _LANES
-            placed += placed[-1:] * (-len(placed) % lanes)
-            blocks = [placed[first : first + lanes] for first in range(0, len(placed), lanes)]
-            followed.append(
-                whole([_along_some(self.model, run, readings, spread, block) for block in blocks], len(rows))
-            )
+            commands = np.stack([reaching for reaching, _ in placed], axis=1)
+            numbers = FilterNumbers(*map(np.stack, zip(*(numbers for _, numbers in placed), strict=True)))
+            beside, told = FollowingRows(self.model, numbers, run.seen, spread), []
+            for y, u, volts in zip(readings, commands, run.voltage, strict=True):
+                nu, S = beside.corrected(y)
+                told.append((nu, S, beside.state))
+                beside.predicted(u, float(volts))
+            innovations, covariances, states = zip(*told, strict=True)
+            parts = [
+                np.stack(part, axis=1) if isinstance(part[0], np.ndarray) else () for part in zip(*states, strict=True)
+            ]
+            followed.append(Followed(np.stack(innovations, axis=1), np.stack(covariances, axis=1), FilterState(*parts)))
         return followed
 
 
@@ -228,7 +227,7 @@ def _off(vehicle: Vehicle, piece: Record, run: RecordRun, went: Filtered) -> Arr
         rate=rate[:n].T,
         inputs=reaching[:n],
         voltage=run.voltage[:n],
-        xp=ArrayBackend(),
+        xp=_ARRAYS,
     )
     error = begun - states[:n]
     if vehicle.traits.settled is None:  # found by Newton's method at the start, not here
@@ -236,147 +235,117 @@ def _off(vehicle: Vehicle, piece: Record, run: RecordRun, went: Filtered) -> Arr
     return np.asarray(error.T @ error / n)
 
 
-def _along_some(
-    model: StochasticModel,
-    run: RecordRun,
-    readings: Array,
-    spread: Array,
-    placed: Sequence[tuple[Array, FilterNumbers]],
-) -> Followed:
-    """One record at as many rows as there are lanes.
+class _Air(NamedTuple):
+    """How the air speed ahead and to the right (rows, 2) is made: of the states (2, states), and of the joined gusts,
+    drifts and line (rows, 2, all of them); `turn` takes north and east there."""
+
+    speeds: Array
+    wind: Array
+    turn: Array
+
+
+class FollowingRows:
+    """One record at some rows of numbers side by side: an extended Kalman filter for each.
 
     Args:
-        model, run: whose.
-        readings: NaN where there are none.
-        spread: how far off the states may be that it begins with, a second moment.
-        placed: commands and numbers of each row.
+        model: of the filter. numbers: by row.
+        seen: of the record's beginning. spread: how far off the states may be that it begins with, a second moment.
     """
-    commands = np.stack([reaching for reaching, _ in placed])
-    numbers = jax.tree.map(lambda *rows: np.stack(rows), *(numbers for _, numbers in placed))
-    state, P = _begun(model, numbers, run.seen, spread)
-    parts, n = [], len(readings)
-    for k, (read, voltage) in enumerate(stretches(readings, run.voltage)):
-        here = commands[:, k * STRETCH : (k + 1) * STRETCH]
-        driven = np.swapaxes(lengthened(np.swapaxes(here, 0, 1), STRETCH), 0, 1)
-        state, P, part = _along(model, state, P, numbers, read, driven, voltage)
-        parts.append(part)
-    return jax.tree.map(lambda *rows: np.concatenate(rows, axis=1)[:, :n], *parts)
 
+    def __init__(self, model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Array) -> None:
+        self._model, self._code = model, filter_code(model)
+        self._n, self._joined = (
+            len(model.vehicle.state_names),
+            len(spread) + model.n_gusts + N_DISTURBANCES + model.n_line,
+        )
+        self._noise, self._nuisance = Noise(*numbers.noise.T), Nuisance(*numbers.nuisance.T)
+        self._numbers = numbers_and_constants(model.vehicle, numbers.parameters)
+        self._fade, self._lasting = model.fade(self._noise), model.lasting(self._noise)
+        self._line_turn, self._sensors = model.line_turn(self._noise), model.sensor_variances(self._noise)
+        matrices = joined_at(model, numbers, seen)
+        self.state = first_state(model, starting_rows(model, numbers, seen), numbers.nuisance)
+        # That of a filter that has settled in steady flight, how far off the first states may be, and the air.
+        self.covariance = np.array([steady_gain(*of_row)[2] for of_row in zip(*matrices, strict=True)])
+        here = slice(self._n, self._n + model.n_gusts)
+        added = np.diagonal(matrices[2], axis1=1, axis2=2)[:, here] / (1.0 - self._fade**2)
+        self.covariance[:, : self._n, : self._n] += spread
+        self.covariance[:, here, here] += diagonal(added)
 
-@jit(static_argnums=0, compiler_options=RUN_RARELY)
-def _begun(
-    model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Float[jax.Array, "states states"]
-) -> tuple[FilterState, Any]:
-    """States to begin with, and their covariances, by lane: those of a filter that has settled in steady flight, how
-    far off the first states may be, and the air."""
+    def corrected(self, y: Array) -> tuple[Array, Array]:
+        """After a reading (NaN: none, which tells nothing): the innovations and their covariances."""
+        model, n, P = self._model, self._n, self.covariance
+        expected = model.measure(self.state.x.T, self._nuisance, _ARRAYS).T
+        expected = expected + self.state.line @ model.line_seen.T if model.lined else expected
+        read = np.isfinite(y)
+        nu = np.where(read, y - expected, 0.0)
+        C = np.zeros((len(nu), len(y), self._joined))
+        C[:, :, :n] = measured_slopes(model, self.state.x, self._nuisance)
+        C[:, :, self._joined - model.n_line :] = model.line_seen
+        C *= read[:, None]
+        seen = C @ P
+        S = seen @ np.swapaxes(C, 1, 2) + diagonal(self._sensors)
+        K = np.swapaxes(np.linalg.solve(S, seen), 1, 2)
+        move = (K @ nu[:, :, None])[:, :, 0]
+        ends = np.cumsum([n, model.n_gusts, N_DISTURBANCES])
+        x, gust, drift, line = np.split(move, ends, axis=1)
+        state = self.state
+        line = state.line + line if model.lined else ()
+        self.state = FilterState(state.x + x, state.gust + gust, state.drift + drift, line)
+        self.covariance = P - K @ seen
+        return nu, S
 
-    def one(numbers: FilterNumbers) -> tuple[FilterState, Any]:
-        parameters = model.vehicle.parameters(*numbers.parameters)
-        around, held = steady_flight(model.vehicle, parameters, seen.voltage[1], seen.velocity)
-        noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
-        linear = model.linear(around, held, parameters, seen.voltage[1], noise, nuisance)
-        settled = predicted_covariance(*linear)
-        begin = first_state(model, traced_begin(model, numbers, seen).x, numbers.nuisance)
-        kept, rest = model.fade(noise), len(settled) - len(spread) - model.n_gusts
-        added = jnp.diag(linear[2])[len(spread) : len(spread) + model.n_gusts] / (1.0 - kept**2)
-        unseen = jax.scipy.linalg.block_diag(spread, jnp.diag(added), jnp.zeros((rest, rest)))
-        return begin, settled + unseen
+    def predicted(self, u: Array, volts: float) -> None:
+        """One sample later, averaged over what is not known of the air speed (u: by row)."""
+        model, n, g, d, P = self._model, self._n, self._model.n_gusts, N_DISTURBANCES, self.covariance
+        air, m = self._air(), u.shape[1]
+        whole = np.concatenate([np.broadcast_to(air.speeds, (len(u), 2, n)), air.wind], axis=2)
+        spread = np.sqrt(np.maximum(np.einsum("ris,rst,rit->ri", whole, P, whole, optimize=True), _STILL))
+        acting = self.state.gust + np.pad(self.state.drift, ((0, 0), (0, g - d)))
+        driving = np.zeros((len(u), m + 4))
+        driving[:, :m], driving[:, m : m + g - d], driving[:, m + 3] = u, acting[:, d:], volts
+        away = np.repeat(driving[:, None], 2 * len(_AWAY), axis=1).reshape(len(u), len(_AWAY), 2, m + 4)
+        away[..., m : m + 2] -= _AWAY[:, None, None] * (spread[:, :, None] * air.turn)[:, None]
+        front = away.shape[:3]
+        there = self._code.rates(
+            np.broadcast_to(self.state.x[:, None, None], (*front, n)),
+            away,
+            np.broadcast_to(self._numbers[:, None, None], (*front, self._numbers.shape[1])),
+        )
+        here, by_x, by_driving = self._code.rates_and_slopes(self.state.x, driving, self._numbers)
+        # What the spread of the air speed does on average, and averaged slopes (Stein 1981, lemma 1).
+        apart = np.einsum("k,rkin->rn", _SHARES, there - here[:, None, None])
+        by_air = np.einsum("k,rkin->rni", _SHARES * _AWAY, there) / spread[:, None]
+        by_gust = np.concatenate(
+            [np.broadcast_to(self._pushed, (len(u), n, d)), by_driving[:, :, m : m + g - d]], axis=2
+        )
+        more = by_air + by_gust[:, :, d : d + 2] @ np.swapaxes(air.turn, 1, 2)
+        by_x, by_gust = by_x + more @ air.speeds, by_gust + more @ air.wind[:, :, :g]
+        by_x, held = held_series(by_x, model.dt, np.eye(n))
+        by_gust = model.dt * held @ by_gust
+        after = self._code.step(model.dt, self.state.x, Pushed(driving, acting[:, :d]), self._numbers)
+        # Disturbances and the line go on by themselves: F is full in the states' rows alone.
+        rows = np.concatenate([by_x, by_gust, by_gust[:, :, :d], np.zeros((len(u), n, model.n_line))], axis=2)
+        led, kept = rows @ P, self._lasting
+        moved = np.empty_like(P)
+        moved[:, :n, :n] = led @ np.swapaxes(rows, 1, 2)
+        moved[:, :n, n:] = led[:, :, n:] @ np.swapaxes(kept, 1, 2)
+        moved[:, n:, :n] = np.swapaxes(moved[:, :n, n:], 1, 2)
+        moved[:, n:, n:] = kept @ P[:, n:, n:] @ np.swapaxes(kept, 1, 2)
+        moved += model.process_noise(by_gust[:, :, :d], self._noise)
+        state = self.state
+        line = (self._line_turn @ state.line[:, :, None])[:, :, 0] if model.lined else ()
+        self.state = FilterState(after + model.dt * apart, self._fade * state.gust, state.drift, line)
+        self.covariance = 0.5 * (moved + np.swapaxes(moved, 1, 2))
 
-    return jax.vmap(one)(numbers)
+    @cached_property
+    def _pushed(self) -> Array:
+        return np.eye(self._n)[:, self._model.disturbed]
 
-
-@jit(static_argnums=0, compiler_options=FEW_PASSES)
-def _along(
-    model: StochasticModel,
-    state: FilterState,
-    covariance: Float[jax.Array, "lanes joined joined"],
-    numbers: FilterNumbers,
-    readings: Float[jax.Array, "samples outputs"],
-    commands: Float[jax.Array, "lanes samples inputs"],
-    voltage: Float[jax.Array, " samples"],
-) -> tuple[FilterState, Any, Followed]:
-    def one(state: FilterState, P: Any, numbers: FilterNumbers, commands: Any) -> Any:
-        def sample(carry: tuple[FilterState, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Followed]:
-            y, u, volts = now
-            state, P, nu, S = _corrected(model, *carry, y, numbers)
-            return _predicted(model, state, P, u, volts, numbers), Followed(nu, S, state)
-
-        return jax.lax.scan(sample, (state, P), (readings, commands, voltage))
-
-    (state, P), part = jax.vmap(one)(state, covariance, numbers, commands)
-    return state, P, part
-
-
-def _corrected(
-    model: StochasticModel,
-    state: FilterState,
-    P: Float[jax.Array, "joined joined"],
-    y: Float[jax.Array, " outputs"],
-    numbers: FilterNumbers,
-) -> tuple[FilterState, Any, Any, Any]:
-    """State and covariance after a reading (NaN: none, which tells nothing), the innovation and its covariance."""
-    n, d, k = np.cumsum([state.x.shape[0], model.n_gusts, N_DISTURBANCES])
-    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
-    expected = model.measure(state.x, nuisance)
-    read = jnp.isfinite(y)
-    nu = jnp.where(read, y - (expected + model.line_seen @ state.line if model.lined else expected), 0.0)
-    by_state = jax.jacfwd(lambda x: model.measure(x, nuisance))(state.x)
-    C = jnp.concatenate([by_state, np.zeros((len(y), k - n)), model.line_seen], axis=1) * read[:, None]
-    R = jnp.diag(model.sensor_variances(noise))
-    seen = C @ P
-    S = seen @ C.T + R
-    left, rows = jnp.column_stack([S, seen, nu]), []
-    for i in range(len(y)):  # eliminated row after row: L^-1 C P and L^-1 nu, L the Cholesky factor of S
-        row = left[0] / jnp.sqrt(left[0, 0])
-        rows.append(row[len(y) - i :])
-        left = left[1:, 1:] - row[1 : len(y) - i, None] * row[1:]
-    told = jnp.stack(rows)
-    move = told[:, :-1].T @ told[:, -1]
-    line = state.line + move[k:] if model.lined else ()
-    corrected = FilterState(state.x + move[:n], state.gust + move[n:d], state.drift + move[d:k], line)
-    return corrected, P - told[:, :-1].T @ told[:, :-1], nu, S
-
-
-def _predicted(
-    model: StochasticModel,
-    state: FilterState,
-    P: Float[jax.Array, "joined joined"],
-    u: Float[jax.Array, " inputs"],
-    volts: Float[jax.Array, ""],
-    numbers: FilterNumbers,
-) -> tuple[FilterState, Any]:
-    """State and covariance one sample later, averaged over what is not known of the air speed."""
-    n, d = state.x.shape[0], N_DISTURBANCES
-    parameters, noise = model.vehicle.parameters(*numbers.parameters), Noise(*numbers.noise)
-    names = model.vehicle.state_names
-    psi = state.x[names.index("psi")]
-    c, s = jnp.cos(psi), jnp.sin(psi)
-    turn = jnp.stack([jnp.stack([c, s]), jnp.stack([-s, c])])
-    speeds = np.eye(n)[[names.index("u"), names.index("v")]]
-    wind = jnp.zeros((2, P.shape[0] - n)).at[:, d : d + 2].set(-turn)
-    air = jnp.concatenate([jnp.asarray(speeds), wind], axis=1)  # of the state and the disturbances
-    spread = jnp.sqrt(jnp.maximum(jnp.diag(air @ P @ air.T), _STILL))
-    acting = model.acting(state)
-
-    def rates(gust: Any) -> Any:
-        return model.rates(state.x, gust, u=u, parameters=parameters, voltage=volts)
-
-    away = (_AWAY[:, None, None] * spread[:, None] * wind[:, : model.n_gusts]).reshape(-1, model.n_gusts)
-    here, there = rates(acting), jax.vmap(rates)(acting + away).reshape(len(_AWAY), 2, n)
-    apart = jnp.tensordot(_SHARES, there - here, 1).sum(axis=0)  # what the spread of the air speed does on average
-    by_x, by_gust = model.slopes(state.x, acting, u=u, parameters=parameters, voltage=volts)
-    by_air = jnp.tensordot(_SHARES * _AWAY, there, 1).T / spread  # averaged slopes (Stein 1981, lemma 1), (n, 2)
-    more = by_air + by_gust[:, d : d + 2] @ turn.T
-    by_x, by_gust = by_x + more @ speeds, by_gust + more @ wind[:, : model.n_gusts]
-    by_x, held = held_series(by_x, model.dt, jnp.eye(n))
-    by_gust = model.dt * held @ by_gust
-    after = model.step(state.x, acting, u, parameters, volts) + model.dt * apart
-    # Disturbances and the line go on by themselves: F is full in the states' rows alone.
-    rows = jnp.concatenate([by_x, by_gust, by_gust[:, :d], np.zeros((n, model.n_line))], axis=1)
-    kept = model.lasting(noise)
-    led = rows @ P
-    across = led[:, n:] @ kept.T
-    moved = jnp.block([[led @ rows.T, across], [across.T, kept @ P[n:, n:] @ kept.T]])
-    moved = moved + model.process_noise(by_gust[:, :d], noise)
-    line = model.line_turn(noise) @ state.line if model.lined else ()
-    return FilterState(after, model.fade(noise) * state.gust, state.drift, line), 0.5 * (moved + moved.T)
+    def _air(self) -> _Air:
+        names = self._model.vehicle.state_names
+        psi = self.state.x[:, names.index("psi")]
+        c, s = np.cos(psi), np.sin(psi)
+        turn = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
+        wind = np.zeros((len(psi), 2, self._joined - self._n))
+        wind[:, :, N_DISTURBANCES : N_DISTURBANCES + 2] = -turn
+        return _Air(np.eye(self._n)[[names.index("u"), names.index("v")]], wind, turn)

@@ -1,37 +1,30 @@
-"""The innovations of some records as a function of one row of numbers: side by side by NumPy, and traceable.
-
-A fit runs the compiled pieces of `record_filter`, which know nothing of rows; what a row means is here. The traceable
-form is for what JAX differentiates as a whole: posteriors, and predictions some time ahead.
-"""
+"""The innovations of one record as a function of one row of numbers: what a row means for the filter along it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from swashplate.arrays import Array
-from swashplate.filtering.arriving_commands import commands, commands_by, commands_moved
+from swashplate.arrays import IMAGINARY, Array
+from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel
+from swashplate.filtering.filter_code import Series
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
-from swashplate.identification.core.robust import losses
 from swashplate.identification.time.beginning import (
+    COMPLEX_ARRAYS,
     Begun,
     FilterNumbers,
     FirstMotion,
     begun,
     begun_moved,
-    first_state,
     starting_samples,
-    traced_begin,
 )
-from swashplate.identification.time.compiled_filter import FilterRun
-from swashplate.identification.time.record_filter import along, moved
-from swashplate.jax_on_demand import jax, jnp
+from swashplate.identification.time.record_filter import FilterRun, Moves, RecordFilter, record_filter
 
 
 @dataclass(frozen=True)
@@ -54,15 +47,22 @@ class FilterPlan:
 
 
 class Filtered(NamedTuple):
-    """A record's run: commands as they arrive, numbers, beginning, innovations (n, n_outputs) and filtered states; of a
-    run in C the roots that its steps found."""
+    """A record's run: commands as they arrive, the numbers that it depends on, its beginning, and the filter's run."""
 
     commands: Array
     numbers: FilterNumbers
     begin: Begun
-    innovations: Array
-    states: FilterState
-    roots: Array | None = None
+    run: FilterRun
+
+    @property
+    def innovations(self) -> Array:
+        """Innovations (n, n_outputs)."""
+        return self.run.innovations
+
+    @property
+    def states(self) -> FilterState:
+        """States after each reading."""
+        return self.run.states
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class RecordRun:
         nuisance, noise = np.zeros(len(Nuisance._fields)), noise.copy()
         nuisance[_places(Nuisance, self.plan.nuisances)] = numbers[k + self.log * m : k + (self.log + 1) * m]
         noise[_places(Noise, self.plan.noises)] = np.exp(numbers[k + n * m :])
-        reaching, _ = commands_moved(model.vehicle, model.dt, self.inputs, Nuisance(*nuisance), np)
+        reaching, _ = commands_moved(model.vehicle, model.dt, self.inputs, Nuisance(*nuisance))
         parameters = np.array(self.plan.layout.values(card, numbers[:k]))
         starting = reaching[: starting_samples(model.dt)].mean(axis=0)
         return reaching, FilterNumbers(parameters, noise, nuisance, starting)
@@ -104,12 +104,60 @@ class RecordRun:
         """The run at a row, of arguments as `placed` has them."""
         reaching, at = self.placed(card, noise, numbers)
         begin = begun(self.plan.model, at, self.seen)
-        return Filtered(reaching, at, begin, *along(self.plan.model, begin, at, self.readings, reaching, self.voltage))
+        run = self._filter.along(begin, at, self._series(reaching))
+        return Filtered(reaching, at, begin, run)
 
     def moved(self, run: Filtered, card: Array, numbers: Array, scale: Array) -> tuple[Array, Array]:
         """Slopes by every scaled entry of the row: innovations (p, n, outputs), covariance (p, outputs, outputs)."""
+        moves = self._moves(run, card, numbers, scale, len(numbers))
+        slopes, _ = self._filter.moved(run.begin, run.numbers, self._series(run.commands), run.run, moves)
+        return slopes, np.asarray(moves.begin.gain.covariance)
+
+    def ahead(self, run: Filtered, starts: Sequence[int], steps: Sequence[int]) -> Array:
+        """Measured less predicted after `steps` samples from each start (starts, steps, outputs)."""
+        at, of = np.asarray(starts, dtype=np.intp), np.asarray(steps, dtype=np.intp)
+        told = run.states, run.numbers, run.commands, self.voltage
+        states = self._filter.ahead_of(*told, at, int(of[-1]))[:, of - 1]
+        return self.readings[at[:, None] + of] - np.real(self._measured(states, Nuisance(*run.numbers.nuisance)))
+
+    def ahead_moved(
+        self,
+        run: Filtered,
+        starts: Sequence[int],
+        steps: Sequence[int],
+        given: tuple[Array, Array, Array],
+        count: int,
+    ) -> tuple[Array, Array]:
+        """The same, and its slopes by the first `count` entries of the scaled row (entries, starts, ...).
+
+        Args:
+            run, starts, steps: as of `ahead`. given: the card's parameters, numbers and scale of the row.
+        """
+        at, of = np.asarray(starts, dtype=np.intp), np.asarray(steps, dtype=np.intp)
+        moves, series = self._moves(run, *given, count), self._series(run.commands)
+        _, by_start = self._filter.moved(run.begin, run.numbers, series, run.run, moves, starts)
+        states, moved = self._filter.ahead_moved(run.states, by_start, run.numbers, series, moves, at, steps)
+        nuisance, to = run.numbers.nuisance, moves.numbers.nuisance
+        errors = self.readings[at[:, None] + of] - np.real(self._measured(states, Nuisance(*nuisance)))
+        aside = Nuisance(*(nuisance + 1j * IMAGINARY * to).T[..., None, None])
+        return errors, -np.imag(self._measured(states + 1j * IMAGINARY * moved, aside)) / IMAGINARY
+
+    def _measured(self, states: Any, nuisance: Nuisance) -> Any:
+        """The measured channels of states (..., states), in the last axis too; imaginary parts are slopes."""
+        seen = self.plan.model.measure(np.moveaxis(states, -1, 0), nuisance, COMPLEX_ARRAYS)
+        return np.moveaxis(seen, 0, -1)
+
+    def _series(self, commands: Array) -> Series:
+        return Series(self.readings, commands, self.voltage)
+
+    @property
+    def _filter(self) -> RecordFilter:
+        return record_filter(self.plan.model)
+
+    def _moves(self, run: Filtered, card: Array, numbers: Array, scale: Array, count: int) -> Moves:
+        """How the run's numbers move along the first `count` entries of the scaled row."""
         model, k, m, p = self.plan.model, len(self.plan.layout.free), len(self.plan.nuisances), len(numbers)
-        late = commands_moved(model.vehicle, model.dt, self.inputs, Nuisance(*run.numbers.nuisance), np)[1]
+        late = commands_moved(model.vehicle, model.dt, self.inputs, Nuisance(*run.numbers.nuisance))[1]
         by_command = commands_by(model.vehicle, late, self.plan.nuisances)
         own, noises = k + self.log * m, _places(Noise, self.plan.noises)
         directions = FilterNumbers(
@@ -122,86 +170,11 @@ class RecordRun:
         directions.nuisance[np.arange(own, own + m), _places(Nuisance, self.plan.nuisances)] = 1.0
         directions.noise[np.arange(p - noises.size, p), noises] = run.numbers.noise[noises]
         directions.inputs[own : own + m] = by_command[:, : starting_samples(model.dt)].mean(axis=1)
-        directions = FilterNumbers(*(scale[:, None] * part for part in directions))
+        directions = FilterNumbers(*(scale[:count, None] * part[:count] for part in directions))
         begin = begun_moved(model, run.numbers, self.seen, directions)
-        arriving, series = by_command * scale[own : own + m, None, None], (self.readings, run.commands, self.voltage)
-        went = FilterRun(run.innovations, run.states, run.roots)
-        slopes = moved(model, run.begin, begin, run.numbers, directions, series, went, (own, arriving), free=k)
-        return slopes, np.asarray(begin.gain.covariance)
+        late = by_command * scale[own : own + m, None, None]
+        return Moves(begin, directions, own, late[: max(0, count - own)])
 
 
 def _places(of: Any, names: Sequence[str]) -> Any:
     return np.array([of._fields.index(name) for name in names], dtype=np.intp)
-
-
-# ---- traceable -----------------------------------------------------------------------------------------------------
-def unpack(plan: FilterPlan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]:
-    """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
-    numbers = row * data["scale"]
-    k, n, m = len(plan.layout.free), plan.logs, len(plan.nuisances)
-    block = numbers[k : k + n * m].reshape(n, m)[data["log"]]
-    nuisance = Nuisance(**{name: jnp.zeros(len(block)) for name in Nuisance._fields})._replace(
-        **{name: block[:, i] for i, name in enumerate(plan.nuisances)}
-    )
-    noise = jnp.asarray(data["noise"])
-    if plan.noises:
-        estimated = jnp.array([Noise._fields.index(name) for name in plan.noises])
-        noise = noise.at[estimated].set(jnp.exp(numbers[k + n * m :]))
-    return plan.layout.values(data["card"], numbers[:k]), nuisance, Noise(*noise)
-
-
-def traced_run(
-    model: StochasticModel,
-    y: Any,
-    u: Any,
-    voltage: Any,
-    seen: FirstMotion,
-    *,
-    parameters: Any,
-    noise: Noise,
-    nuisance: Nuisance,
-) -> tuple[Any, Any, FilterState]:
-    """Innovations, their covariance and the filtered states of one record (traceable).
-
-    Args:
-        model: the stochastic model.
-        y, u, voltage: measurements, logged inputs and battery voltage by sample.
-        seen: of the record's beginning.
-        parameters, noise, nuisance: numbers of the equations, of the noise and of this record.
-    """
-    reaching = commands(model.vehicle, model.dt, u, nuisance)
-    starting = jnp.mean(reaching[: starting_samples(model.dt)], axis=0)
-    gain, x = traced_begin(model, FilterNumbers(parameters, noise, nuisance, starting), seen)
-
-    def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
-        commanded, volts = now
-        return model.step(x, acting, commanded, parameters, volts)
-
-    first = first_state(model, x, jnp.stack([jnp.asarray(value, dtype=float) for value in nuisance]))
-    _, (innovations, states) = model.run(first, y, advance, (reaching, voltage), noise, nuisance, gain)
-    return innovations, gain.covariance, states
-
-
-def traced_innovations(plan: FilterPlan, data: Any, row: Any) -> tuple[Any, Any, FilterState]:
-    """Of all records side by side: innovations (records, n, outputs), their covariances and the filtered states."""
-    parameters, nuisances, noise = unpack(plan, data, row)
-
-    def one(y: Any, u: Any, voltage: Any, seen: FirstMotion, nuisance: Nuisance) -> Any:
-        return traced_run(plan.model, y, u, voltage, seen, parameters=parameters, noise=noise, nuisance=nuisance)
-
-    rows = (data["outputs"], data["inputs"], data["voltage"], FirstMotion(*data["seen"]))
-    return jax.vmap(one)(*rows, nuisances)
-
-
-def traced_cost(plan: FilterPlan, data: Mapping[str, Any], row: jax.Array) -> Any:
-    """Negative log-likelihood of the counted innovations (traceable), as `PredictionError.cost` has it.
-
-    Args:
-        plan, row: as `traced_innovations` takes them.
-        data: its data, and "counted" (records, n).
-    """
-    innovations, covariances, _ = traced_innovations(plan, data, row)
-    roots = jnp.linalg.cholesky(covariances)
-    white = jax.vmap(lambda L, nu: jax.scipy.linalg.solve_triangular(L, nu.T, lower=True).T)(roots, innovations)
-    logarithms = jnp.log(jnp.diagonal(roots, axis1=1, axis2=2)).sum(axis=-1)
-    return jnp.where(data["counted"], losses(white, jnp).sum(axis=-1) + logarithms[:, None], 0.0).sum()

@@ -8,7 +8,6 @@ residuals (Jategaonkar 2015, ch. 4; Bock 1983 for the shooting).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -18,21 +17,16 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import robust
-from swashplate.identification.core.called_cost import called_cost
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record, logs
-from swashplate.identification.core.scoring import TracedCost
-from swashplate.identification.time import traced_shooting
 from swashplate.identification.time.beginning import FirstMotion
-from swashplate.identification.time.compiled_filter import compiled_filter
-from swashplate.identification.time.compiled_shooting import CompiledShooting, FlownWindow, Window
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.prediction_error import parameter_entries, stack_records
+from swashplate.identification.time.prediction_error import parameter_entries
+from swashplate.identification.time.record_filter import record_filter
+from swashplate.identification.time.shooting import FlownWindow, Shooting, ShootingPlan, Window
 from swashplate.identification.time.start_states import slopes
-from swashplate.identification.time.traced_shooting import ShootingPlan
-from swashplate.jax_on_demand import jnp
 
 WINDOW = 4.0
 """Seconds of one shot: some periods of the fast modes, and short against the growth of unstable ones and of yaw."""
@@ -123,52 +117,21 @@ class OutputError:
             for name, (scale, sigma) in self._own.items():
                 entries.append(Entry(f"{name} at window {place}", "initial", 0.0, scale, sigma=sigma))
         self.row = Row(tuple(entries), table.prior_correlations)
-        self._plan = ShootingPlan(
-            self.model, table.layout, len(self.logs), self.nuisances, drifting, self.length, self._shared
-        )
-        self._data = self._windows()
-        self._outputs = np.asarray(self._data["outputs"])
-        self._shooting = self._compiled()
+        self._plan = ShootingPlan(self.model, table.layout, self.nuisances, drifting, self.length, self._shared)
+        self._outputs = np.stack([pieces[r].outputs[first : first + self.length] for r, first in self._places])
+        self._shooting = self._windows()
         self._L = np.eye(len(pieces[0].output_names))
 
-    def _windows(self) -> dict[str, Any]:
-        outputs, values, rates = [], [], []
-        for number, first in self._places:
-            piece = self.pieces[number]
-            value, rate = slopes(piece, np.array([first]))
-            outputs.append(piece.outputs[first : first + self.length])
-            values.append(value[0])
-            rates.append(rate[0])
-        stacked = stack_records(self.pieces)
-        return {
-            "outputs": jnp.asarray(np.stack(outputs)),
-            "value": jnp.asarray(np.stack(values)),
-            "rate": jnp.asarray(np.stack(rates)),
-            "running": jnp.asarray([self.pieces[number].time[first] for number, first in self._places]),
-            "first": jnp.asarray([first for _, first in self._places]),
-            "record": jnp.asarray([number for number, _ in self._places]),
-            "inputs": jnp.asarray(stacked["inputs"]),
-            "voltage": jnp.asarray(stacked["voltage"]),
-            "card": jnp.asarray(self.table.card_row),
-            "log": jnp.asarray(self._log),
-            "scale": jnp.asarray(self.row.scale[: self._shared]),
-            "initial_scale": jnp.asarray([scale for scale, _ in self._own.values()]),
-        }
-
-    def _compiled(self) -> CompiledShooting | None:
-        """The windows in C; None where that cannot be had here."""
-        if (in_c := compiled_filter(self.model)) is None:
-            return None
+    def _windows(self) -> Shooting:
         windows = []
-        for place, (number, first) in enumerate(self._places):
+        for number, first in self._places:
             piece, here = self.pieces[number], slice(first, first + self.length)
-            value, rate = (np.asarray(self._data[name][place]) for name in ("value", "rate"))
+            value, rate = (part[0] for part in slopes(piece, np.array([first])))
             voltage = piece.voltage[here]
             seen = FirstMotion(value, rate, np.zeros(3), np.array([voltage[0]]), float(piece.time[first]))
             windows.append(Window(int(self._log[number]), first, piece.inputs, voltage, seen))
-        return CompiledShooting(
+        return Shooting(
             self._plan,
-            in_c,
             tuple(windows),
             card=np.asarray(self.table.card_row),
             scale=self.row.scale[: self._shared],
@@ -177,18 +140,12 @@ class OutputError:
 
     @property
     def compiled_by(self) -> str:
-        """What makes the code that simulates the windows: a C compiler or XLA."""
-        return "XLA" if self._shooting is None else "C"
+        """What simulates the windows: "C" or "NumPy"."""
+        return record_filter(self.model).compiled_by
 
-    def unpack(self, shared: Array) -> tuple[Any, Nuisance]:
-        """Equations' parameters and nuisances (one array entry per record) of the shared part of a scaled row."""
-        return traced_shooting.unpack_shared(self._plan, self._data, jnp.asarray(shared))
-
-    def residuals(self, row: Array) -> tuple[Any, Any]:
+    def residuals(self, row: Array) -> tuple[Array, Array]:
         """Residuals (windows, n, outputs) and states (windows, n, states)."""
-        if self._shooting is not None:
-            return self._beside(self._shooting.flown(np.asarray(row)))
-        return traced_shooting.residuals(self._plan, self._data, jnp.asarray(row))
+        return self._beside(self._shooting.flown(row))
 
     def _beside(self, flown: list[FlownWindow]) -> tuple[Array, Array]:
         """Residuals and states of simulated windows."""
@@ -196,11 +153,8 @@ class OutputError:
 
     def _with_slopes(self, row: Array) -> tuple[Array, Array]:
         """Residuals, and their slopes by the shared entries and by each window's own (windows, entries, n, outputs)."""
-        if self._shooting is None:
-            values, tangents = traced_shooting.residuals_moved(self._plan, self._data, jnp.asarray(row))
-            return np.asarray(values), np.asarray(tangents)
-        flown = self._shooting.flown(np.asarray(row))
-        return self._beside(flown)[0], -self._shooting.moved(np.asarray(row), flown)
+        flown = self._shooting.flown(row)
+        return self._beside(flown)[0], -self._shooting.moved(row, flown)
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def cost(self, row: Array) -> float:
@@ -214,12 +168,6 @@ class OutputError:
             return np.inf
         white = np.linalg.solve(self._L, flat.T)
         return robust.huber(np.asarray(white, dtype=np.float64)) + flat.shape[0] * float(np.log(np.diag(self._L)).sum())
-
-    def traced(self) -> TracedCost:
-        """The cost as a function that JAX differentiates, or calls: with the covariance of the last accepted row."""
-        if self._shooting is not None:
-            return TracedCost(called_cost, self, {})
-        return TracedCost(traced_shooting.shooting_cost, self._plan, self._data | {"root": jnp.asarray(self._L)})
 
     def slope(self, row: Array) -> tuple[float, Array]:
         """Cost and gradient, for samplers, from several threads too."""
@@ -286,7 +234,10 @@ class OutputError:
 
     def nuisances_of(self, row: Array) -> Nuisance:
         """Constants at a row, one array entry per record."""
-        return self.unpack(row[: self._shared])[1]
+        k, n, m = len(self.table.layout.free), len(self.logs), len(self.nuisances)
+        told = (row[: self._shared] * self.row.scale[: self._shared])[k : k + n * m].reshape(n, m)[self._log]
+        still = Nuisance(*np.zeros((len(Nuisance._fields), len(told))))
+        return still._replace(**dict(zip(self.nuisances, told.T, strict=True)))
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside its simulated windows."""

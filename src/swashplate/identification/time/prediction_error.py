@@ -9,7 +9,6 @@ answers to the measured motion does not bias it as it biases output error.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,22 +16,18 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
-from swashplate.filtering.filter_library import filter_library
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import robust
-from swashplate.identification.core.called_cost import called_cost
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record, logs
-from swashplate.identification.core.scoring import TracedCost
-from swashplate.identification.time import innovations_ahead
 from swashplate.identification.time.beginning import FilterNumbers, seen_at_start
-from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun, traced_cost
+from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun
 from swashplate.identification.time.kinematics import PREDICTED, turned_rows
 from swashplate.identification.time.noise_entries import estimated_noises, noise_entries, with_first_guesses
-from swashplate.jax_on_demand import jnp
+from swashplate.identification.time.record_filter import record_filter
 
 SETTLING = 1.5
 """Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""
@@ -56,9 +51,6 @@ _Accumulated = tuple[Array, Array, list[Filtered], list[tuple[Array, Array]]]
 _KEPT = 2
 """Rows whose runs are kept: a search tries up to two, and goes on from one of them."""
 
-_LENGTHS = 256
-"""Records are padded to a multiple of this many samples, so that flights of similar length share compiled code."""
-
 
 def parameter_entries(table: Parameterization) -> list[Entry]:
     """Row entries of the free parameters with their bounds and priors."""
@@ -76,21 +68,6 @@ def parameter_entries(table: Parameterization) -> list[Entry]:
         )
         for free, start, lower, upper in zip(table.free, table.starts(), low, high, strict=True)
     ]
-
-
-def stack_records(pieces: Sequence[Record]) -> dict[str, NDArray[Any]]:
-    """Records of different lengths side by side, padded with their last sample, and a mask of what is real."""
-    longest = -(-max(piece.time.size for piece in pieces) // _LENGTHS) * _LENGTHS
-
-    def padded(rows: Array) -> Array:
-        return np.concatenate([rows, np.repeat(rows[-1:], longest - rows.shape[0], axis=0)])
-
-    return {
-        "outputs": np.stack([padded(piece.outputs) for piece in pieces]),
-        "inputs": np.stack([padded(piece.inputs) for piece in pieces]),
-        "voltage": np.stack([padded(piece.voltage) for piece in pieces]),
-        "mask": np.stack([np.arange(longest) < piece.time.size for piece in pieces]),
-    }
 
 
 class PredictionError:
@@ -132,19 +109,10 @@ class PredictionError:
         noises = estimated_noises(self.model, self.noise) if estimate_noise else ()
         entries += noise_entries(noises, self.noise)
         self.row = Row(tuple(entries), table.prior_correlations)
-        stacked = stack_records(pieces)
         seen = [seen_at_start(table.vehicle, piece) for piece in pieces]
-        self._plan = FilterPlan(self.model, table.layout, len(self.logs), tuple(nuisances), noises)
-        self._data: dict[str, Any] = {
-            **{name: stacked[name] for name in ("outputs", "inputs", "voltage")},
-            "seen": tuple(np.stack(rows) for rows in zip(*seen, strict=True)),
-            "card": np.asarray(table.card_row),
-            "log": np.asarray(self._log),
-            "scale": self.row.scale,
-            "noise": np.array([float(value) for value in self.noise]),
-        }
+        plan = FilterPlan(self.model, table.layout, len(self.logs), tuple(nuisances), noises)
         self._runs = tuple(
-            RecordRun(self._plan, int(log), piece.outputs, piece.inputs, piece.voltage, first)
+            RecordRun(plan, int(log), piece.outputs, piece.inputs, piece.voltage, first)
             for log, piece, first in zip(self._log, pieces, seen, strict=True)
         )
         self._kept: dict[bytes, list[Filtered]] = {}
@@ -164,8 +132,8 @@ class PredictionError:
 
     @property
     def compiled_by(self) -> str:
-        """What makes the code that runs along the records: a C compiler or XLA."""
-        return "XLA" if filter_library(self.model) is None else "C"
+        """What runs along the records: "C" or "NumPy"."""
+        return record_filter(self.model).compiled_by
 
     def numbers(self, row: Array) -> list[FilterNumbers]:
         """What the filter of each record depends on at a scaled row."""
@@ -183,26 +151,15 @@ class PredictionError:
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
         """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
-        errors = innovations_ahead.errors_ahead(
-            self._plan, ahead.steps, self._data, jnp.asarray(row), _side_by_side(ahead)
-        )
-        return [np.asarray(errors[r])[: len(starts)] for r, starts in enumerate(ahead.starts)]
+        runs = zip(self._runs, self.runs(row), ahead.starts, strict=True)
+        return [mine.ahead(run, starts, ahead.steps) for mine, run, starts in runs]
 
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
         """The same, and the slopes by some entries of the row, (places, starts, horizons, outputs)."""
-        errors, slopes = innovations_ahead.errors_ahead_moved(
-            self._plan,
-            ahead.steps,
-            self._data,
-            jnp.asarray(row),
-            _side_by_side(ahead),
-            jnp.asarray(np.eye(len(self.row))[places]),
-        )
-        kept = [len(starts) for starts in ahead.starts]
-        return (
-            [np.asarray(errors[r])[:n] for r, n in enumerate(kept)],
-            [np.asarray(slopes[:, r])[:, :n] for r, n in enumerate(kept)],
-        )
+        given, count = (self.table.card_row, row * self.row.scale, self.row.scale), int(max(places)) + 1
+        runs = zip(self._runs, self.runs(row), ahead.starts, strict=True)
+        told = [mine.ahead_moved(run, starts, ahead.steps, given, count) for mine, run, starts in runs]
+        return [errors for errors, _ in told], [slopes[places] for _, slopes in told]
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def cost(self, row: Array) -> float:
@@ -228,20 +185,6 @@ class PredictionError:
         """Cost, gradient and Fisher information (the covariance's part included; Ljung 1999, sec. 9.4)."""
         gradient, information, runs, _ = self._accumulate(row)
         return self._cost(runs), gradient, information
-
-    def traced(self) -> TracedCost:
-        """The cost as a function that JAX differentiates; in C, as one that it calls."""
-        if self.compiled_by == "C":
-            return TracedCost(called_cost, self, {})
-        plan, data = self.traced_at()
-        counted = np.zeros(data["voltage"].shape, dtype=bool)
-        for padded, here in zip(counted, self.counted, strict=True):
-            padded[: here.size] = here
-        return TracedCost(traced_cost, plan, data | {"counted": jnp.asarray(counted)})
-
-    def traced_at(self) -> tuple[FilterPlan, dict[str, Any]]:
-        """What the traceable functions of `innovations` take beside a row."""
-        return self._plan, self._data
 
     def _accumulate(self, row: Array) -> _Accumulated:
         """Slopes at a row; those of the last one are kept, which a search ends with and its judges ask for."""
@@ -364,12 +307,6 @@ class PredictionError:
             sensitivities.append(d_white)
             rest += by_covariance
         return white, sensitivities, rest
-
-
-def _side_by_side(ahead: Ahead) -> Any:
-    """Starts of records of different lengths, (records, most starts); what is missing begins at the first sample."""
-    most = max(len(starts) for starts in ahead.starts)
-    return jnp.asarray([(*starts, *[0] * (most - len(starts))) for starts in ahead.starts])
 
 
 def _of_record(free: Free) -> tuple[float, float, float]:

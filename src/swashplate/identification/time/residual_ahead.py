@@ -21,7 +21,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
-from swashplate.identification.core.multi_step import Horizon
+from swashplate.identification.core.multi_step import Ahead, Horizon
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.spans import CALIBRATION
@@ -37,7 +37,6 @@ from swashplate.identification.time.linear_residual import (
     with_coefficients,
 )
 from swashplate.identification.time.prediction_error import PredictionError
-from swashplate.identification.time.record_filter import ahead_of
 from swashplate.identification.time.residual_strength import (
     BLOCK,
     LeftOutBlock,
@@ -47,8 +46,6 @@ from swashplate.identification.time.residual_strength import (
 )
 from swashplate.models.residual import coefficients
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import ArrayBackend
-from swashplate.simulation.compilation import lengthened
 
 _FASTER = (0.3, 1.0, 3.0, 10.0, 30.0)
 """By what the wandering of a drift is multiplied to make errors ahead small."""
@@ -102,18 +99,12 @@ class FlightAhead:
         """Measured less predicted over their size, by block (starts, horizons, outputs)."""
         if not self._starts:
             return []
-        likelihood, piece, ahead = self.likelihood, self.likelihood.pieces[0], int(self._steps[-1])
-        row = likelihood.row.starts()
-        row[likelihood.row.places("parameter")] = factors
-        run, starts = likelihood.runs(row)[0], np.concatenate(self._starts)
-        n = piece.time.size + ahead
-        told = lengthened(run.commands, n), lengthened(piece.voltage, n)
+        row, starts = self.likelihood.row.starts(), np.concatenate(self._starts)
+        row[self.likelihood.row.places("parameter")] = factors
+        ahead = Ahead((tuple(starts.tolist()),), tuple(self._steps.tolist()))
         with np.errstate(over="ignore", invalid="ignore"):
-            states = ahead_of(likelihood.model, run.states, run.numbers, *told, starts, ahead)[:, self._steps - 1]
-            nuisance = Nuisance(*run.numbers.nuisance)
-            predicted = likelihood.model.measure(np.moveaxis(states, -1, 0), nuisance, ArrayBackend())
-            off = piece.outputs[starts[:, None] + self._steps] - np.moveaxis(predicted, 0, -1)
-        parts = np.split(np.asarray(off), np.cumsum([len(part) for part in self._starts])[:-1])
+            (off,) = self.likelihood.errors_ahead(row, ahead)
+        parts = np.split(off, np.cumsum([len(part) for part in self._starts])[:-1])
         return [part / size for part, size in zip(parts, self.sizes, strict=True)]
 
     def costs(self, factors: Array) -> list[float]:

@@ -1,27 +1,18 @@
-"""First guesses of a vehicle's whole state from what was measured, differentiable in the parameters."""
+"""First guesses of a vehicle's whole state from what was measured."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
-from swashplate.engine.equations import CONSTANTS, equations_of
 from swashplate.errors import TrimError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
-from swashplate.jax_on_demand import jax, jnp
-from swashplate.models.nesting import leaves
-from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
-from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body, turned_about_z
-from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import jax_backend, rates_function
-from swashplate.simulation.steady import assemble, unrest
 from swashplate.simulation.trim import trim
 
 _SPAN = 0.15
@@ -55,59 +46,6 @@ def mean_velocity(vehicle: Vehicle, record: Record) -> Array:
     return velocity
 
 
-def steady_flight(
-    vehicle: Vehicle,
-    parameters: tuple[jax.Array, ...],
-    voltage: Float[jax.Array, ""],
-    velocity: Float[jax.Array, " axes"] | Array | None = None,
-) -> tuple[Any, Any]:
-    """Flat state and inputs of steady flight in calm air, the nose north, traceable and differentiable.
-
-    Args:
-        vehicle, parameters, voltage: what flies.
-        velocity: ahead, right and down [m/s], where the hover has no closed form; None hovers.
-    """
-    if vehicle.traits.hover is not None:
-        states, inputs = vehicle.traits.hover(parameters, voltage, jax_backend())
-        row = jnp.stack([jnp.asarray(states.get(name, 0.0), dtype=float) for name in vehicle.state_names])
-        return row, jnp.stack([jnp.asarray(value, dtype=float) for value in inputs])
-    return _trim_by_newton(vehicle, parameters, voltage, jnp.zeros(3) if velocity is None else velocity)
-
-
-def _trim_by_newton(
-    vehicle: Vehicle,
-    parameters: tuple[jax.Array, ...],
-    voltage: Float[jax.Array, ""],
-    velocity: Float[jax.Array, " axes"] | Array,
-) -> tuple[Any, Any]:
-    """Trim by a fixed count of Newton steps, none of which moves an angle by more than `STRIDE`.
-
-    The steps are not differentiated: one more from where they end, with a constant slope, has the exact derivative
-    (the implicit function theorem).
-    """
-    equations = equations_of(vehicle)
-    calm = environment_of(vehicle, parameters=parameters)
-    row = jnp.stack([jnp.asarray(0.0)] * 3 + [jnp.asarray(voltage, dtype=float)])
-    constants = [getattr(calm, name) for name in CONSTANTS]
-    p = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
-    course = jnp.concatenate([velocity, jnp.zeros(3)])
-    held = dict(vehicle.trim_held)
-    limits = zip(vehicle.input_names, vehicle.input_limits, strict=True)
-    middle = [0.5 * (low + high) for name, (low, high) in limits if name not in held]
-    start = jnp.array([0.0, 0.0, *middle, *list(leaves(vehicle.state))[len(RigidBody._fields) :]])
-    frozen, still = jax.lax.stop_gradient(p), jax.lax.stop_gradient(row)
-
-    def newton(_: Int[jax.Array, ""], reached: tuple[Any, Any]) -> tuple[Any, Any]:
-        value, slope = unrest(equations, reached[0], course, still, frozen)
-        step = jnp.linalg.solve(slope, value)
-        return reached[0] - step * jnp.minimum(1.0, STRIDE / jnp.max(jnp.abs(step[: 2 + len(middle)]))), slope
-
-    solved = jax.lax.fori_loop(0, STEPS, newton, (start, jnp.eye(start.shape[0])))
-    z, slope = jax.lax.stop_gradient(solved)
-    z = z - jnp.linalg.solve(slope, unrest(equations, z, course, row, p)[0])
-    return assemble(equations, z, course)
-
-
 STEPS, STRIDE = 40, 0.1
 """Newton steps to a trim, and how far each may go [rad]."""
 
@@ -139,52 +77,18 @@ def slopes_ahead(record: Record) -> tuple[Array, Array]:
     return values, rates
 
 
-def start_state(
-    vehicle: Vehicle,
-    output_names: tuple[str, ...],
-    parameters: tuple[jax.Array, ...],
-    nuisance: Nuisance,
-    *,
-    value: Float[jax.Array, " outputs"],
-    rate: Float[jax.Array, " outputs"],
-    inputs: Float[jax.Array, " inputs"],
-    voltage: Float[jax.Array, ""],
-    running: Float[jax.Array, ""] | float = 0.0,
-) -> Any:
-    """`measured_start`, with the inner states where they would rest (traceable).
-
-    Args:
-        value, rate, inputs, voltage, running: as `measured_start` takes them.
-    """
-    row = measured_start(
-        vehicle,
-        output_names,
-        parameters,
-        nuisance,
-        value=value,
-        rate=rate,
-        inputs=inputs,
-        voltage=voltage,
-        running=running,
-        xp=jax_backend(),
-    )
-    if vehicle.traits.settled is not None:
-        return row
-    return _at_rest_inside(vehicle, row, inputs, parameters, voltage)
-
-
 def measured_start(
     vehicle: Vehicle,
     output_names: tuple[str, ...],
     parameters: Any,
     nuisance: Nuisance,
     *,
-    value: Float[jax.Array | np.ndarray, "outputs ..."],
-    rate: Float[jax.Array | np.ndarray, "outputs ..."],
-    inputs: Float[jax.Array | np.ndarray, "... inputs"],
-    voltage: Float[jax.Array | np.ndarray, ...],
+    value: Any,
+    rate: Any,
+    inputs: Any,
+    voltage: Any,
     xp: Backend,
-    running: Float[jax.Array | np.ndarray, ...] | float = 0.0,
+    running: Any = 0.0,
 ) -> Any:
     """A flat state: pose and its rates from the measurement, inner states by `Traits.settled`, where there is one.
 
@@ -235,46 +139,6 @@ def measured_start(
         )
     entries = [xp.arrays.asarray(known.get(name, 0.0)) for name in vehicle.state_names]
     return xp.arrays.stack(xp.arrays.broadcast_arrays(*entries), axis=-1)
-
-
-def _at_rest_inside(
-    vehicle: Vehicle,
-    row: Float[jax.Array, " states"],
-    inputs: Float[jax.Array, " inputs"],
-    parameters: tuple[jax.Array, ...],
-    voltage: Float[jax.Array, ""],
-) -> Any:
-    """The row with disc tilt, bar, inflow, rotor speed and servos where this motion and these inputs hold them.
-
-    Differentiated as `_trim_by_newton` is.
-    """
-    body, rates = len(RigidBody._fields), rates_function(vehicle)
-    still = jax.lax.stop_gradient((row[:body], inputs, parameters, voltage))
-
-    def unrest_inside(
-        inner: Float[jax.Array, " inner"],
-        body_row: Float[jax.Array, " body"],
-        inputs: Float[jax.Array, " inputs"],
-        parameters: tuple[jax.Array, ...],
-        voltage: Float[jax.Array, ""],
-    ) -> Any:
-        surroundings = Environment(voltage=voltage)
-        return rates(jnp.concatenate([body_row, inner]), inputs, parameters, surroundings)[body:]
-
-    def slope(inner: Float[jax.Array, " inner"]) -> Any:
-        jacobian = jax.jacfwd(unrest_inside)(inner, *still)
-        # A governor at its stop does not move: without this the slope could not be inverted.
-        return jacobian - NUDGE * jnp.eye(inner.shape[0])
-
-    def newton(_: Int[jax.Array, ""], reached: tuple[Any, Any]) -> tuple[Any, Any]:
-        here = slope(reached[0])
-        return reached[0] - jnp.linalg.solve(here, unrest_inside(reached[0], *still)), here
-
-    template = jnp.array(list(leaves(vehicle.state))[body:])
-    solved = jax.lax.fori_loop(0, INNER_STEPS, newton, (template, jnp.eye(template.shape[0])))
-    inner, last = jax.lax.stop_gradient(solved)
-    inner = inner - jnp.linalg.solve(last, unrest_inside(inner, row[:body], inputs, parameters, voltage))
-    return jnp.concatenate([row[:body], inner])
 
 
 INNER_STEPS, NUDGE = 5, 1e-9

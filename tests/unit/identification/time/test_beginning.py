@@ -1,8 +1,7 @@
-"""Where a filter begins, by NumPy, against the same as JAX traces and differentiates it."""
+"""Where a filter begins, and how that moves with its numbers."""
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 import pytest
 
@@ -19,11 +18,10 @@ from swashplate.identification.time.beginning import (
     begun,
     begun_moved,
     joined_at,
-    traced_begin,
+    steady_rows,
 )
 from swashplate.models.catalogue import vehicle as load_vehicle
-from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.trim import trim
 
 
 def _seen(velocity: tuple[float, float, float]) -> FirstMotion:
@@ -43,14 +41,7 @@ def _numbers(name: str) -> tuple[FilterNumbers, FilterNumbers]:
     return at, FilterNumbers(*(1e-2 * draw.standard_normal(row.shape) * row for row in at))
 
 
-def _agrees(found: Begun, expected: Begun, *, relative: float) -> None:
-    for ours, theirs in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
-        exact = np.asarray(theirs)
-        np.testing.assert_allclose(ours, exact, rtol=relative, atol=relative * np.abs(exact).max())
-
-
 def test_where_nothing_settles_the_gain_is_not_a_number() -> None:
-    enable_double_precision()
     vehicle = load_vehicle("coax")
     at, _ = _numbers("coax")
     lost = at._replace(parameters=np.where(np.array(vehicle.parameter_names) == "mass", np.nan, at.parameters))
@@ -62,7 +53,6 @@ _LINE = Noise(line_hertz=34.4, line_angle=1.4e-3, line_height=2e-4, line_time=0.
 
 
 def _hover(noise: Noise) -> tuple[Array, Array, Array, Array]:
-    enable_double_precision()
     at, _ = _numbers("coax")
     rows = FilterNumbers(*(row[None] for row in at._replace(noise=np.array(noise, dtype=np.float64))))
     model = stochastic_model(load_vehicle("coax"), POSE, 0.01, noise=noise)
@@ -109,19 +99,29 @@ def test_a_filter_that_knows_of_the_line_has_white_innovations_and_one_that_does
     assert np.all(does_not[[2, 3, 4]] > 0.2)  # z, phi, theta
 
 
-@pytest.mark.proof
 @pytest.mark.parametrize(("name", "speed"), [("coax", 0.0), ("crazyflie", 0.0), ("raptor50", 0.0), ("raptor50", 10.0)])
-def test_the_beginning_and_its_slopes_are_those_that_jax_finds(name: str, speed: float) -> None:
-    """Closed forms, and Newton's method at the row with one step beside it for the rest."""
-    enable_double_precision()
+def test_slopes_of_the_beginning_are_those_of_beginnings(name: str, speed: float) -> None:
+    """Closed forms, and one step of Newton's method beside the row for the rest."""
     model = stochastic_model(load_vehicle(name), POSE, 0.01)
     (at, to), seen = _numbers(name), _seen((speed, 0.0, 0.0))
+    found, step = begun_moved(model, at, seen, FilterNumbers(*(row[None] for row in to))), 1e-3
+    one, back, two, far_back = (
+        begun(model, FilterNumbers(*(a + factor * step * b for a, b in zip(at, to, strict=True))), seen)
+        for factor in (1.0, -1.0, 2.0, -2.0)
+    )
+    for moved, *sides in zip(*(_parts(each) for each in (found, one, back, two, far_back)), strict=True):
+        slope = (8.0 * (sides[0] - sides[1]) - (sides[2] - sides[3])) / (12.0 * step)
+        np.testing.assert_allclose(moved[0], slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
 
-    def traced(numbers: FilterNumbers) -> Begun:
-        return traced_begin(model, numbers, seen)
 
-    both = jax.jit(lambda p, d: jax.jvp(traced, (p,), (d,)), compiler_options=RUN_RARELY)
-    expected, expected_moved = both(at, to)
-    _agrees(begun(model, at, seen), expected, relative=1e-9)
-    moved = begun_moved(model, at, seen, FilterNumbers(*(row[None] for row in to)))
-    _agrees(jax.tree.map(lambda part: part[0], moved), expected_moved, relative=1e-6)
+@pytest.mark.parametrize(("speed", "climb"), [(0.0, 0.0), (10.0, -0.5)])
+def test_a_helicopter_is_linearised_about_its_trim(speed: float, climb: float) -> None:
+    model = stochastic_model(raptor := load_vehicle("raptor50"), POSE, 0.01)
+    flown = trim(raptor, speed=speed, climb=climb, voltage=12.0)
+    at = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (raptor.values(), Noise(), Nuisance(), [0.0])))
+    found, _ = steady_rows(model, at.parameters, 12.0, np.array([speed, 0.0, -climb]))
+    np.testing.assert_allclose(found[0], flown.state, atol=1e-10)
+
+
+def _parts(begin: Begun) -> list[np.ndarray]:
+    return [part for part in (*begin.gain, begin.x) if isinstance(part, np.ndarray)]

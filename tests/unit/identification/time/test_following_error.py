@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-import scipy.linalg
 from scipy.special import erf
 
 import swashplate as sp
@@ -21,21 +18,18 @@ from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
 from swashplate.identification.core import robust
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
-from swashplate.identification.time import following_error
-from swashplate.identification.time.beginning import seen_at_start
+from swashplate.identification.time.beginning import FilterNumbers, numbers_and_constants, seen_at_start
 from swashplate.identification.time.calibration import first_part
 from swashplate.identification.time.following_error import (
     _AWAY,
     _SHARES,
     Followed,
     FollowingError,
-    _begun,
-    _corrected,
+    FollowingRows,
     _off,
-    _predicted,
 )
+from swashplate.identification.time.record_filter import record_filter
 from swashplate.identification.time.start_states import slopes_ahead
-from swashplate.simulation.compilation import RUN_RARELY
 
 
 @lru_cache(maxsize=1)
@@ -45,47 +39,55 @@ def _likelihood() -> FollowingError:
     return FollowingError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [first_part(record, 2.5)], noise=noise)
 
 
-@pytest.fixture
-def one_lane(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rows one after the other: one program where eight lanes would be a second."""
-    monkeypatch.setattr(following_error, "_LANES", 1)
+def _beside(rows: int = 1) -> FollowingRows:
+    """Rows of a filter somewhere along the flight, alike."""
+    likelihood = _likelihood()
+    run, start = likelihood._runs[0], likelihood.row.starts()
+    numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), start)[1]
+    many = FilterNumbers(*(np.repeat(np.asarray(part)[None], rows, axis=0) for part in numbers))
+    beside = FollowingRows(likelihood.model, many, run.seen, likelihood._spread[0])
+    states = likelihood.constant.runs(start)[0].states
+    beside.state = FilterState(*(np.repeat(part[100][None], rows, axis=0) for part in states))
+    return beside
 
 
 def test_a_step_carries_the_covariance_by_the_slopes_of_the_equations() -> None:
-    """With next to nothing unknown, P+ - Q = F P F', F from the whole step by JAX instead of from the rates."""
-    likelihood = _likelihood()
-    model = likelihood.model
-    run = likelihood._runs[0]
-    numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), likelihood.row.starts())[1]
-    rng = np.random.default_rng(3)
+    """With next to nothing unknown, P+ - Q = F P F', F by differences of whole steps instead of from the rates."""
+    likelihood, rng = _likelihood(), np.random.default_rng(3)
+    model, run = likelihood.model, likelihood._runs[0]
     n, d, k = np.cumsum([len(model.vehicle.state_names), model.n_gusts, N_DISTURBANCES])
     joined = int(k) + model.n_line
-    x = likelihood.constant.runs(likelihood.row.starts())[0].states.x[100]
-    whole = jnp.concatenate([jnp.asarray(x), jnp.asarray(0.3 * rng.standard_normal(joined - n))])
-    u, volts = run.inputs[100], run.voltage[100]
-    parameters = model.vehicle.parameters(*numbers.parameters)
-    noise = Noise(*numbers.noise)
+    u, volts = run.inputs[100], float(run.voltage[100])
+    whole = np.concatenate([_beside().state.x[0], 0.3 * rng.standard_normal(joined - n)])
 
-    @partial(jax.jit, compiler_options=RUN_RARELY)
-    def predicted(P: jax.Array) -> tuple[FilterState, jax.Array]:
-        return _predicted(model, state, P, u, volts, numbers)
+    def after(states: np.ndarray, P: np.ndarray) -> FollowingRows:
+        beside = _beside(len(states))
+        beside.state = FilterState(*np.split(states, [n, d, k], axis=1))
+        beside.covariance = np.broadcast_to(P, (len(states), joined, joined))
+        beside.predicted(np.broadcast_to(u, (len(states), len(u))), volts)
+        return beside
 
-    def step(z: jax.Array) -> tuple[jax.Array, jax.Array]:
-        state = FilterState(z[:n], z[n:d], z[d:k], z[k:])
-        after = model.step(state.x, model.acting(state), u, parameters, volts)
-        joined = jnp.concatenate(
-            [after, model.fade(noise) * state.gust, state.drift, model.line_turn(noise) @ state.line]
-        )
-        return joined, joined
-
-    root = 1e-6 * rng.standard_normal((joined, joined))
-    state = FilterState(whole[:n], whole[n:d], whole[d:k], whole[k:])
-    after, P = predicted(jnp.asarray(root @ root.T))
-    _, still = predicted(jnp.zeros((joined, joined)))
-    F, following = jax.jit(jax.jacfwd(step, has_aux=True), compiler_options=RUN_RARELY)(whole)
-    np.testing.assert_allclose(np.concatenate(after), following, rtol=1e-8, atol=1e-10)
+    nothing, root, step = np.zeros((joined, joined)), 1e-6 * rng.standard_normal((joined, joined)), 1e-5
+    ways = step * np.eye(joined)
+    around = [np.concatenate(after(whole + factor * ways, nothing).state, axis=1) for factor in (1.0, -1.0)]
+    F = (around[0] - around[1]).T / (2.0 * step)
+    found = after(whole[None], root @ root.T).covariance[0] - after(whole[None], nothing).covariance[0]
     expected = F @ root @ root.T @ F.T
-    np.testing.assert_allclose(P - still, expected, atol=2e-3 * np.abs(expected).max())
+    np.testing.assert_allclose(found, expected, atol=2e-3 * np.abs(expected).max())
+
+
+def test_a_calm_step_is_that_of_the_equations() -> None:
+    """Of nothing unknown in still air: the state of the filter with a constant gain."""
+    likelihood, beside = _likelihood(), _beside()
+    run = likelihood._runs[0]
+    beside.covariance = 0.0 * beside.covariance
+    before = beside.state
+    beside.predicted(run.inputs[100][None], float(run.voltage[100]))
+    numbers = likelihood.numbers(likelihood.row.starts())[0].parameters
+    told = numbers_and_constants(likelihood.table.vehicle, numbers)
+    step = record_filter(likelihood.model).step
+    plain = step(before.x, before.gust, before.drift, run.inputs[100][None], run.voltage[100][None], told)
+    np.testing.assert_allclose(beside.state.x, plain, atol=2e-6)  # the air speed is held to be unsure by 0.1 mm/s
 
 
 def test_averages_over_the_air_speed_are_those_of_a_normal_distribution() -> None:
@@ -103,25 +105,16 @@ def test_averages_over_the_air_speed_are_those_of_a_normal_distribution() -> Non
 def test_what_was_not_read_tells_nothing() -> None:
     """A bridge over a gap is no reading: it moves neither state nor covariance, and is not counted."""
     likelihood = _likelihood()
-    run, (piece,) = likelihood._runs[0], likelihood.pieces
-    numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), likelihood.row.starts())[1]
-    states = likelihood.constant.runs(likelihood.row.starts())[0].states
-    state = jax.tree.map(lambda rows: jnp.asarray(rows[100]), states)
-    joined = sum(len(part) for part in state)
-    P = 1e-4 * jnp.eye(joined)
-
-    @partial(jax.jit, compiler_options=RUN_RARELY)
-    def corrected(y: jax.Array) -> tuple[FilterState, jax.Array, jax.Array, jax.Array]:
-        return _corrected(likelihood.model, state, P, y, numbers)
-
-    reading = jnp.asarray(piece.outputs[100])
-    after, told, _, _ = corrected(reading)
-    same, still, nu, _ = corrected(jnp.full_like(reading, jnp.nan))
-    assert np.trace(told) < np.trace(P)
-    assert not np.allclose(after.x, state.x, atol=1e-6)
-    np.testing.assert_array_equal(np.concatenate(same), np.concatenate(state))
-    np.testing.assert_array_equal(still, P)
+    (piece,), beside = likelihood.pieces, _beside()
+    before = beside.state
+    beside.covariance = P = 1e-4 * np.eye(beside.covariance.shape[1])[None]
+    nu, _ = beside.corrected(np.full_like(piece.outputs[100], np.nan))
+    np.testing.assert_array_equal(np.concatenate(beside.state, axis=1), np.concatenate(before, axis=1))
+    np.testing.assert_array_equal(beside.covariance, P)
     assert not np.any(nu)
+    beside.corrected(piece.outputs[100])
+    assert np.trace(beside.covariance[0]) < np.trace(P[0])
+    assert not np.allclose(beside.state.x, before.x, atol=1e-6)
     holed = replace(piece, bridged=((piece.time[199], piece.time[203]),))
     other = FollowingError(likelihood.table, [holed], noise=likelihood.noise)
     assert list(np.flatnonzero(np.isnan(other._readings[0][:, 0]))) == [200, 201, 202]
@@ -140,17 +133,19 @@ def test_a_record_that_begins_in_a_maneuver_says_how_far_off_its_states_may_be()
         seen = seen_at_start(likelihood.table.vehicle, later)
         np.testing.assert_allclose([part[place] for part in slopes_ahead(piece)], [seen.value, seen.rate], atol=1e-9)
         numbers = went.numbers._replace(inputs=went.commands[place : place + 50].mean(axis=0))
-        numbers = jax.tree.map(lambda row: np.asarray(row)[None], numbers)
-        state, P = _begun(likelihood.model, numbers, run.seen._replace(value=seen.value, rate=seen.rate), spread)
-        off.append(np.asarray(state.x)[0] - went.states.x[place])
-        sure = np.asarray(P)[0] - scipy.linalg.block_diag(spread, np.zeros((len(P[0]) - n,) * 2))
+        rows = FilterNumbers(*(np.asarray(row)[None] for row in numbers))
+        begun = FollowingRows(likelihood.model, rows, run.seen._replace(value=seen.value, rate=seen.rate), spread)
+        off.append(begun.state.x[0] - went.states.x[place])
+        sure = begun.covariance[0].copy()
+        sure[:n, :n] -= spread
     distance = np.sqrt(np.mean(np.array(off) ** 2, axis=0) / np.diag(spread))
     assert np.all((distance > 0.8) & (distance < 1.25))  # every fourth place stands for all
     moved = [likelihood.table.vehicle.index(name) for name in ("p", "q", "eta_bar", "zeta_bar")]
     assert np.all(np.diag(spread)[moved] > np.diag(sure)[moved])  # more than a filter leaves open that has settled
     wind = float(noise.wind) * np.sqrt(0.5 * float(noise.tau_wind))
     assert np.all(np.sqrt(np.diag(sure))[n + N_DISTURBANCES : n + N_DISTURBANCES + 2] > 0.99 * wind)
-    lost = went._replace(states=went.states._replace(x=np.full_like(went.states.x, np.nan)))
+    states = went.states._replace(x=np.full_like(went.states.x, np.nan))
+    lost = went._replace(run=went.run._replace(states=states))
     assert not np.any(_off(likelihood.table.vehicle, piece, run, lost))
 
 
@@ -159,8 +154,12 @@ def test_scores_are_slopes_of_the_cost_whatever_the_filter(name: str, monkeypatc
     """Innovations and covariances that bend with all numbers, in the place of the filter's own."""
     likelihood = FollowingError(_likelihood().table, _likelihood().pieces, noise=_likelihood().noise)
 
-    def some(model: Any, run: Any, readings: Any, spread: Any, placed: list[tuple[Any, Any]]) -> Followed:
-        told = np.array([np.concatenate([n.parameters, n.noise, n.nuisance]) for _, n in placed])
+    def some(rows: list[Any]) -> list[Followed]:
+        run, readings = likelihood._runs[0], likelihood._readings[0]
+        placed = [
+            run.placed(likelihood.table.card_row, np.array(likelihood.noise), r * likelihood.row.scale)[1] for r in rows
+        ]
+        told = np.array([np.concatenate([n.parameters, n.noise, n.nuisance]) for n in placed])
         rng, (count, outputs) = np.random.default_rng(6), readings.shape
         bent = np.sin(told * 10.0 ** -np.round(np.log10(np.abs(told) + 1e-6)) + 1.0)
         ways = rng.standard_normal((bent.shape[1], count + outputs, outputs))
@@ -168,9 +167,9 @@ def test_scores_are_slopes_of_the_cost_whatever_the_filter(name: str, monkeypatc
         nu = rng.standard_normal((count, outputs)) + 0.3 * turned[:, :count]
         root = np.eye(outputs) + 0.03 * np.tril(turned[:, count:])
         S = np.repeat((root @ np.swapaxes(root, 1, 2))[:, None], count, axis=1)
-        return Followed(nu, S, FilterState(*[nu] * 4))
+        return [Followed(nu, S, FilterState(*[nu] * 4))]
 
-    monkeypatch.setattr(following_error, "_along_some", some)
+    monkeypatch.setattr(likelihood, "_followed", some)
     row = likelihood.row.starts() + 0.05 * np.random.default_rng(1).standard_normal(len(likelihood.row))
     cost, gradient, information = likelihood.scores(row)
     assert cost == pytest.approx(likelihood.cost(row), rel=1e-12)
@@ -184,7 +183,6 @@ def test_scores_are_slopes_of_the_cost_whatever_the_filter(name: str, monkeypatc
 
 
 @pytest.mark.proof
-@pytest.mark.usefixtures("one_lane")
 def test_the_gradient_is_the_slope_of_the_cost() -> None:
     likelihood = _likelihood()
     row = likelihood.row.starts() + 0.05 * np.random.default_rng(1).standard_normal(len(likelihood.row))
@@ -199,42 +197,18 @@ def test_the_gradient_is_the_slope_of_the_cost() -> None:
         assert gradient[place] == pytest.approx(slope, rel=0.01, abs=0.02 * size[place]), name
 
 
-@pytest.mark.proof
-def test_rows_side_by_side_are_those_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_side_by_side_are_those_one_after_the_other() -> None:
     likelihood = _likelihood()
     row = likelihood.row.starts()
-    rows = [row, *(row + step for step in 1e-3 * np.eye(len(row)))]
-    (eight,) = likelihood._followed(rows)
-    monkeypatch.setattr(following_error, "_LANES", 1)
-    (one,) = likelihood._followed(rows)
-    for side, alone in zip(jax.tree.leaves(eight), jax.tree.leaves(one), strict=True):
-        np.testing.assert_allclose(side, alone, rtol=1e-9, atol=1e-11 * np.abs(alone).max())
-
-
-@pytest.mark.parametrize("count", [1, 3, 8, 11])
-def test_every_row_comes_back_in_its_place(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lanes that are left over repeat the last row; a row alone has one lane."""
-    likelihood, lanes = _likelihood(), []
-
-    def some(
-        model: object, run: object, readings: object, spread: object, placed: list[tuple[object, Any]]
-    ) -> Followed:
-        lanes.append(len(placed))
-        parameters = np.array([numbers.parameters for _, numbers in placed])
-        return Followed(parameters, parameters, FilterState(*[parameters] * 4))
-
-    monkeypatch.setattr(following_error, "_along_some", some)
-    row = likelihood.row.starts()
-    rows = [row * (1.0 + 0.01 * k) for k in range(count)]
-    (found,) = likelihood._followed(rows)
-    given = likelihood.table.card_row, np.array(likelihood.noise)
-    expected = [likelihood._runs[0].placed(*given, one * likelihood.row.scale)[1].parameters for one in rows]
-    np.testing.assert_array_equal(found.innovations, expected)
-    assert lanes == ([1] if count == 1 else [8] * -(-count // 8))
+    rows = [row, *(row + step for step in 1e-3 * np.eye(len(row))[:2])]
+    (beside,), alone = likelihood._followed(rows), [likelihood._followed([one])[0] for one in rows]
+    for k, one in enumerate(alone):
+        for found, expected in ((beside.innovations, one.innovations), (beside.covariances, one.covariances)):
+            # Slopes and equilibria of rows beside the first are one step of Newton's method away from its own.
+            np.testing.assert_allclose(found[k], expected[0], rtol=1e-6, atol=1e-7 * np.abs(expected).max())
 
 
 @pytest.mark.proof
-@pytest.mark.usefixtures("one_lane")
 def test_slopes_whiten_as_the_scores_count_them() -> None:
     likelihood = _likelihood()
     row = likelihood.row.starts()
@@ -247,4 +221,4 @@ def test_slopes_whiten_as_the_scores_count_them() -> None:
 
 def test_nuts_is_refused_where_it_would_draw_from_another_likelihood() -> None:
     with pytest.raises(IdentificationError, match=r"has a wind.*NUTS does not draw from"):
-        _likelihood().traced()
+        _likelihood().slope(_likelihood().row.starts())

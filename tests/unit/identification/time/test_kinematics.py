@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-from functools import partial
-
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import POSE, Record
+from swashplate.identification.time.beginning import FilterNumbers, FirstMotion, starting_row, steady_rows
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.identification.time.start_states import mean_velocity, slopes, start_state, steady_flight
+from swashplate.identification.time.start_states import mean_velocity, slopes
 from swashplate.models.catalogue import vehicle
-from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.trim import trim
 
 COAX = vehicle("coax")
 LEVER = Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1, level_phi=0.02, level_theta=-0.03, level_psi=0.4)
 RATE = 100.0
-
-
-@pytest.fixture(autouse=True)
-def _double() -> None:
-    enable_double_precision()
 
 
 def _tumble(time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -77,61 +69,47 @@ def test_a_lever_that_is_forgotten_shows_as_a_velocity() -> None:
     np.testing.assert_allclose(found[10:-10, 3:6], expected[10:-10], atol=2e-4)
 
 
+def _start(record: Record, place: int, nuisance: Nuisance, *, more: float = 0.0, voltage: float = 12.0) -> np.ndarray:
+    """The state that a filter would begin with at a sample, one motor's command more or less."""
+    value, rate = (part[0] for part in slopes(record, np.array([place])))
+    inputs = record.inputs[place] + more * (np.array(COAX.input_names) == "motor_lower")
+    numbers = (np.array(row, dtype=np.float64) for row in (COAX.values(), Noise(), nuisance, inputs))
+    seen = FirstMotion(value, rate, np.zeros(3), np.array([voltage, voltage]))
+    return starting_row(stochastic_model(COAX, POSE, record.dt), FilterNumbers(*numbers), seen)
+
+
 @pytest.mark.parametrize("nuisance", [Nuisance(), LEVER])
 def test_the_first_guess_of_the_equations_agrees(nuisance: Nuisance) -> None:
-    """The other implementation, on traced numbers: from slopes of the same pose to a flat state of the vehicle."""
+    """From slopes of the same pose to a flat state of the vehicle."""
     record, truth = _record(nuisance)
     place = 150
-    value, rate = slopes(record, np.array([place]))
-    x = start_state(
-        COAX,
-        POSE,
-        COAX.values(),
-        nuisance,
-        value=jnp.asarray(value[0]),
-        rate=jnp.asarray(rate[0]),
-        inputs=jnp.asarray(record.inputs[place]),
-        voltage=12.0,
-    )
-    found = np.array([float(x[COAX.index(name)]) for name in PREDICTED])
+    x = _start(record, place, nuisance)
+    found = x[[COAX.index(name) for name in PREDICTED]]
     np.testing.assert_allclose(found, truth[place], atol=8e-3)  # straight lines over 0.3 s of a curved motion
-    assert float(x[COAX.index("eta_bar")]) == pytest.approx(truth[place, 6], abs=2e-3)
-    assert float(x[COAX.index("zeta_bar")]) == pytest.approx(truth[place, 7], abs=2e-3)
+    assert x[COAX.index("eta_bar")] == pytest.approx(truth[place, 6], abs=2e-3)
+    assert x[COAX.index("zeta_bar")] == pytest.approx(truth[place, 7], abs=2e-3)
 
 
 @pytest.mark.parametrize("voltage", [11.1, 12.22])
 def test_the_closed_form_of_hover_is_the_trim(voltage: float) -> None:
-    found = trim(COAX, voltage=voltage)
-    x, u = steady_flight(COAX, COAX.values(), voltage)
-    np.testing.assert_allclose(np.asarray(u), found.inputs, atol=1e-9)
+    found, row = trim(COAX, voltage=voltage), np.array([COAX.values()], dtype=np.float64)
+    (x,), (u,) = steady_rows(stochastic_model(COAX, POSE, 0.01), row, voltage, np.zeros(3))
+    np.testing.assert_allclose(u, found.inputs, atol=1e-9)
     speeds = [COAX.index("omega_lower"), COAX.index("omega_upper")]
-    np.testing.assert_allclose(np.asarray(x)[speeds], found.state[speeds], rtol=1e-9)
-    assert np.abs(np.delete(np.asarray(x), speeds)).max() == 0.0
+    np.testing.assert_allclose(x[speeds], found.state[speeds], rtol=1e-9)
+    assert np.abs(np.delete(x, speeds)).max() == 0.0
 
 
 def test_the_first_guess_of_rotor_speeds_is_steady() -> None:
     """One percent of motor is 4.4 rad/s at the lower rotor, one volt 13.6 rad/s: the card's slopes."""
     record, _ = _record(Nuisance())
-    value, rate = slopes(record, np.array([100]))
 
-    lower = COAX.input_names.index("motor_lower")
-
-    def speed(more: float, voltage: float) -> jax.Array:
-        x = start_state(
-            COAX,
-            POSE,
-            COAX.values(),
-            Nuisance(),
-            value=jnp.asarray(value[0]),
-            rate=jnp.asarray(rate[0]),
-            inputs=jnp.asarray(record.inputs[100]).at[lower].add(more),
-            voltage=voltage,
-        )
-        return x[COAX.index("omega_lower")]
+    def speed(more: float, voltage: float) -> float:
+        return float(_start(record, 100, Nuisance(), more=more, voltage=voltage)[COAX.index("omega_lower")])
 
     card = COAX.card.values()
-    assert float(speed(0.01, 12.0) - speed(0.0, 12.0)) == pytest.approx(0.01 * card["k_drive_lower"])
-    assert float(speed(0.0, 12.0) - speed(0.0, 11.0)) == pytest.approx(card["k_drive_voltage"])
+    assert speed(0.01, 12.0) - speed(0.0, 12.0) == pytest.approx(0.01 * card["k_drive_lower"])
+    assert speed(0.0, 12.0) - speed(0.0, 11.0) == pytest.approx(card["k_drive_voltage"])
 
 
 def test_slopes_are_those_of_a_straight_line_also_at_the_ends() -> None:
@@ -141,34 +119,6 @@ def test_slopes_are_those_of_a_straight_line_also_at_the_ends() -> None:
     value, rate = slopes(straight, np.array([0, 200, 400]))
     np.testing.assert_allclose(value, line[[0, 200, 400]], atol=1e-12)
     np.testing.assert_allclose(rate, np.tile([1.0, -2.0, 0.5, 0.1, 0.2, 3.0], (3, 1)), atol=1e-12)
-
-
-@pytest.mark.proof
-def test_a_helicopters_steady_flight_and_inner_states_are_those_of_its_trim_and_differentiable() -> None:
-    """The traced Newton steps end where `trim` does, and their derivative is that of trims at other masses."""
-    raptor = vehicle("raptor50")
-    level, fast = trim(raptor), trim(raptor, speed=10.0, climb=-0.5)
-
-    def at(mass: float, velocity: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return steady_flight(raptor, raptor.values()._replace(mass=mass), jnp.asarray(12.0), velocity)
-
-    mass = raptor.card.values()["mass"]
-    once = partial(jax.jit, compiler_options=RUN_RARELY)
-    flown = once(lambda m, v: jax.jvp(partial(at, velocity=v), (m,), (jnp.ones(()),)))
-    for velocity, expected in (((10.0, 0.0, 0.5), fast), ((0.0, 0.0, 0.0), level)):
-        (x, u), (dx, du) = flown(jnp.asarray(mass), jnp.asarray(velocity))
-        np.testing.assert_allclose(x, expected.state, atol=1e-12)
-        np.testing.assert_allclose(u, expected.inputs, atol=1e-12)
-    heavy, light = (trim(raptor.with_values({"mass": mass + step})) for step in (1e-4, -1e-4))
-    np.testing.assert_allclose(dx, (heavy.state - light.state) / 2e-4, atol=1e-8)
-    np.testing.assert_allclose(du, (heavy.inputs - light.inputs) / 2e-4, atol=1e-8)
-    seen = {name: level.state[raptor.index(name)] for name in POSE}
-
-    def guess(value: jax.Array) -> jax.Array:
-        rest = {"rate": jnp.zeros(6), "inputs": jnp.asarray(level.inputs), "voltage": jnp.asarray(12.0)}
-        return jnp.asarray(start_state(raptor, POSE, raptor.values(), Nuisance(), value=value, **rest))
-
-    np.testing.assert_allclose(once(guess)(jnp.array(list(seen.values()))), level.state, atol=1e-12)
 
 
 def test_a_filter_is_linearised_about_the_mean_flight_of_a_helicopter_that_is_fast() -> None:

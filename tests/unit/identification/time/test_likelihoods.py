@@ -8,15 +8,12 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import swashplate as sp
 from simulated_flights import FREE, TIE, ten_seconds
 from swashplate.errors import IdentificationError
-from swashplate.filtering.arriving_commands import commands, commands_moved
 from swashplate.filtering.disturbed_model import FilterGain, FilterState
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import accuracy
@@ -24,11 +21,9 @@ from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.scoring import minimise
 from swashplate.identification.time.calibration import DifferencedError, first_part
-from swashplate.identification.time.innovations import traced_innovations
 from swashplate.identification.time.output_error import WINDOW, OutputError
-from swashplate.identification.time.prediction_error import PredictionError, stack_records
-from swashplate.identification.time.record_filter import STRETCH
-from swashplate.simulation.compilation import RUN_RARELY
+from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.physics.backend import ArrayBackend
 
 
 @lru_cache(maxsize=1)
@@ -83,34 +78,6 @@ def test_the_gradient_is_the_slope_of_the_cost(likelihood: OutputError | Predict
         assert gradient[place] == pytest.approx(slope, rel=1e-3, abs=1e-3 * size[place]), likelihood.row.names[place]
 
 
-@pytest.mark.proof
-def test_derivatives_along_tangent_planes_are_those_of_the_filter() -> None:
-    """The two passes against derivatives that are carried through the equations sample by sample."""
-    likelihood = _prediction_error()
-    row = _somewhere(likelihood)
-    white, sensitivities, _ = likelihood.whitened(row)
-    (run,), (counted,) = likelihood.runs(row), likelihood.counted
-    root = np.linalg.cholesky(run.begin.gain.covariance)
-    direction = np.random.default_rng(2).standard_normal(len(row))
-
-    def carried(row: jax.Array) -> object:
-        return jax.jvp(lambda r: traced_innovations(*likelihood.traced_at(), r)[0], (row,), (jnp.asarray(direction),))
-
-    values, expected = jax.jit(carried, compiler_options=RUN_RARELY)(jnp.asarray(row))
-    n = len(counted)
-    np.testing.assert_allclose(white[0] @ root.T, values[0, :n][counted], rtol=1e-9, atol=1e-14)
-    found = np.tensordot(direction, sensitivities[0], 1) @ root.T
-    exact = np.array(expected[0, :n][counted])
-    # What only turns an innovation with the predicted heading tells nothing and is left out.
-    x, y, psi = (likelihood.model.output_names.index(name) for name in ("x", "y", "psi"))
-    place = likelihood.row.names.index("level_psi[0]")
-    heading = -exact[:, psi] - direction[place] * likelihood.row.scale[place]
-    nu = white[0] @ root.T
-    exact[:, x] -= heading * nu[:, y]
-    exact[:, y] += heading * nu[:, x]
-    np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-12 * np.abs(exact).max())
-
-
 def test_a_heading_that_only_turns_the_innovations_tells_nothing() -> None:
     """What is expected at another heading turns the innovation that is there; no flight is more likely for that."""
     likelihood = _prediction_error()
@@ -118,11 +85,11 @@ def test_a_heading_that_only_turns_the_innovations_tells_nothing() -> None:
     x = likelihood.runs(_somewhere(likelihood))[0].states.x[100]
     none = np.zeros((model.n_gusts, model.n_outputs))
     gain = FilterGain(np.zeros((x.size, model.n_outputs)), none, none, none)
-    readings = np.asarray(model.measure(x, Nuisance())) + 1e-3 * np.arange(1.0, 7.0)
+    readings = np.asarray(model.measure(x, Nuisance(), ArrayBackend())) + 1e-3 * np.arange(1.0, 7.0)
 
     def innovation(turn: float) -> np.ndarray:
         state = FilterState(x + turn * (np.arange(x.size) == model.vehicle.index("psi")), none[:, 0], none[:, 0])
-        return np.asarray(model.correct(state, jnp.asarray(readings), gain, Nuisance())[1])[None]
+        return np.asarray(model.correct(state, readings, gain, Nuisance(), ArrayBackend())[1])[None]
 
     moved = (innovation(1e-5) - innovation(-1e-5)) / 2e-5
     assert np.abs(moved[0, [names.index("x"), names.index("y")]]).min() > 5e-4
@@ -138,7 +105,7 @@ def test_a_heading_that_only_turns_the_innovations_tells_nothing() -> None:
     assert likelihood._foreseen(every, innovation(0.0), 0.0 * with_it, spread, 0)[1][0, 0] > 0.1
 
 
-def test_slopes_by_differences_of_runs_are_those_along_tangent_planes() -> None:
+def test_slopes_by_differences_of_runs_are_those_of_the_filter() -> None:
     likelihood = _prediction_error()
     row = _somewhere(likelihood)
     cost, gradient, information = DifferencedError(likelihood.table, [_start()]).scores(row)
@@ -155,31 +122,6 @@ def test_records_beside_others_are_run_alike() -> None:
     row = _somewhere(whole)
     both = PredictionError(whole.table, [_start(), _start()])
     assert both.cost(row) == pytest.approx(2.0 * whole.cost(row), rel=1e-12)
-
-
-@pytest.mark.proof
-def test_the_end_of_a_stretch_leaves_no_trace() -> None:
-    whole, piece = _prediction_error(), _start()
-    row = _somewhere(whole)
-    assert piece.time.size > STRETCH
-    values = jax.jit(traced_innovations, static_argnums=0, compiler_options=RUN_RARELY)(
-        *whole.traced_at(), jnp.asarray(row)
-    )[0]
-    np.testing.assert_allclose(whole.runs(row)[0].innovations, values[0, : piece.time.size], rtol=1e-9, atol=1e-13)
-
-
-def test_slopes_by_commands_are_those_of_the_curve_through_them() -> None:
-    vehicle, piece = sp.vehicle("coax"), _start()
-    late = Nuisance(delay_servo=0.034, delay_motor=0.0617, trim_servo_roll=0.01)
-    value, by_delay = commands_moved(vehicle, piece.dt, piece.inputs, late, np)
-
-    def arriving(later: jax.Array) -> object:
-        moved = late._replace(delay_servo=late.delay_servo + later, delay_motor=late.delay_motor + later)
-        return commands(vehicle, piece.dt, jnp.asarray(piece.inputs), moved)
-
-    expected, exact = jax.jit(lambda later: jax.jvp(arriving, (later,), (jnp.ones(()),)))(0.0)
-    np.testing.assert_allclose(value, expected, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(by_delay, exact, rtol=1e-9, atol=1e-12)
 
 
 def test_the_information_is_the_curvature_where_the_model_is_true(likelihood: OutputError | PredictionError) -> None:
@@ -278,17 +220,6 @@ def test_windows_start_where_they_should_and_share_nothing_but_the_record() -> N
 def test_a_record_shorter_than_a_window_is_refused() -> None:
     with pytest.raises(IdentificationError, match=r"longest record has 10\.0 s, expected more than one"):
         OutputError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_record()], window=20.0)
-
-
-def test_records_of_different_lengths_stand_side_by_side() -> None:
-    one = _record()
-    short = Record(
-        one.name, one.time[:300], one.inputs[:300], one.outputs[:300], one.voltage[:300], one.output_names, True
-    )
-    stacked = stack_records([one, short])
-    assert stacked["outputs"].shape == (2, 1024, 6)
-    assert stacked["mask"].sum(axis=1).tolist() == [one.time.size, 300]
-    np.testing.assert_array_equal(stacked["inputs"][1, 299:], np.tile(one.inputs[299], (1024 - 299, 1)))
 
 
 def test_the_first_seconds_of_a_filter_are_not_counted() -> None:

@@ -1,7 +1,8 @@
-"""The filter in C: the equations' own steps, slopes of its own runs, and the numbers that XLA's filter finds."""
+"""The filter: the equations' own steps, slopes of its own runs, and the same numbers with and without a compiler."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,19 +15,19 @@ import pytest
 import swashplate as sp
 from swashplate.arrays import Array
 from swashplate.compiled import can_compile
+from swashplate.errors import ExportError
 from swashplate.filtering import filter_library as libraries
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
+from swashplate.identification.core.multi_step import Ahead
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import POSE, Record
 from swashplate.identification.time.beginning import FilterNumbers
-from swashplate.identification.time.compiled_filter import compiled_filter
 from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
-from swashplate.simulation.dynamics import enable_double_precision
-from swashplate.simulation.runge_kutta import rk4_step
 
 pytestmark = pytest.mark.skipif(not can_compile(), reason="there is no C compiler, or the extra 'model' is missing")
 
@@ -59,7 +60,6 @@ def _vehicle(name: str) -> Vehicle:
 
 @lru_cache(maxsize=8)
 def _likelihood(name: str, noise: Noise | None = None) -> PredictionError:
-    enable_double_precision()
     vehicle = _vehicle(name)
     return PredictionError(parameterize(vehicle, _FREE[name]), [_record(vehicle)], noise=noise)
 
@@ -68,12 +68,18 @@ def _somewhere(likelihood: PredictionError) -> Array:
     return likelihood.row.starts() + 0.02 * np.random.default_rng(1).standard_normal(len(likelihood.row))
 
 
+def _stepped(rates: Callable[[Array, Array], Array], x: Array, u: Array, dt: float = 0.01) -> Array:
+    k1 = rates(x, u)
+    k2 = rates(x + 0.5 * dt * k1, u)
+    k3 = rates(x + 0.5 * dt * k2, u)
+    k4 = rates(x + dt * k3, u)
+    return np.asarray(x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+
+
 @pytest.mark.parametrize("name", ["coax", "xcell60", "x8"])
-def test_steps_in_c_are_those_of_the_equations(name: str) -> None:
+def test_steps_are_those_of_the_equations(name: str) -> None:
     vehicle = sp.vehicle(name)
     model = stochastic_model(vehicle, POSE, 0.01, noise=Noise(wind=0.3))
-    in_c = compiled_filter(model)
-    assert in_c is not None
     likelihood = _likelihood(name)
     run = likelihood.runs(_somewhere(likelihood))[0]
     gust = np.array([0.3, -0.2, 0.1, 1.0, -2.0, 0.5, 0.4, -0.3])
@@ -81,7 +87,7 @@ def test_steps_in_c_are_those_of_the_equations(name: str) -> None:
     commands, voltage = run.commands, likelihood.pieces[0].voltage
     noise = np.array(Noise(wind=0.3), dtype=np.float64)
     numbers = FilterNumbers(run.numbers.parameters, noise, run.numbers.nuisance, run.numbers.inputs)
-    found = in_c.ahead_of(states, numbers, commands, voltage, np.array([100, 170]), 2)
+    found = record_filter(model).ahead_of(states, numbers, commands, voltage, np.array([100, 170]), 2)
     parameters, push = vehicle.parameters(*run.numbers.parameters.tolist()), np.zeros(len(vehicle.state_names))
     around = environment_of(vehicle, parameters=parameters)
     for start, predicted in zip((100, 170), found, strict=True):
@@ -94,8 +100,8 @@ def test_steps_in_c_are_those_of_the_equations(name: str) -> None:
             def rates(x: Array, u: Array, here: object = here, push: Array = push) -> Array:
                 return np.array(vehicle.rates(x, u, parameters, here, FloatBackend())) + push
 
-            x = rk4_step(rates, x, lambda _, u=commands[start + k]: u, 0.01, looped=False)
-            faded = faded * np.asarray(model.fade(Noise(wind=0.3), np))
+            x = _stepped(rates, x, commands[start + k])
+            faded = faded * np.asarray(model.fade(Noise(wind=0.3)))
             np.testing.assert_allclose(predicted[k], x, rtol=1e-11, atol=1e-12)
 
 
@@ -112,43 +118,59 @@ def test_slopes_in_c_are_those_of_its_own_runs(name: str, noise: Noise | None) -
     assert likelihood.compiled_by == "C"
 
 
-def _without_a_compiler(likelihood: PredictionError, monkeypatch: pytest.MonkeyPatch) -> PredictionError:
-    monkeypatch.setattr(libraries, "can_compile", lambda: False)
-    _forget()
-    return PredictionError(likelihood.table, likelihood.pieces, noise=likelihood.noise)
+AHEAD = Ahead(((160, 170, 200),), (5, 10, 30))
 
 
-def _forget() -> None:
-    libraries.filter_library.cache_clear()
-    compiled_filter.cache_clear()
+def test_slopes_of_errors_ahead_are_those_of_the_errors() -> None:
+    likelihood = _likelihood("coax")
+    row, places = _somewhere(likelihood), np.flatnonzero([e.group != "noise" for e in likelihood.row.entries])
+    (errors,), (slopes,) = likelihood.errors_ahead_moved(row, AHEAD, places)
+    np.testing.assert_array_equal(errors, likelihood.errors_ahead(row, AHEAD)[0])
+    assert errors.dtype == slopes.dtype == np.float64
+    for place, found in zip(places, slopes, strict=True):
+        step = 1e-4 * np.eye(len(row))[place]
+        around = [likelihood.errors_ahead(row + factor * step, AHEAD)[0] for factor in (1.0, -1.0, 2.0, -2.0)]
+        slope = (8.0 * (around[0] - around[1]) - (around[2] - around[3])) / 12e-4
+        np.testing.assert_allclose(found, slope, atol=1e-7 * max(1.0, np.abs(slope).max()))
 
 
 @pytest.mark.parametrize(
     ("name", "noise"),
     [
         ("ducted_fan", None),
-        pytest.param("coax", None, marks=pytest.mark.proof),
-        pytest.param("coax", _EVERYTHING, marks=pytest.mark.proof),
+        ("coax", None),
+        ("coax", _EVERYTHING),
         pytest.param("xcell60", None, marks=pytest.mark.proof),
-        pytest.param("x8", None, marks=pytest.mark.proof),
     ],
 )
-def test_xla_finds_the_same_numbers(name: str, noise: Noise | None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_the_numbers_are_the_same(
+    name: str, noise: Noise | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     in_c = _likelihood(name, noise)
+    assert in_c.compiled_by == "C"
     row = _somewhere(in_c)
-    ours, (run,) = in_c.scores(row), in_c.runs(row)
-    by_xla = _without_a_compiler(in_c, monkeypatch)
+    places = np.arange(len(_FREE[name]) + 2)
+    ours, (run,), ahead = in_c.scores(row), in_c.runs(row), in_c.errors_ahead_moved(row, AHEAD, places)
+    monkeypatch.setattr(libraries, "can_compile", lambda: False)
+    _forget()
     try:
-        theirs, (other,) = by_xla.scores(row), by_xla.runs(row)
-        assert (by_xla.compiled_by, run.roots is None, other.roots is None) == ("XLA", False, True)
+        by_numpy = PredictionError(in_c.table, in_c.pieces, noise=in_c.noise)
+        theirs, (other,) = by_numpy.scores(row), by_numpy.runs(row)
+        further = by_numpy.errors_ahead_moved(row, AHEAD, places)
+        assert by_numpy.compiled_by == "NumPy"
     finally:
         _forget()
     np.testing.assert_allclose(run.innovations, other.innovations, atol=1e-11 * np.abs(other.innovations).max())
-    for mine, exact in zip(ours, theirs, strict=True):
+    for mine, exact in zip((*ours, *ahead[0], *ahead[1]), (*theirs, *further[0], *further[1]), strict=True):
         np.testing.assert_allclose(mine, exact, rtol=1e-10, atol=1e-11 * np.max(np.abs(exact)))
 
 
-def test_equations_that_cannot_be_printed_are_left_to_xla() -> None:
+def _forget() -> None:
+    libraries.filter_code.cache_clear()
+    record_filter.cache_clear()
+
+
+def test_equations_that_cannot_be_traced_are_refused() -> None:
     vehicle = sp.vehicle("coax")
     rates = vehicle.derivatives
 
@@ -157,4 +179,5 @@ def test_equations_that_cannot_be_printed_are_left_to_xla() -> None:
         return rates(state, inputs, parameters, environment, xp)
 
     model: StochasticModel = stochastic_model(replace(vehicle, derivatives=own), POSE, 0.01)
-    assert libraries.filter_library(model) is None
+    with pytest.raises(ExportError, match="cannot trace the equations"):
+        libraries.filter_code(model)

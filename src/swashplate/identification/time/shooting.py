@@ -1,4 +1,4 @@
-"""Windows simulated from their own starts, and how they move, by the C of the filter with a gain of zero.
+"""Windows simulated from their own starts, and how they move, by the filter with a gain of zero.
 
 Without a gain the filter is the simulation: what it is told to expect is what the model would measure. It carries the
 slopes of its innovations along; told to read just what it expects, these are the slopes of the outputs, in the axes of
@@ -14,8 +14,10 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, StochasticModel
+from swashplate.filtering.filter_code import Series
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.beginning import (
     Begun,
     FilterNumbers,
@@ -23,12 +25,32 @@ from swashplate.identification.time.beginning import (
     starting_row,
     starting_row_moved,
 )
-from swashplate.identification.time.compiled_filter import CompiledFilter, FilterRun
 from swashplate.identification.time.kinematics import turned_rows
-from swashplate.identification.time.traced_shooting import ShootingPlan
+from swashplate.identification.time.record_filter import FilterRun, Moves, record_filter
 from swashplate.physics.backend import ArrayBackend
 
 _XP = ArrayBackend()
+
+
+@dataclass(frozen=True)
+class ShootingPlan:
+    """What the simulation of windows depends on: everything but numbers.
+
+    Attributes:
+        model: the vehicle's equations and what is measured.
+        layout: where a row's parameters go.
+        nuisances: what is estimated of each flight.
+        drifting: which of these every window moves by a number of its own, behind the corrections of its states.
+        length: samples of a window.
+        shared: how many entries of the row all windows share.
+    """
+
+    model: StochasticModel
+    layout: Layout
+    nuisances: tuple[str, ...]
+    drifting: tuple[str, ...]
+    length: int
+    shared: int
 
 
 @dataclass(frozen=True)
@@ -55,7 +77,7 @@ class FlownWindow:
     """A window as it was simulated at a row.
 
     Attributes:
-        numbers: what it depends on.
+        numbers: what it depends on. begin: where it begins.
         commands: as they arrive. late: their slopes by the delay.
         run: of the filter. outputs: what the model measures (n, outputs).
     """
@@ -68,11 +90,11 @@ class FlownWindow:
     outputs: Array
 
 
-class CompiledShooting:
+class Shooting:
     """All windows of a fit.
 
     Args:
-        plan: of the fit. in_c: its model's filter.
+        plan: of the fit.
         windows: in the order of the row.
         card: parameters of the card.
         scale, own_scale: of the row's shared entries, and of the entries of a window.
@@ -81,14 +103,14 @@ class CompiledShooting:
     def __init__(
         self,
         plan: ShootingPlan,
-        in_c: CompiledFilter,
         windows: tuple[Window, ...],
         *,
         card: Array,
         scale: Array,
         own_scale: Array,
     ) -> None:
-        self._plan, self._c, self._windows = plan, in_c, windows
+        self._plan, self._windows = plan, windows
+        self._filter = record_filter(plan.model)
         self._card, self._scale, self._own_scale = card, scale, own_scale
         self._nuisances = np.array([Nuisance._fields.index(name) for name in plan.nuisances], dtype=np.intp)
         self._drifting = np.array([Nuisance._fields.index(name) for name in plan.drifting], dtype=np.intp)
@@ -115,14 +137,14 @@ class CompiledShooting:
         nuisance = np.zeros(len(Nuisance._fields))
         nuisance[self._nuisances] = shared[k + window.log * m : k + (window.log + 1) * m]
         nuisance[self._drifting] += own[n:]
-        reaching, late = commands_moved(model.vehicle, model.dt, window.inputs, Nuisance(*nuisance), np)
+        reaching, late = commands_moved(model.vehicle, model.dt, window.inputs, Nuisance(*nuisance))
         here = slice(window.first, window.first + self._plan.length)
         parameters = np.array(self._plan.layout.values(self._card, shared[:k]), dtype=np.float64)
         numbers = FilterNumbers(parameters, self._noise, nuisance, reaching[window.first])
         begin = Begun(self._no_gain(), starting_row(model, numbers, window.seen) + own[:n])
         nothing = np.zeros((self._plan.length, model.n_outputs))
-        run = self._c.along(begin, numbers, (nothing, reaching[here], window.voltage))
-        outputs = np.asarray(model.measure(np.asarray(run.states.x).T, Nuisance(*nuisance), _XP)).T
+        run = self._filter.along(begin, numbers, Series(nothing, reaching[here], window.voltage))
+        outputs = np.asarray(model.measure(run.states.x.T, Nuisance(*nuisance), _XP)).T
         return FlownWindow(numbers, reaching[here], late[here], begin, run, outputs)
 
     def _moved(self, window: Window, flown: FlownWindow, shared: Array) -> Array:
@@ -144,11 +166,10 @@ class CompiledShooting:
         )
         begins[k + m + d :] = np.diag(scale[k + m + d :])
         late = by_command * scale[k : k + m + d, None, None]
-        series = flown.outputs, flown.commands, window.voltage
-        begin = Begun(self._no_gain(count), begins)
-        roots = np.asarray(flown.run.roots)
-        slopes = -self._c.moved(flown.begin, begin, numbers, directions, series, roots, (k, late))
-        heading = np.asarray(flown.run.states.x)[:, model.vehicle.index("psi")]
+        series = Series(flown.outputs, flown.commands, window.voltage)
+        moves = Moves(Begun(self._no_gain(count), begins), directions, k, late)
+        slopes = -self._filter.moved(flown.begin, numbers, series, flown.run, moves)[0]
+        heading = flown.run.states.x[:, model.vehicle.index("psi")]
         slopes = turned_rows(slopes, model.output_names, heading)
         every = np.zeros((plan.shared + n + d, *slopes.shape[1:]))
         every[:k], every[own : own + m] = slopes[:k], slopes[k : k + m]
