@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, lengthened
 from swashplate.filtering.arriving_commands import commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel, stochastic_model
@@ -28,7 +28,6 @@ from swashplate.identification.time.calibration import as_begun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.record_filter import ahead_of, along
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import lengthened
 from swashplate.validation.closed_loop import closed_ahead
 from swashplate.validation.controller_law import Law, learnt
 

@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, lengthened
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core.multi_step import Horizon
@@ -48,7 +48,6 @@ from swashplate.identification.time.residual_strength import (
 from swashplate.models.residual import coefficients
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
-from swashplate.simulation.compilation import lengthened
 
 _FASTER = (0.3, 1.0, 3.0, 10.0, 30.0)
 """By what the wandering of a drift is multiplied to make errors ahead small."""
