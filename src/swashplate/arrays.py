@@ -21,5 +21,10 @@ def largest_first(sizes: Array) -> NDArray[np.int64]:
     return np.argsort(-np.round(relative / _SAME), kind="stable")
 
 
+def lengthened(rows: Array, length: int) -> Array:
+    """Rows (n, ...) with the last one repeated up to `length` of them."""
+    return np.concatenate([rows, np.repeat(rows[-1:], length - len(rows), axis=0)])
+
+
 IMAGINARY = 1e-30
 """Step of a slope by complex numbers, exact to rounding (Squire and Trapp 1998)."""

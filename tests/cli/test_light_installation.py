@@ -62,9 +62,9 @@ try:
     print(json.dumps(["open", opened.state, not len(drawn[0]["values"]), opened.problem]))
 finally:
     desk.close()
-for name in ("trim", "identify", "simulate_bench"):
+for name in ("trim", "linearize"):
     try:
-        getattr(sp, name)
+        getattr(sp, name)(sp.vehicle("coax"))
     except ImportError as error:
         print(json.dumps([name, type(error).__name__, False, str(error)]))
 """
@@ -112,14 +112,13 @@ def test_the_light_verbs_do_without_what_the_others_name(tmp_path: Path) -> None
     assert all((tmp_path / out / "report.html").is_file() for out in ("responses", "tf", "model", "validation"))
     for verb, code, _, err in told[len(light) : len(light) + len(heavy)]:
         assert (code, err.count("\n")) == (2, 1), err
-        wanted = ("matplotlib", "plot") if verb == "plot" else ("ja", "model")
-        assert f" needs the library {wanted[0]}" in err, (verb, err)
-        assert f"Install it with: pip install 'swashplate[{wanted[1]}]'" in err
+        assert " needs the library " in err, (verb, err)
+        assert f"Install it with: pip install 'swashplate[{'plot' if verb == 'plot' else 'model'}]'" in err
     assert ran.returncode == 0, ran.stderr
     assert told[len(light) + len(heavy)] == ["open", "ready", False, ""]
     late = told[len(light) + len(heavy) + 1 :]
     assert [(name, kind) for name, kind, *_ in late] == [
-        (name, "MissingLibraryError") for name in ("trim", "identify", "simulate_bench")
+        (name, "MissingLibraryError") for name in ("trim", "linearize")
     ]
     assert all(COMMAND in words for *_, words in late)
 

@@ -195,14 +195,12 @@ def conditions(
     changed: Set = None,
     switched: Switch = None,
 ) -> Conditions:
-    """The conditions that the options describe; JAX is set up by this."""
+    """The conditions that the options describe."""
     from swashplate.models.surroundings import environment_of
     from swashplate.physics.atmosphere import air_density
     from swashplate.physics.environment import Environment
-    from swashplate.simulation.compilation import enable_compilation_cache
 
     made = vehicle_of(vehicle, changed, switched, mass)
-    enable_compilation_cache()
     if altitude is not None and not -500.0 <= altitude <= 11_000.0:
         raise SwashError(f"is {altitude:g} m, expected -500 to 11000.", channel="--altitude")
     north, east, down = options.numbers(wind, option="--wind", count=3)

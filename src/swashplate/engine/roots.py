@@ -11,8 +11,12 @@ from swashplate.physics.backend import CasadiBackend
 
 
 def require_casadi() -> Any:
-    """CasADi, or what to do without it."""
-    return library("casadi", what="C code")
+    """CasADi, or what to do without it.
+
+    Raises:
+        MissingLibraryError: where it is not installed.
+    """
+    return library("casadi", what="computing a model")
 
 
 @dataclass(frozen=True)

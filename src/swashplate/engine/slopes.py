@@ -1,4 +1,4 @@
-"""Exact slopes of a graph at a point: of a vehicle's rates by its state and what drives it, and of other functions."""
+"""Exact slopes at a point: of a vehicle's rates by its state and what drives it, and of other functions."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.arrays import Array
-from swashplate.engine.equations import Equations
+from swashplate.arrays import IMAGINARY, Array
+from swashplate.engine.equations import Equations, unpack_rows
 from swashplate.engine.roots import require_casadi
-from swashplate.engine.trace import unrolled_rates
 from swashplate.errors import ExportError
-from swashplate.physics.backend import Backend, CasadiBackend
+from swashplate.physics.backend import ArrayBackend, Backend, CasadiBackend
 
 Scalars = Callable[[Sequence[Any], Sequence[Any], Sequence[Any], Backend], Sequence[Any]]
 """`f(x, w, p, xp)`: a row of scalars of a state row, a driving row and a row of numbers."""
+Slopes = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
+"""Of (x, w, p) the values (m,), their slopes by x (m, n) and by w (m, driving)."""
 
 
 def rates_and_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
@@ -27,47 +28,92 @@ def rates_and_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tupl
         x, w, p: rows as in `engine.trace.traced_rates`.
 
     Raises:
-        ExportError: for equations that CasADi cannot trace.
+        ExportError: for equations that can neither be traced nor take complex numbers.
     """
-    return _split(_slopes_of_rates(equations)(x, w, p), len(x))
+    return _of_rates(equations)(x, w, p)
 
 
-def slopes_graph(f: Scalars, sizes: tuple[int, int, int], *, where: str) -> Any:
-    """A CasADi function of (x, w, p) to the values of `f` and their slopes by x and w, side by side.
+def slopes_of(f: Scalars, sizes: tuple[int, int, int], *, where: str) -> Slopes:
+    """A function's values and slopes: from its graph, or by imaginary steps where CasADi cannot trace it.
+
+    Not traced is what sums over arrays (aerofoil tables).
 
     Args:
-        f: what is traced. sizes: of x, w and p. where: whose it is, for messages.
+        f: what is differentiated. sizes: of x, w and p. where: whose it is, for messages.
 
     Raises:
-        ExportError: where CasADi cannot trace it.
+        ExportError: where CasADi cannot trace it; when it is called, where it takes no complex numbers either.
     """
     casadi = require_casadi()
     x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
     try:
         rows = [[column[i] for i in range(column.shape[0])] for column in (x, w, p)]
-        values = casadi.vertcat(*f(rows[0], rows[1], rows[2], CasadiBackend()))
+        values = casadi.cse(casadi.vertcat(*f(rows[0], rows[1], rows[2], CasadiBackend())))
     except Exception as error:  # whatever a model of another package does with numbers that are none
-        raise ExportError(f"CasADi cannot trace the equations: {error}", where=where) from error
-    return _with_slopes(casadi, x, w, p, values)
+        return _by_imaginary_steps(f, ExportError(f"CasADi cannot trace the equations: {error}", where=where))
+    slopes = casadi.densify(casadi.jacobian(values, casadi.vertcat(x, w)))
+    graph = casadi.Function("slopes", [x, w, p], [casadi.densify(values), slopes], {"cse": True})
 
+    def at(x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
+        values, slopes = (np.asarray(part.full(), dtype=np.float64) for part in graph(x, w, p))
+        return values[:, 0], slopes[:, : len(x)], slopes[:, len(x) :]
 
-def slopes_at(graph: Any, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
-    """Values (m,) and slopes by x (m, n) and by w (m, driving) of a graph of `slopes_graph`."""
-    return _split(graph(x, w, p), len(x))
+    return at
 
 
 @lru_cache(maxsize=64)
-def _slopes_of_rates(equations: Equations) -> Any:
-    casadi, rates = require_casadi(), unrolled_rates(equations)
-    x, w, p = (casadi.SX.sym(name, rates.size1_in(i)) for i, name in enumerate("xwp"))
-    return _with_slopes(casadi, x, w, p, rates(x, w, p))
+def _of_rates(equations: Equations) -> Slopes:
+    vehicle = equations.vehicle
+    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
+
+    def rates(x: Any, w: Any, p: Any, xp: Backend) -> Sequence[Any]:
+        return vehicle.rates(x, *unpack_rows(equations, w, p), xp)
+
+    return slopes_of(rates, sizes, where=vehicle.name)
 
 
-def _with_slopes(casadi: Any, x: Any, w: Any, p: Any, values: Any) -> Any:
-    slopes = casadi.densify(casadi.jacobian(values, casadi.vertcat(x, w)))
-    return casadi.Function("slopes", [x, w, p], [casadi.densify(values), slopes], {"cse": True})
+class _ComplexArrays:
+    """NumPy's functions of numbers whose imaginary part is a slope, where NumPy's own would compare it or lose it."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(np, name)
+
+    @staticmethod
+    def floor(x: Any) -> Any:
+        return np.floor(np.real(x))
+
+    @staticmethod
+    def abs(x: Any) -> Any:
+        return np.where(np.real(x) < 0.0, -x, x)
+
+    @staticmethod
+    def minimum(a: Any, b: Any) -> Any:
+        return np.where(np.real(b) < np.real(a), b, a)
+
+    @staticmethod
+    def maximum(a: Any, b: Any) -> Any:
+        return np.where(np.real(b) > np.real(a), b, a)
+
+    def clip(self, x: Any, low: Any, high: Any) -> Any:
+        return self.minimum(self.maximum(x, low), high)
+
+    @staticmethod
+    def arctan2(y: Any, x: Any) -> Any:
+        turned = np.real(x) * np.imag(y) - np.real(y) * np.imag(x)
+        return np.arctan2(np.real(y), np.real(x)) + 1j * turned / (np.real(x) ** 2 + np.real(y) ** 2)
 
 
-def _split(results: Sequence[Any], n: int) -> tuple[Array, Array, Array]:
-    values, slopes = (np.asarray(part.full(), dtype=np.float64) for part in results)
-    return values[:, 0], slopes[:, :n], slopes[:, n:]
+def _by_imaginary_steps(f: Scalars, refused: ExportError) -> Slopes:
+    """Steps along the imaginary axis, exact to rounding (Squire and Trapp 1998), all directions side by side."""
+
+    def at(x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
+        row, n = np.concatenate([x, w]), len(x)
+        moved = row[:, None] + 1j * IMAGINARY * np.eye(row.size)
+        try:
+            values = f(list(moved[:n]), list(moved[n:]), p.tolist(), ArrayBackend(_ComplexArrays()))
+            told = np.stack([np.broadcast_to(value, row.size) for value in values]).astype(np.complex128)
+        except Exception as error:
+            raise refused from error
+        return told[:, 0].real.copy(), told[:, :n].imag / IMAGINARY, told[:, n:].imag / IMAGINARY
+
+    return at

@@ -20,7 +20,7 @@ from swashplate.export.controller_c import operations_of
 from swashplate.export.regression_c import CYCLES
 from swashplate.extras import library
 from swashplate.filtering import observer
-from swashplate.filtering.matrix_operations import CasadiMatrices
+from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate
 from swashplate.identification.recursive.fourier_regression import EARLY, LATE
 from swashplate.identification.recursive.slow_parameters import SlowPlan
@@ -83,7 +83,7 @@ def slow_parameters_code(plan: SlowPlan, *, name: str = "slow") -> SlowCode:
     )
 
 
-class _Apart(CasadiMatrices):
+class _Apart(Matrices):
     """The observer's operations, with its covariance left to the loops: only its slopes are traced."""
 
     slopes: Any

@@ -11,11 +11,6 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.models.vehicle import Vehicle
 
 
-def lengthened(rows: Array, length: int) -> Array:
-    """Rows (n, ...) with the last one repeated up to `length` of them."""
-    return np.concatenate([rows, np.repeat(rows[-1:], length - len(rows), axis=0)])
-
-
 def commands_moved(vehicle: Vehicle, dt: float, inputs: Array, nuisance: Nuisance) -> tuple[Array, Array]:
     """What reaches the vehicle at each sample, to be held there: trimmed, and later than logged; and its slopes by each
     input's delay [1/s]. Both (n, n_inputs).

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from swashplate.filtering.matrix_operations import Matrices, change
+from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import (
     Numbers,
     ObserverEstimate,
@@ -41,5 +41,5 @@ def predicted_steadily(
     xp, dt, e = M.xp, plan.dt, estimate.mean
     if any(at.kept for at in plan.sampling):
         e = M.value(lambda e, w: keeping(plan, numbers, e, w, xp), e, M.column([*M.scalars(w), *taken]))
-    step = change(lambda e, w: moving(plan, numbers, e, w, xp), e, w, dt, M)
+    step = M.change(lambda e, w: moving(plan, numbers, e, w, xp), e, w, dt)
     return ObserverEstimate(e + step, estimate.covariance)

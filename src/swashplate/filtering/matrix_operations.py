@@ -1,140 +1,104 @@
-"""The few matrix operations of the observer, for JAX and for CasADi.
+"""The matrix operations of the observer as CasADi expressions: columns (n, 1) and matrices.
 
-The observer is written once, on columns (n, 1) and matrices with `@`, `.T`, `*`, `+` and slices, which both have; what
-they write differently is here.
+`@`, `.T`, `*`, `+` and slices are CasADi's own; the rest is here, and the covariance's algebra, which C of an observer
+may replace by loops (`export.slow_parameters_c`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from swashplate.jax_on_demand import jax, jnp
+from swashplate.engine.roots import require_casadi
 from swashplate.physics.backend import Backend, CasadiBackend
-from swashplate.simulation.dynamics import jax_backend
+from swashplate.simulation.discretisation import held_series
 from swashplate.simulation.runge_kutta import rk4_change
 
 Scalars = Callable[[Sequence[Any], Sequence[Any]], Sequence[Any]]
 """A function of two rows of scalars; scalars back."""
 
 
-class Matrices(Protocol):
-    """Operations beyond `@`, `.T`, `*`, `+` and slices."""
-
-    looped: bool
-    """Whether the stages of a Runge-Kutta step are a loop, compiled once."""
-
-    @property
-    def xp(self) -> Backend: ...
-    def column(self, scalars: Sequence[Any], /) -> Any: ...
-    def scalars(self, column: Any, /) -> list[Any]: ...
-    def value(self, f: Scalars, x: Any, w: Any, /) -> Any: ...
-    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]: ...
-    def stacked(self, parts: Sequence[Any], /) -> Any: ...
-    def diagonal(self, values: Any, /) -> Any: ...
-
-
-def change(rates: Scalars, x: Any, w: Any, dt: float, M: Matrices) -> Any:
-    """How far a Runge-Kutta step of length `dt` [s] takes a column `x` under a column `w` that stays."""
-    return rk4_change(lambda x, w: M.value(rates, x, w), x, lambda _: w, dt, looped=M.looped)
-
-
-class JaxMatrices:
-    """Columns are arrays (n, 1)."""
-
-    looped = True
+class Matrices:
+    """Operations of one graph: functions are traced once for each place in the program that calls them."""
 
     def __init__(self) -> None:
-        self.xp: Backend = jax_backend()
-
-    def column(self, scalars: Sequence[Any], /) -> Any:
-        return jnp.stack([jnp.reshape(jnp.asarray(s, dtype=float), ()) for s in scalars])[:, None]
-
-    def scalars(self, column: Any, /) -> list[Any]:
-        return [column[i, 0] for i in range(column.shape[0])]
-
-    def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
-        return self.column(f(self.scalars(x), self.scalars(w)))
-
-    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
-        """Value (m, 1) and Jacobian by x (m, n)."""
-        rest = self.scalars(w)
-
-        def both(row: Any) -> tuple[Any, Any]:
-            value = self.column(f([row[i] for i in range(x.shape[0])], rest))[:, 0]
-            return value, value
-
-        J, value = jax.jacfwd(both, has_aux=True)(x[:, 0])
-        return value[:, None], J
-
-    def row(self, scalars: Sequence[Any], /) -> Any:
-        """Scalars side by side."""
-        return self.column(scalars)[:, 0]
-
-    def matrix(self, row: Any, rows: int, columns: int, /) -> Any:
-        """A matrix from a row of its entries, row after row; `flat` is the way back."""
-        return row.reshape(rows, columns)
-
-    def flat(self, matrix: Any, /) -> Any:
-        return matrix.ravel()
-
-    def stacked(self, parts: Sequence[Any], /) -> Any:
-        """One above the other."""
-        return jnp.concatenate(parts, axis=0)
-
-    def diagonal(self, values: Any, /) -> Any:
-        """A matrix of a row's values."""
-        return jnp.eye(len(values)) * values
-
-
-class CasadiMatrices:
-    """The observer's matrix operations as CasADi expressions."""
-
-    looped = False
-
-    def __init__(self) -> None:
+        self._casadi = require_casadi()
         self.xp: Backend = CasadiBackend()
         self._made: dict[Any, Any] = {}
 
     def column(self, scalars: Sequence[Any], /) -> Any:
-        import casadi
-
-        return casadi.vertcat(*scalars)
+        return self._casadi.vertcat(*scalars)
 
     def scalars(self, column: Any, /) -> list[Any]:
         return [column[i] for i in range(column.shape[0])]
 
-    def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
-        """Without the slopes, which a call would compute all the same."""
-        import casadi
-
-        key = (f.__code__, x.shape[0], w.shape[0], "value")
-        if key not in self._made:
-            xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
-            outputs = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
-            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [outputs])
-        return self._made[key](x, w)
-
-    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
-        """Traced once per place in the program: the four stages of a Runge-Kutta step call one function."""
-        import casadi
-
-        key = (f.__code__, x.shape[0], w.shape[0])
-        if key not in self._made:
-            xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
-            outputs = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
-            slopes = casadi.jacobian(outputs, xs)
-            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [outputs, slopes])
-        return tuple(self._made[key](x, w))
-
     def stacked(self, parts: Sequence[Any], /) -> Any:
-        import casadi
-
-        return casadi.vertcat(*parts)
+        """One above the other."""
+        return self._casadi.vertcat(*parts)
 
     def diagonal(self, values: Any, /) -> Any:
-        import casadi
+        """A matrix of a row's values."""
+        return self._casadi.diag(self._casadi.DM(np.asarray(values)))
 
-        return casadi.diag(casadi.DM(np.asarray(values)))
+    def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
+        """A column (m, 1) of columns, without the slopes, which a call would compute all the same."""
+        return self._traced(f, x, w, slopes=False)(x, w)
+
+    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
+        """Value (m, 1) and Jacobian by x (m, n)."""
+        return tuple(self._traced(f, x, w, slopes=True)(x, w))
+
+    def change(self, rates: Scalars, x: Any, w: Any, dt: float) -> Any:
+        """How far a Runge-Kutta step of length `dt` [s] takes a column `x` under a column `w` that stays."""
+        return rk4_change(lambda x, w: self.value(rates, x, w), x, lambda _: w, dt)
+
+    def _traced(self, f: Scalars, x: Any, w: Any, *, slopes: bool) -> Any:
+        """The four stages of a Runge-Kutta step call one function."""
+        casadi, key = self._casadi, (f.__code__, x.shape[0], w.shape[0], slopes)
+        if key not in self._made:
+            xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
+            values = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
+            told = [values, casadi.jacobian(values, xs)] if slopes else [values]
+            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], told)
+        return self._made[key]
+
+    def updated(
+        self, H: Any, mean: Any, covariance: Any, innovations: Any, measurement: Any, /
+    ) -> tuple[Any, Any, Any]:
+        """Mean (N, 1) and covariance (N, N) after readings, and the covariance of the innovations (m, m).
+
+        Args:
+            H: slopes of the readings (m, N). mean, covariance: predicted.
+            innovations: (m, 1). measurement: variance of each reading.
+        """
+        together = H @ covariance
+        spread = H @ together.T + self.diagonal(measurement)
+        # Rows of [S | H P | innovation] without those above them, the pivots' roots taken out: a Cholesky factor L of
+        # S and behind it L^-1 H P and L^-1 times the innovation, in which the update is a plain product.
+        left, rows, m = self.stacked([spread, together.T, innovations.T]).T, [], innovations.shape[0]
+        for i in range(m):
+            (pivot,) = self.scalars(left[:1, :1])
+            row = left[:1, :] * (1.0 / self.xp.sqrt(pivot))
+            rows.append(row[:, m - i :])
+            if i + 1 < m:
+                left = left[1:, 1:] - row[:, 1 : m - i].T @ row[:, 1:]
+        known = self.stacked(rows)
+        told, news = known[:, : mean.shape[0]], known[:, mean.shape[0] :]
+        return mean + told.T @ news, covariance - told.T @ told, spread
+
+    def propagated(self, A: Any, J: Any | None, P: Any, process: Any, dt: float, /) -> Any:
+        """The covariance (N, N) one sample later.
+
+        Args:
+            A: slopes of the rates of what moves, the first of what is estimated.
+            J: slopes (kept, N) of the readings put in store, the last of it; None for none.
+            P: now. process: variance that a sample adds to each. dt: length of the sample [s].
+        """
+        moves, own = A.shape[0], P.shape[0] - (0 if J is None else J.shape[0])
+        F, _ = held_series(A, dt, np.eye(moves))
+        for _ in range(2):  # rows of what moves, of offsets, of kept readings; then from the other side
+            stored = [] if J is None else [J @ P]
+            P = self.stacked([F @ P[:moves, :], P[moves:own, :], *stored]).T
+        return 0.5 * (P + P.T) + self.diagonal(process)

@@ -9,7 +9,7 @@ the update eliminates reading after reading and inverts no matrix (Bar-Shalom, L
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -17,16 +17,16 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.engine.equations import Equations
+from swashplate.engine.slopes import slopes_of
 from swashplate.errors import ControllerError
 from swashplate.filtering.disturbances import DISTURBED, Unrest, on_axes
-from swashplate.filtering.matrix_operations import Matrices, change
+from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.sensor_suite import BIASED, Suite, biased, readings
 from swashplate.models.nesting import rebuild
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.discretisation import held_series
 
 _BODY = len(RigidBody._fields)
 
@@ -259,6 +259,17 @@ def keeping(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[
     return after
 
 
+OfObserver = Callable[[ObserverPlan, Numbers, Sequence[Any], Sequence[Any], Backend], list[Any]]
+"""`shown`, `keeping`."""
+
+
+def linearised_at(of: OfObserver, plan: ObserverPlan, numbers: Numbers, e: Array, w: Array) -> tuple[Array, Array]:
+    """Value (m,) and slopes by what is estimated (m, N) at estimates (N,) under a driving row."""
+    plain = Numbers(*(None if part is None else np.asarray(part).tolist() for part in numbers))
+    slopes = slopes_of(lambda e, w, _, xp: of(plan, plain, e, w, xp), (len(e), len(w), 0), where="the observer")
+    return slopes(e, w, np.zeros(0))[:2]
+
+
 # ---- the filter --------------------------------------------------------------------------------------------------
 def corrected(
     plan: ObserverPlan,
@@ -281,7 +292,7 @@ def corrected(
     """
     xp = M.xp
     flags = [flag for flag, sensor in zip(due, plan.sensors, strict=True) for _ in sensor.channels]
-    m, first = len(flags), plan.inputs + 1
+    first = plan.inputs + 1
 
     def heard(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
         """What arrives now; zero, whatever is estimated, of what does not."""
@@ -290,26 +301,8 @@ def corrected(
 
     expected, H = M.linearised(heard, estimate.mean, M.column([*M.scalars(w), *flags]))
     innovations = M.column(innovations_of(plan, M.column(flags) * y, expected, M))
-    own = getattr(M, "updated", None)  # operations that have one of their own for this may use it
-    if own is not None and (update := own(H, *estimate, innovations, numbers.measurement)) is not None:
-        mean, covariance, spread = update
-        return ObserverEstimate(mean, covariance), innovations, spread
-    together = H @ estimate.covariance
-    spread = H @ together.T + M.diagonal(numbers.measurement)
-    # Rows of [S | H P | innovation] without those above them, the pivots' roots taken out: a Cholesky factor L of S
-    # and behind it L^-1 H P and L^-1 times the innovation, in which the update is a plain product.
-    left, rows = M.stacked([spread, together.T, innovations.T]).T, []
-    for i in range(m):
-        (pivot,) = M.scalars(left[:1, :1])
-        row = left[:1, :] * (1.0 / xp.sqrt(pivot))
-        rows.append(row[:, m - i :])
-        if i + 1 < m:
-            left = left[1:, 1:] - row[:, 1 : m - i].T @ row[:, 1:]
-    known = M.stacked(rows)
-    N = len(plan.names)
-    told, news = known[:, :N], known[:, N:]
-    after = ObserverEstimate(estimate.mean + told.T @ news, estimate.covariance - told.T @ told)
-    return after, innovations, spread
+    mean, covariance, spread = M.updated(H, *estimate, innovations, numbers.measurement)
+    return ObserverEstimate(mean, covariance), innovations, spread
 
 
 def innovations_of(plan: ObserverPlan, y: Any, expected: Any, M: Matrices) -> list[Any]:
@@ -339,9 +332,9 @@ def predicted(
         return moving(plan, numbers, e, w, xp)
 
     x = begin[:moves, :]
-    moved = change(rates, x, w, dt, M)
+    moved = M.change(rates, x, w, dt)
     _, A = M.linearised(rates, x + 0.5 * moved, w)
-    mean, stored, J = [x + moved, begin[moves:own, :]], [], None
+    mean, J = [x + moved, begin[moves:own, :]], None
     if any(at.kept for at in plan.sampling):
 
         def kept(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
@@ -349,11 +342,4 @@ def predicted(
 
         readings, J = M.linearised(kept, begin, M.column([*M.scalars(w), *taken]))
         mean.append(readings)
-    at_once = getattr(M, "propagated", None)
-    if at_once is not None and (covariance := at_once(A, J, P, numbers.process, dt)) is not None:
-        return ObserverEstimate(M.stacked(mean), covariance)
-    F, _ = held_series(A, dt, np.eye(moves))
-    for _ in range(2):  # the moved states' rows, the offsets', the kept readings'; then the same from the other side
-        stored = [] if J is None else [J @ P]
-        P = M.stacked([F @ P[:moves, :], P[moves:own, :], *stored]).T
-    return ObserverEstimate(M.stacked(mean), 0.5 * (P + P.T) + M.diagonal(numbers.process))
+    return ObserverEstimate(M.stacked(mean), M.propagated(A, J, P, numbers.process, dt))

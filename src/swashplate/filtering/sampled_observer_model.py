@@ -11,7 +11,6 @@ from swashplate.arrays import Array
 from swashplate.filtering import observer
 from swashplate.filtering.disturbances import DISTURBED
 from swashplate.filtering.observer import Numbers, ObserverPlan
-from swashplate.filtering.observer_slopes import linearised_at
 from swashplate.simulation.discretisation import held_late, with_late_inputs
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim import Trim
@@ -123,4 +122,4 @@ def outputs(plan: ObserverPlan, numbers: Numbers, trim: Trim) -> Array:
         return np.zeros((0, len(plan.names)))
     e = np.concatenate([trim.state, np.zeros(len(plan.names) - plan.n)])
     w = np.array([*trim.inputs, trim.environment.voltage], dtype=np.float64)
-    return linearised_at(observer.shown, plan, numbers, e, w)[1]
+    return observer.linearised_at(observer.shown, plan, numbers, e, w)[1]

@@ -9,10 +9,9 @@ import zlib
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import platformdirs
 
-from swashplate.arrays import Array
+from swashplate.arrays import lengthened as lengthened
 from swashplate.atomic import write_text
 from swashplate.errors import WriteError
 from swashplate.jax_on_demand import option, set_option
@@ -20,13 +19,6 @@ from swashplate.jax_on_demand import option, set_option
 QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
 """Options for `jax.jit`: a helicopter's exact derivatives compile four times faster, loops of one vehicle by a sixth to
 a third, and run as fast; a batch runs 5 % slower."""
-
-QUICK_FLIGHT = {
-    **QUICK_TO_COMPILE,
-    "xla_disable_hlo_passes": "simplify-while-loops,while-loop-invariant-code-motion,while-loop-constant-sinking",
-}
-"""Of flights: passes are left out that look for what may leave a loop. A tenth to two fifths less compiling than
-`QUICK_TO_COMPILE`, and steps as fast."""
 
 FEW_PASSES = {**QUICK_TO_COMPILE, "xla_backend_optimization_level": 1}
 """Options for `jax.jit` of runs and slopes along records: a seventh to a third less compiling than
@@ -37,23 +29,6 @@ RUN_RARELY = {**QUICK_TO_COMPILE, "xla_backend_optimization_level": 0}
 
 _SMALL_LOOP = "xla_cpu_small_while_loop_byte_threshold"
 _SMALL_LOOP_BYTES = 1_000_000
-
-
-_SHORTEST = 64
-
-
-def shared_length(n: int) -> int:
-    """A length of at least `n` that many series share: 64, 96, 128, 192, 256... (powers of two, and halfway).
-
-    XLA compiles a loop anew for every length, for seconds; a sample too many costs microseconds.
-    """
-    whole = max(_SHORTEST, 1 << (max(n, 1) - 1).bit_length())
-    return 3 * whole // 4 if n <= 3 * whole // 4 and whole > _SHORTEST else whole
-
-
-def lengthened(rows: Array, length: int) -> Array:
-    """Rows (n, ...) with the last one repeated up to `length` of them."""
-    return np.concatenate([rows, np.repeat(rows[-1:], length - len(rows), axis=0)])
 
 
 def compile_small_loops_whole() -> None:
@@ -145,12 +120,3 @@ def _unpacks(content: bytes) -> bool:
         return len(unpack(content)) > 0
     except Exception:  # each library has errors of its own
         return False
-
-
-def dispatch_in_line() -> None:
-    """Let JAX run compiled code in the thread that calls it, for a process that waits for every small step.
-
-    By default the CPU back end hands every program with a loop to another thread (measured: 45 us a call). An option
-    that is read when JAX first computes; called by entry points that own their process.
-    """
-    set_option("jax_cpu_enable_async_dispatch", False)

@@ -1,4 +1,4 @@
-"""The table of derivatives by automatic differentiation of the nonlinear equations."""
+"""The table of derivatives by exact slopes of the nonlinear equations."""
 
 from __future__ import annotations
 
@@ -6,21 +6,16 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float
 
-from swashplate.arrays import Array
 from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row, unpack_rows
-from swashplate.engine.slopes import slopes_at, slopes_graph
-from swashplate.errors import ExportError, SwashError
-from swashplate.jax_on_demand import jax, jit, jnp
+from swashplate.engine.slopes import Slopes, slopes_of
+from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import COLUMNS, CONTROLS, MOTIONS, DerivativeTable
 from swashplate.models.conventional.helicopter import CONTRIBUTORS, loads
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
-from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dynamics import enable_double_precision, jax_backend
 from swashplate.simulation.trim import Trim
 
 if TYPE_CHECKING:
@@ -40,11 +35,10 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
     """
     if not isinstance(vehicle.options, HelicopterOptions):
         raise SwashError("has no table of derivatives.", where=vehicle.name, hint="It needs a single-rotor card.")
-    enable_double_precision()
     surroundings = [float(getattr(trim.environment, name)) for name in SURROUNDINGS]
     w = np.array([*trim.inputs, *surroundings])
     numbers = parameter_row(vehicle, trim.environment)
-    by_x, by_w = _exact_slopes(equations_of(vehicle), np.asarray(trim.state), w, numbers)
+    _, by_x, by_w = _slopes(equations_of(vehicle))(np.asarray(trim.state), w, numbers)
     fast = [vehicle.index(name) for name in _FAST if name in vehicle.state_names]
     motions = [vehicle.index(name) for name in MOTIONS]
     controls = [vehicle.input_names.index(name) for name in CONTROLS]
@@ -63,33 +57,19 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
     return DerivativeTable(parts, following[:2], "automatic differentiation")
 
 
-def _exact_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tuple[Array, Array]:
-    """From the graph, or by XLA where CasADi cannot trace the equations (sums over arrays)."""
-    try:
-        _, by_x, by_w = slopes_at(_graph(equations, len(x), len(w), len(p)), x, w, p)
-    except ExportError:
-        by_x, by_w = _compiled_slopes(equations, x, w, p)
-    return np.asarray(by_x), np.asarray(by_w)
-
-
 @lru_cache(maxsize=16)
-def _graph(equations: Equations, states: int, driving: int, numbers: int) -> Any:
+def _slopes(equations: Equations) -> Slopes:
+    vehicle = equations.vehicle
+    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
+
     def acting(x: Rows, w: Rows, p: Rows, xp: Backend) -> list[Any]:
         return _acting(equations, x, w, p=p, xp=xp)
 
-    return slopes_graph(acting, (states, driving, numbers), where=equations.vehicle.name)
-
-
-@jit(static_argnums=0, compiler_options=RUN_RARELY)
-def _compiled_slopes(equations: Equations, x: Array, w: Array, p: Float[jax.Array, " parameters"]) -> tuple[Any, Any]:
-    def acting(x: Float[jax.Array, " states"], w: Float[jax.Array, " inputs"]) -> Any:
-        return jnp.stack([jnp.asarray(value, x.dtype) for value in _acting(equations, x, w, p=p, xp=jax_backend())])
-
-    return jax.jacfwd(acting, argnums=(0, 1))(x, w)
+    return slopes_of(acting, sizes, where=vehicle.name)
 
 
 def _acting(equations: Equations, x: Rows, w: Rows, *, p: Rows, xp: Backend) -> list[Any]:
-    """Forces and moments by contributor, and the rates of disc and inflow; rows as of `row_rates`."""
+    """Forces and moments by contributor, and the rates of disc and inflow; rows as of `engine.trace.traced_rates`."""
     vehicle = equations.vehicle
     inputs, parameters, environment = unpack_rows(equations, w, p)
     state = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from jaxtyping import Float, Num
-
 from swashplate.jax_on_demand import jax, jnp
 from swashplate.simulation.discretisation import held_series
 
 _HALVINGS, _TERMS = 8, 5
 
 
-def gathered_noise(
-    A: Num[jax.Array, "n n"], W: Num[jax.Array, "n n"], dt: Float[jax.Array, ""] | float
-) -> tuple[Any, Any]:
+def gathered_noise(A: jax.Array, W: jax.Array, dt: jax.Array | float) -> tuple[Any, Any]:
     """Transition e^(A dt) and the noise gathered meanwhile, the integral of e^(As) W e^(A's), to be differentiated.
 
     Series over a small part of the sample, then doubled (Van Loan's exponential of twice the size takes five times as
@@ -33,7 +29,7 @@ def gathered_noise(
     return summed(transition, h * gathered, _HALVINGS)
 
 
-def summed(F: Num[jax.Array, "n n"], W: Num[jax.Array, "n n"], doublings: int) -> tuple[Any, Any]:
+def summed(F: jax.Array, W: jax.Array, doublings: int) -> tuple[Any, Any]:
     """F^n and the sum of F^k W F'^k over k below n = 2^doublings (Smith 1968, SIAM J. Appl. Math. 16, 198-201)."""
 
     def double(carry: tuple[Any, Any], _: None) -> tuple[tuple[Any, Any], None]:

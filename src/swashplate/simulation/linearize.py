@@ -13,6 +13,7 @@ from scipy.linalg import eig, schur, solve_sylvester
 from swashplate import atomic
 from swashplate.arrays import Array, Complex, largest_first
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
+from swashplate.engine.slopes import rates_and_slopes
 from swashplate.models.delays import known_delays
 from swashplate.models.linear import python_control
 from swashplate.models.linear.matrices_file import state_space_of_matrices
@@ -21,7 +22,6 @@ from swashplate.models.linear.state_space_file import to_toml
 from swashplate.models.residual import refuse_predictor
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
-from swashplate.simulation.dynamics import enable_double_precision, rates_and_slopes
 from swashplate.simulation.modes import Mode
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
@@ -197,7 +197,6 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
         TrimError: where no trim is given and it has no hover.
     """
     refuse_predictor(vehicle, "linear models and controllers")
-    enable_double_precision()
     about = trim if trim is not None else find_trim(vehicle)
     surroundings = [getattr(about.environment, name) for name in SURROUNDINGS]
     w = np.array([*about.inputs, *surroundings], dtype=np.float64)

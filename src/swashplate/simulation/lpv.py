@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
 from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
+from swashplate.engine.slopes import rates_and_slopes
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
@@ -31,7 +32,6 @@ from swashplate.models.linear.stitching import stitch_points
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
-from swashplate.simulation.dynamics import rates_and_slopes
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.reduction import PAPER_INPUTS, PAPER_STATES, paper_model

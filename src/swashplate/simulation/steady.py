@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from swashplate.arrays import IMAGINARY, Array
 from swashplate.engine.equations import Equations
+from swashplate.engine.slopes import Slopes, rates_and_slopes
 from swashplate.jax_on_demand import jax, jnp
 from swashplate.physics.backend import ArrayBackend, Backend
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import jax_backend, rates_and_slopes, row_rates
+from swashplate.simulation.dynamics import jax_backend, row_rates
 
-Slopes = Callable[[Array, Array, Array], tuple[Any, Any, Any]]
-"""Rates and their slopes by state and driving row, of (x, w, p)."""
 BODY = len(RigidBody._fields)
 ACCELERATIONS = slice(3, 6)
 ANGULAR_ACCELERATIONS = slice(9, 12)
@@ -27,10 +24,7 @@ _XP = ArrayBackend()
 
 
 def assemble(
-    equations: Equations,
-    z: Float[jax.Array | np.ndarray, " unknowns"],
-    course: Float[jax.Array | np.ndarray, " course"],
-    xp: Backend | None = None,
+    equations: Equations, z: Array | jax.Array, course: Array | jax.Array, xp: Backend | None = None
 ) -> tuple[Any, Any]:
     """State and input rows of a steady flight from the unknowns (traceable).
 
@@ -60,10 +54,10 @@ def assemble(
 
 def unrest(
     equations: Equations,
-    z: Float[jax.Array, " unknowns"],
-    course: Float[jax.Array, " course"],
-    row: Float[jax.Array, " surroundings"],
-    p: Float[jax.Array, " parameters"],
+    z: jax.Array,
+    course: jax.Array,
+    row: jax.Array,
+    p: jax.Array,
 ) -> tuple[Any, Any]:
     """What should vanish in the steady flight that `assemble` makes, and its derivatives by the unknowns (traceable).
 
@@ -72,7 +66,7 @@ def unrest(
         row, p: `SURROUNDINGS`, and parameters with `CONSTANTS`.
     """
 
-    def rest(z: Float[jax.Array, " unknowns"]) -> tuple[Any, Any]:
+    def rest(z: jax.Array) -> tuple[Any, Any]:
         state, inputs = assemble(equations, z, course)
         rates = row_rates(equations, padded=False)(state, jnp.concatenate([inputs, row]), p)
         value = jnp.concatenate([rates[ACCELERATIONS], rates[ANGULAR_ACCELERATIONS], rates[BODY:]])
@@ -85,10 +79,16 @@ def unrest(
 def unrest_at(
     equations: Equations, z: Array, course: Array, row: Array, p: Array, slopes: Slopes | None = None
 ) -> tuple[Array, Array]:
-    """`unrest` by NumPy, from the rates and slopes that are compiled for linear models too, or others of these."""
+    """What should vanish in the steady flight that `assemble` makes, and its slopes by the unknowns.
+
+    Args:
+        z, course: as in `assemble`.
+        row, p: `SURROUNDINGS`, and parameters with `CONSTANTS`.
+        slopes: of the rates; those of the graph by default.
+    """
     state, inputs = assemble(equations, z, course, _XP)
     taken = slopes or partial(rates_and_slopes, equations)
-    rates, by_x, by_w = map(np.asarray, taken(state, np.concatenate([inputs, row]), p))
+    rates, by_x, by_w = taken(state, np.concatenate([inputs, row]), p)
     held, inside = dict(equations.vehicle.trim_held), len(state) - BODY
     free = [name not in held for name in equations.vehicle.input_names]
     by_z, by_input = np.zeros((len(state), z.size)), np.zeros((len(inputs), z.size))

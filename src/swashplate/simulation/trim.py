@@ -20,7 +20,6 @@ from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.ground_contact import Grip
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.steady import ACCELERATIONS, ANGULAR_ACCELERATIONS, BODY, assemble, unrest_at
 
 _XP = ArrayBackend()
@@ -134,7 +133,6 @@ def trim(
     Raises:
         TrimError: naming the input whose limit prevents it, or the state that does not come to rest.
     """
-    enable_double_precision()
     surroundings = environment_of(vehicle, environment)
     if voltage is not None:
         surroundings = surroundings._replace(voltage=voltage)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.arrays import Array
-from swashplate.filtering.arriving_commands import commands_moved, lengthened
+from swashplate.arrays import Array, lengthened
+from swashplate.filtering.arriving_commands import commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel, stochastic_model
 from swashplate.filtering.filter_code import Series

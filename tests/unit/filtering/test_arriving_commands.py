@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swashplate.filtering.arriving_commands import commands_moved, lengthened
+from swashplate.filtering.arriving_commands import commands_moved
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.models.catalogue import vehicle
 
@@ -62,12 +62,3 @@ def test_slopes_by_a_delay_are_those_of_the_commands() -> None:
         for side in (step, -step)
     ]
     np.testing.assert_allclose(slope, (sides[0] - sides[1]) / (2.0 * step), rtol=1e-6, atol=1e-5)
-
-
-def test_series_are_lengthened_by_their_last_sample() -> None:
-    assert lengthened(np.array([[1.0, 2.0], [3.0, 4.0]]), 4).tolist() == [
-        [1.0, 2.0],
-        [3.0, 4.0],
-        [3.0, 4.0],
-        [3.0, 4.0],
-    ]

@@ -7,12 +7,11 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import jax
-import jax.numpy as jnp
+import casadi
 import numpy as np
 import pytest
 
@@ -25,7 +24,7 @@ from swashplate.control.lqg.design import design
 from swashplate.errors import ControllerError
 from swashplate.filtering import disturbances
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.matrix_operations import JaxMatrices
+from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import ObserverEstimate, arriving, corrected, predicted
 from swashplate.filtering.periodic_gain import steady_gains
 from swashplate.filtering.sensor_suite import suite
@@ -33,7 +32,6 @@ from swashplate.models.catalogue import vehicle
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space_file import structure
 from swashplate.simulation.closed_loop import simulate_closed_loop
-from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.wind import INDOOR
 
@@ -64,18 +62,14 @@ def test_constant_gains_are_the_filters_after_a_long_time(which: str) -> None:
     assert gains.shape == (2, len(plan.names), 12)
     assert not np.any(gains[1][:, 6:])  # no motion capture in between
     estimate = ObserverEstimate(controller.first_estimate().mean, covariances[0])
-    w = np.append(controller.start.inputs, controller.start.environment.voltage)[:, None]
-
-    @partial(jax.jit, compiler_options=RUN_RARELY)
-    def sample(mean: Any, P: Any, due: Any) -> Any:
-        M = JaxMatrices()
-        y = M.value(lambda e, w: arriving(plan, numbers, e, w, M.xp), mean, w)
-        after, _, _ = corrected(plan, numbers, ObserverEstimate(mean, P), y, list(due), w, M)
-        return predicted(plan, numbers, after, w, list(due), M)
-
-    mean, P = (jnp.asarray(part) for part in estimate)
-    for due in ([1.0, 1.0], [1.0, 0.0]):
-        mean, P = sample(mean, P, jnp.array(due))
+    w, M, N = casadi.DM([*controller.start.inputs, controller.start.environment.voltage]), Matrices(), len(plan.names)
+    mean, P, due = given = [casadi.MX.sym(*size) for size in (("mean", N), ("P", N, N), ("due", 2))]
+    y = M.value(lambda e, w: arriving(plan, numbers, e, w, M.xp), mean, w)
+    after, _, _ = corrected(plan, numbers, ObserverEstimate(mean, P), y, M.scalars(due), w, M)
+    sample = casadi.Function("sample", given, predicted(plan, numbers, after, w, M.scalars(due), M))
+    mean, P = estimate
+    for flags in ([1.0, 1.0], [1.0, 0.0]):
+        mean, P = sample(mean, P, flags)
     sigma = np.sqrt(np.diag(covariances[0]))
     assert np.max(np.abs(np.asarray(P) - covariances[0]) / np.outer(sigma, sigma)) < 1e-3
     assert np.max(np.abs(np.asarray(mean) - estimate.mean)[:, 0] / sigma) < 1e-3

@@ -6,26 +6,24 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
 import swashplate as sp
 from swashplate.bench.virtual_bench import virtual_bench
+from swashplate.engine.equations import equations_of, parameter_row
+from swashplate.engine.slopes import rates_and_slopes
 from swashplate.errors import BenchError, CardError
 from swashplate.models.catalogue import from_card, vehicle
 from swashplate.models.coax_rotors import InflowOptions, RotorPair, balanced_hover, rotor_pair
 from swashplate.models.coax_vehicle import acting_at, rotor_factors
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import CasadiBackend, FloatBackend, JaxBackend
+from swashplate.physics.backend import CasadiBackend, FloatBackend
 from swashplate.physics.coaxial_wake import Induced
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.frames import Vector
-from swashplate.simulation.dynamics import enable_double_precision
 
-enable_double_precision()
 XP = FloatBackend()
 FROZEN = json.loads((Path(__file__).parent / "frozen_rates.json").read_text())
 
@@ -294,7 +292,7 @@ ALL = {"tip_loss": True, "induced_factor": True, "ground_effect": "hayden"}
         ("raptor50", {"inflow": "pitt-peters", **ALL}),
     ],
 )
-def test_floats_jax_and_casadi_compute_the_same(name: str, options: dict[str, object]) -> None:
+def test_floats_and_casadi_compute_the_same(name: str, options: dict[str, object]) -> None:
     casadi = pytest.importorskip("casadi")
     flown, rng = vehicle(name, **options), np.random.default_rng(0)
     x = 0.1 * rng.normal(size=len(flown.state_names))
@@ -303,17 +301,12 @@ def test_floats_jax_and_casadi_compute_the_same(name: str, options: dict[str, ob
         x[i] += {"omega": 220.0, "induc": 2.0}.get(state[:5], 0.0)
     u = [0.5 * (low + high) for low, high in flown.input_limits]
     floats = flown.rates(x, u, flown.values())
-    with_jax = [float(rate) for rate in flown.rates(x, u, flown.values(), xp=JaxBackend())]
     row = casadi.SX.sym("x", len(x))
     traced = casadi.Function("f", [row], [casadi.vertcat(*flown.rates(row, u, flown.values(), xp=CasadiBackend()))])
-    np.testing.assert_allclose(with_jax, floats, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(np.array(traced(x)).ravel(), floats, rtol=1e-11, atol=1e-11)
 
 
 def test_slopes_are_finite_where_everything_stands_still() -> None:
     flown = vehicle("coax", rotor="inflow", ground_effect="cheeseman-bennett")
-
-    def rates(x: jax.Array) -> jax.Array:
-        return jnp.stack([jnp.asarray(r, float) for r in flown.rates(x, (0.0,) * 4, flown.values(), xp=JaxBackend())])
-
-    assert np.all(np.isfinite(jax.jacfwd(rates)(jnp.zeros(len(flown.state_names)))))
+    x, w, p = np.zeros(len(flown.state_names)), np.zeros(8), parameter_row(flown, Environment())
+    assert np.all(np.isfinite(rates_and_slopes(equations_of(flown), x, w, p)[1]))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swashplate.simulation.dynamics import enable_double_precision
-from swashplate.simulation.runge_kutta import rk4_step, rk4_steps
+from swashplate.simulation.runge_kutta import rk4_step
 
 
 def falling(x: float, w: float) -> float:
@@ -47,8 +47,3 @@ def test_in_a_loop_it_is_the_step_written_out() -> None:
 
     once = [rk4_step(rates, x, drive, 0.1, looped=looped) for looped in (False, True)]
     np.testing.assert_allclose(once[0], once[1], rtol=1e-15)
-    thrice = x
-    for i in range(3):
-        thrice = rk4_step(rates, thrice, lambda fraction, i=i: drive(i + fraction), 0.1, looped=False)
-    found = rk4_steps(rates, x, lambda i, fraction: drive(i + fraction), 0.1, 3)
-    np.testing.assert_allclose(found, thrice, rtol=1e-14)

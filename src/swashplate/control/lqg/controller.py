@@ -20,7 +20,6 @@ from swashplate.engine.law import FELT, LawGraph, draw_names
 from swashplate.errors import ControllerError
 from swashplate.filtering import disturbances, observer
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
-from swashplate.filtering.observer_slopes import linearised_at
 from swashplate.filtering.sensor_suite import BIASED
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
@@ -125,7 +124,7 @@ class Lqg(Controller):
         if own < N:
             deepest = max(at.kept for at in plan.sampling)
             for _ in range(deepest):  # every stored reading is one of the start
-                mean, G = linearised_at(observer.keeping, plan, self.numbers, mean, w)
+                mean, G = observer.linearised_at(observer.keeping, plan, self.numbers, mean, w)
                 P = G @ P @ G.T
         return ObserverEstimate(mean[:, None], P)
 

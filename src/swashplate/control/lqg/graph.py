@@ -14,7 +14,7 @@ from swashplate.control.lqg.controller_step import Carried, LawOnEstimates, lqg_
 from swashplate.control.lqg.law import LAW_MEMORY, Feedback
 from swashplate.engine.law import REFERENCES
 from swashplate.engine.roots import require_casadi
-from swashplate.filtering.matrix_operations import CasadiMatrices
+from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.filtering.sensor_suite import readings
 from swashplate.physics.backend import Backend, CasadiBackend
@@ -75,7 +75,7 @@ def step_graph(
         measured[:read],
         measured[read],
         [reference[i] for i in range(len(REFERENCES))],
-        CasadiMatrices(),
+        Matrices(),
         law,
     )
     flat = [value for row in after.given for value in row] + after.counts + after.law

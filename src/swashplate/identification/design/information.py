@@ -18,12 +18,12 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
+from swashplate.engine.slopes import rates_and_slopes
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.identification.core.records import POSE
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.dynamics import enable_double_precision, rates_and_slopes
 from swashplate.simulation.trim import Trim, trim
 
 DELAY_SIGMA = 0.05
@@ -75,7 +75,6 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
             f"'{vehicle.name}' has no such states, and the noise of flights is known for a tracked pose only.",
             channel=", ".join(lacking),
         )
-    enable_double_precision()
     about = trim(vehicle)
     around = [getattr(about.environment, name) for name in SURROUNDINGS]
     w = np.array([*about.inputs, *around], dtype=np.float64)
@@ -83,9 +82,7 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
     m, equations = len(vehicle.input_names), equations_of(vehicle)
 
     def slopes(row: Array) -> Array:
-        return np.concatenate(
-            [np.asarray(part) for part in rates_and_slopes(equations, about.state, w, row)[1:]], axis=1
-        )
+        return np.concatenate(rates_and_slopes(equations, about.state, w, row)[1:], axis=1)
 
     def moved(name: str, step: float) -> Array:
         if vehicle.structure is not None:

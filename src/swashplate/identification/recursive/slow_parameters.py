@@ -8,25 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.engine.equations import equations_of, parameter_row
+from swashplate.engine.roots import require_casadi
 from swashplate.errors import IdentificationError
 from swashplate.filtering import observer
 from swashplate.filtering.disturbances import Unrest, unrest_of
-from swashplate.filtering.matrix_operations import JaxMatrices
+from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.filtering.sensor_suite import Suite
 from swashplate.identification.recursive.fourier_regression import CLOCK, EARLY, GAP, LATE, NO_NUMBER
 from swashplate.identification.time.equation_error import EquationError
-from swashplate.jax_on_demand import jit, jnp
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.trim import Trim, trim
 
 
@@ -54,6 +53,21 @@ class SlowPlan:
     def places(self) -> slice:
         """Of the slow parameters among everything estimated."""
         return slice(self.observer.moves - len(self.unknown), self.observer.moves)
+
+    @cached_property
+    def graph(self) -> Any:
+        """A CasADi function of (mean, covariance, driving, readings, due) to mean and covariance one sample later, and
+        the innovations with their covariance."""
+        casadi, plan, M = require_casadi(), self.observer, Matrices()
+        N, inputs = len(plan.names), plan.inputs + 1
+        sizes = {"mean": (N, 1), "covariance": (N, N), "driving": (inputs, 1), "readings": (len(plan.channels), 1)}
+        mean, covariance, driving, y = (casadi.MX.sym(name, *size) for name, size in sizes.items())
+        due = casadi.MX.sym("due", len(plan.sensors))
+        flags, begun = M.scalars(due), ObserverEstimate(mean, covariance)
+        before = observer.predicted(plan, self.numbers, begun, driving, flags, M)
+        after, innovations, spread = observer.corrected(plan, self.numbers, before, y, flags, driving, M)
+        given = [mean, covariance, driving, y, due]
+        return casadi.Function("sample", given, [casadi.densify(part) for part in (*after, innovations, spread)])
 
 
 def slow_plan(
@@ -86,7 +100,6 @@ def slow_plan(
         IdentificationError: a parameter that the vehicle does not have, or that is zero; a sensor that is late.
         TrimError: where the vehicle has no hover.
     """
-    enable_double_precision()
     values = dict(zip(vehicle.parameter_names, vehicle.values(), strict=True))
     size = _sizes(vehicle, unknown, values)
     if not unknown or len(set(unknown)) < len(unknown):
@@ -145,12 +158,9 @@ class SlowParameters:
     surprise: float = field(init=False, default=float("nan"))
     _estimate: ObserverEstimate = field(init=False)
     _given: list[Array] = field(init=False, default_factory=list)
-    _numbers: Numbers = field(init=False)
 
     def __post_init__(self) -> None:
         self._estimate = self.plan.start
-        made = (None if part is None else jnp.asarray(part) for part in self.plan.numbers)
-        self._numbers = Numbers(*made)
 
     def step(self, elapsed: float, inputs: Sequence[float] | Array, readings: Sequence[float] | Array) -> bool:
         """Take one sample in.
@@ -177,11 +187,12 @@ class SlowParameters:
             return False
         self.frozen = ""
         acting = [self._given[-1 - late][j] for j, late in enumerate(plan.delays)]
-        driving = np.array([*acting, self._given[-1][-1]])[:, None]
-        self._estimate, surprise = _stepped(
-            plan, self._numbers, self._estimate, driving, np.nan_to_num(y)[:, None], np.array(due)
-        )
-        self.surprise = float(surprise)
+        driving = np.array([*acting, self._given[-1][-1]])
+        told = self.plan.graph(*self._estimate, driving, np.nan_to_num(y), due)
+        mean, covariance, innovations, spread = (np.asarray(part.full()) for part in told)
+        self._estimate = ObserverEstimate(mean, covariance)
+        heard = sum(flag * len(sensor.channels) for flag, sensor in zip(due, plan.sensors, strict=True))
+        self.surprise = float(np.vdot(innovations, np.linalg.solve(spread, innovations))) / max(heard, 1.0)
         self._given = [*self._given, w][-1 - max(plan.delays) :]
         return True
 
@@ -189,8 +200,8 @@ class SlowParameters:
         """States where the sensors say, and as unknown as at the start; the parameters as they are known."""
         plan, places = self.plan.observer, self.plan.places
         mean, covariance = (np.array(part) for part in self.plan.start)
-        mean[places] = np.asarray(self._estimate.mean)[places]
-        covariance[places, places] = np.asarray(self._estimate.covariance)[places, places]
+        mean[places] = self._estimate.mean[places]
+        covariance[places, places] = self._estimate.covariance[places, places]
         names = plan.equations.vehicle.state_names
         for channel, value in zip(plan.channels, y, strict=True):
             name = channel.partition(".")[2]
@@ -202,23 +213,12 @@ class SlowParameters:
     def estimate(self) -> EquationError:
         """The parameters as they are known now; `noise` is the root of what the readings surprise by, 1 as promised."""
         places = self.plan.places
-        covariance = np.asarray(self._estimate.covariance)[places, places]
+        covariance = self._estimate.covariance[places, places]
         return EquationError(
             self.plan.unknown,
-            np.asarray(self._estimate.mean)[places, 0].copy(),
+            self._estimate.mean[places, 0].copy(),
             np.sqrt(np.diag(covariance)),
             float("nan"),
             float(np.sqrt(self.surprise)),
             covariance=covariance.copy(),
         )
-
-
-@jit(static_argnums=0, compiler_options=RUN_RARELY)
-def _stepped(plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Any, y: Any, due: Any) -> Any:
-    M = JaxMatrices()
-    flags = [due[i] for i in range(len(plan.sensors))]
-    before = observer.predicted(plan, numbers, estimate, w, flags, M)
-    after, innovations, spread = observer.corrected(plan, numbers, before, y, flags, w, M)
-    told = jnp.concatenate([due[i] * jnp.ones(len(s.channels)) for i, s in enumerate(plan.sensors)])
-    size = (innovations.T @ jnp.linalg.solve(spread, innovations))[0, 0]
-    return after, size / jnp.maximum(jnp.sum(told), 1.0)

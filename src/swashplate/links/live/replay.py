@@ -25,7 +25,6 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.usual import HELICOPTER, USUAL
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
 from swashplate.validation.prediction import predict
@@ -112,7 +111,6 @@ def replay(
         FlightError: where a channel of the motion is missing, or an input of the model without `hold_missing`, or the
             flight is too short to be predicted.
     """
-    enable_double_precision()
     if not ahead > 0.0:
         raise SwashError(f"is {ahead:g} s, expected more than zero.", channel="--ahead")
     if draws and model is None:

@@ -20,7 +20,6 @@ from swashplate.errors import ControllerError
 from swashplate.flights.flight import Flight
 from swashplate.links.ardupilot.gains import ardupilot_law
 from swashplate.links.servos import servo_mapping
-from swashplate.simulation.dynamics import enable_double_precision
 
 HAND_MADE = {
     **{
@@ -44,12 +43,6 @@ MIXERS = (
     (CoaxialMixer(1.0, -1.0, 0.0, 0.0), (0.55, 0.54, 0.1, -0.05)),
     (CoaxialMixer(1.0, -1.0, 0.0, 0.0, yaw=1.0, divided=0.0), (0.55, 0.54, 0.1, -0.05)),
 )
-
-
-@pytest.fixture(autouse=True, scope="module")
-def double_precision() -> None:
-    """Flights ask for it; filters alone do not."""
-    enable_double_precision()
 
 
 def coax(given: dict[str, float]) -> ArduPilotLaw:
