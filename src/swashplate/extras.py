@@ -16,7 +16,6 @@ EXTRA_OF: Mapping[str, str] = {
     "control": "model",
     "matplotlib": "plot",
     "casadi": "model",
-    "blackjax": "posterior",
     "pymavlink": "link",
     "imageio_ffmpeg": "live",
     "pyulog": "logs",

@@ -99,7 +99,7 @@ def identify(
             "--posterior",
             metavar="laplace|nuts",
             help="Draw models from the fit's uncertainty, into posterior.nc (for ArviZ) and for Monte Carlo: "
-            "laplace (normal, fast) or nuts (from the likelihood, minutes; extra 'posterior').",
+            "laplace (normal, fast) or nuts (from the likelihood, minutes).",
         ),
     ] = None,
     rate: options.Rate = 100.0,

@@ -10,8 +10,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.extras import library
-from swashplate.identification.core import accuracy
+from swashplate.identification.core import accuracy, nuts
 from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.posterior_draws import LEAST_ESS, SPLIT_RHAT, Posterior
@@ -57,7 +56,6 @@ def posterior(
     Raises:
         IdentificationError: for a fit that failed, a result from a file or of a method without a likelihood in time
             (NUTS), and draws that did not converge, with their diagnostics.
-        MissingLibraryError: where NUTS is asked for and blackjax is not installed.
     """
     where = f"the fit of {result.name}"
     check_posterior(method)
@@ -70,13 +68,18 @@ def posterior(
     if method == "laplace":
         return replace(result, posterior=_laplace(result, draws=draws, chains=chains, seed=seed, where=where))
     fitted = result.fitted
-    if fitted is None or not hasattr(fitted.likelihood, "traced"):
-        told = "comes from a file" if fitted is None else f"is by {result.method}"
+    if fitted is None:
         raise IdentificationError(
-            f"{told}, and NUTS needs the likelihood of records in time itself.",
+            "has no likelihood beside it, and NUTS needs that of records in time itself.",
             where=where,
             channel="posterior",
             hint="Fit the flights again with --posterior nuts (without a horizon), or take 'laplace'.",
+        )
+    if getattr(fitted.likelihood, "constant", fitted.likelihood) is not fitted.likelihood:
+        raise IdentificationError(
+            "the fit has a wind, whose likelihood (a gain that follows) NUTS does not draw from.",
+            channel="posterior",
+            hint="Take 'laplace', or fit the flight without --wind.",
         )
     if not result.converged:
         raise IdentificationError(
@@ -88,15 +91,13 @@ def posterior(
 
 
 def check_posterior(method: str) -> None:
-    """That there is such a posterior, and the library that it needs.
+    """That there is such a posterior.
 
     Raises:
-        IdentificationError, MissingLibraryError: where not.
+        IdentificationError: where not.
     """
     if method not in METHODS:
         raise IdentificationError(f"'{method}' is no posterior; there are {', '.join(METHODS)}.", channel="posterior")
-    if method == "nuts":
-        library("blackjax", what="A posterior by NUTS")
 
 
 def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, where: str) -> Posterior:
@@ -140,10 +141,8 @@ def _drawn(
         good = np.all(effective(so_far.rows[:, :, :k]) >= LEAST_ESS)
         return bool(good and np.all(split_rhat(so_far.rows) < SPLIT_RHAT))
 
-    from swashplate.identification.core import nuts
-
     sampled = nuts.sample(
-        likelihood.traced(),
+        likelihood.slope,
         row,
         fitted.row,
         covariance,

@@ -1,44 +1,52 @@
 """The No-U-Turn sampler on a likelihood's exact gradients, whitened by the Fisher information at its optimum.
 
-Hoffman and Gelman (2014), by blackjax; the metric is the information with the priors' (Girolami and Calderhead 2011,
-held at the optimum), and in it the slope of the gradients a little to either side: what one flight says of a number at
-its bound, or of a noise that it hardly shows, is not what the information expects of all flights. So every direction
-has a standard deviation of about one and only the step is to be learnt.
+Hoffman and Gelman (2014), with draws by their weight along the path and turns told by the summed momentum (Betancourt
+2017, appendix A). The metric is the information with the priors' (Girolami and Calderhead 2011, held at the optimum),
+and in it the slope of the gradients a little to either side: what one flight says of a number at its bound, or of a
+noise that it hardly shows, is not what the information expects of all flights. So every direction has a standard
+deviation of about one and only the step is to be learnt.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
-import blackjax
 import numpy as np
-from blackjax.mcmc.hmc import HMCState
 
 from swashplate.arrays import Array
 from swashplate.identification.core.parameter_row import Row
-from swashplate.identification.core.scoring import TracedCost
-from swashplate.identification.core.whitened import Chains, unbent, whitening
-from swashplate.jax_on_demand import jax, jit, jnp
-from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.identification.core.whitened import Chains, evened, unbent, whitening
 
-Density = Callable[[Any, Any, Any], Any]
-Target = tuple[Density, Hashable, Mapping[str, Any]]
+Slope = Callable[[Array], tuple[float, Array]]
+"""Cost and gradient at a scaled row, priors not included; several threads ask it."""
+
 _ACCEPTED = 0.8
 """Mean acceptance that the step is chosen for: longer steps mix worse on a real flight (decision 119)."""
 _FIRST_STEP = 0.5
-_ASIDE = 0.3
-"""Standard deviations to either side at which gradients say how the density bends."""
-_FLATTEST = 0.04
-"""Of the information: less bending than this is taken for as much, so that no direction is made wider than five."""
 _DOUBLINGS = 8
+_RAN_AWAY = 1000.0
+"""Loss of log-density along a path that no draw comes from."""
 _STATS = ("lp", "diverging", "energy", "tree_depth", "n_steps", "acceptance_rate")
 
 
+class Point(NamedTuple):
+    """A place in whitened numbers, the density's logarithm there and its gradient, and the scaled row."""
+
+    z: Array
+    density: float
+    slope: Array
+    row: Array
+
+
+Density = Callable[[Array], Point]
+
+
 def sample(
-    traced: TracedCost,
+    slope: Slope,
     row: Row,
     optimum: Array,
     covariance: Array,
@@ -54,7 +62,7 @@ def sample(
     """Draws from exp(-cost - prior).
 
     Args:
-        traced: the cost. row: its entries, with bounds and priors.
+        slope: cost and gradient. row: its entries, with bounds and priors.
         optimum: scaled row to start from (p,). covariance: inverse of information and priors there (p, p).
         chains: how many, each from a point of its own as far from the optimum as the metric says.
         warmup: draws of each chain, dropped, in which it looks for a step; all then take the mean of these.
@@ -62,133 +70,146 @@ def sample(
         seed: of all that is random.
         progress: told draws of a chain so far and at most.
     """
-    data = _prepared(traced, row, optimum, covariance)
-    numbers = len(row)
-    random = np.random.default_rng(seed)
-    starts = [jnp.asarray(random.standard_normal(numbers)) for _ in range(chains)]
-    keys = list(jax.random.split(jax.random.key(seed), chains))
-    target: Target = (traced.function, traced.plan, data)
-    np.asarray(_step(*target, keys[0], _begin(*target, starts[0]), _FIRST_STEP)[1])  # compiled before there are threads
-    parts: list[list[tuple[Array, Array]]] = [[] for _ in range(chains)]
+    made = [_Chain(np.random.default_rng([seed, number])) for number in range(chains)]
     with ThreadPoolExecutor(max_workers=min(chains, os.cpu_count() or 1)) as pool:
-        target = _evened(target, pool)
-        warmed = [pool.submit(_warmed, target, warmup, keys[c], _alive(target, starts[c])) for c in range(chains)]
-        states = [job.result()[0] for job in warmed]
-        # The metric is one, and so is the step; a float as while they warmed, for which it is compiled.
-        step = float(np.exp(np.mean([np.log(job.result()[1]) for job in warmed])))
-        done, chain = 0, None
+        data = whitening(row, optimum, covariance)
+        data = evened(data, lambda sides: [p.slope for p in pool.map(density_of(slope, row, data), sides)])
+        density, done, told = density_of(slope, row, data), 0, None
+        steps = list(pool.map(lambda chain: chain.warmed(density, len(row), warmup), made))
+        step = float(np.exp(np.mean(np.log(steps))))  # the metric is one, and so is the step
         while done < most:
             size = min(block, most - done)
-            jobs = [pool.submit(_drawn, target, keys[c], states[c], step, done, size) for c in range(chains)]
-            for c, job in enumerate(jobs):
-                states[c], rows, stats = job.result()
-                parts[c].append((rows, stats))
+            list(pool.map(lambda chain, size=size: chain.draw(density, step, size), made))
             done += size
-            chain = _together(parts, np.full(chains, step))
+            stats = np.array([chain.stats for chain in made])
+            named = {name: stats[:, :, i] for i, name in enumerate(_STATS)}
+            told = Chains(np.array([chain.rows for chain in made]), named, np.full(chains, step))
             if progress is not None:
                 progress(done, most)
-            if enough(chain):
+            if enough(told):
                 break
-    assert chain is not None
-    return chain
+    assert told is not None
+    return told
 
 
-def _alive(target: Target, start: jax.Array) -> Any:
-    """The sampler's state at a start, which comes nearer to the optimum as long as the model diverges there."""
-    state = _begin(*target, start)
-    for _ in range(6):
-        if np.isfinite(float(state.logdensity)):
-            break
-        start = 0.5 * start
-        state = _begin(*target, start)
-    return state
+def density_of(slope: Slope, row: Row, data: dict[str, Any]) -> Density:
+    """The density in whitened numbers; nothing lies beyond the bounds and where the model diverges."""
+    low, high = row.bounds()
+
+    def density(z: Array) -> Point:
+        with np.errstate(all="ignore"):  # a sampler looks far out too
+            place = unbent(data, z)
+            lost = Point(z, -np.inf, np.zeros_like(z), place.row)
+            if not np.all((place.row >= low) & (place.row <= high)):
+                return lost
+            try:
+                cost, gradient = slope(place.row)
+            except np.linalg.LinAlgError:  # no filter settles there
+                return lost
+            prior, by_prior, _ = row.prior(place.row)
+            total = place.stretch - cost - prior
+            pull = (place.bend - place.slope * (gradient + by_prior)) @ data["root"]
+        return Point(z, float(total), pull, place.row) if np.isfinite(total) and np.all(np.isfinite(pull)) else lost
+
+    return density
 
 
-def _together(parts: list[list[tuple[Array, Array]]], steps: Array) -> Chains:
-    rows = np.stack([np.concatenate([rows for rows, _ in one]) for one in parts])
-    stats = np.stack([np.concatenate([stats for _, stats in one]) for one in parts])
-    return Chains(rows, {name: stats[:, :, i] for i, name in enumerate(_STATS)}, steps)
+@dataclass
+class _Chain:
+    """One chain: where it is, and what it drew."""
+
+    random: np.random.Generator
+    at: Any = None
+    rows: list[Array] = field(default_factory=list)
+    stats: list[tuple[float, ...]] = field(default_factory=list)
+
+    def warmed(self, density: Density, numbers: int, warmup: int) -> float:
+        """The step that the second half of some draws took, by Robbins and Monro (1951)."""
+        z = self.random.standard_normal(numbers)
+        self.at = density(z)
+        for _ in range(6):  # nearer to the optimum as long as the model diverges
+            if np.isfinite(self.at.density):
+                break
+            z = 0.5 * z
+            self.at = density(z)
+        log = np.log(_FIRST_STEP)
+        taken = [log]
+        for k in range(warmup):
+            self.at, told = drawn(density, self.at, float(np.exp(log)), self.random)
+            log += (told[-1] - _ACCEPTED) / np.sqrt(k + 1.0)
+            taken.append(log)
+        return float(np.exp(np.mean(taken[len(taken) // 2 :])))
+
+    def draw(self, density: Density, step: float, count: int) -> None:
+        for _ in range(count):
+            self.at, told = drawn(density, self.at, step, self.random)
+            self.rows.append(self.at.row)
+            self.stats.append(told)
 
 
-def _warmed(target: Target, warmup: int, key: jax.Array, state: HMCState) -> tuple[Any, float]:
-    """The state after some draws, and the step that the second half of them took, by Robbins and Monro (1951)."""
-    log, taken = float(np.log(_FIRST_STEP)), [float(np.log(_FIRST_STEP))]
-    for k in range(warmup):
-        state, _, stats = _step(*target, jax.random.fold_in(key, k), state, float(np.exp(log)))
-        accepted = float(stats[_STATS.index("acceptance_rate")])
-        log += ((accepted if np.isfinite(accepted) else 0.0) - _ACCEPTED) / np.sqrt(k + 1.0)
-        taken.append(log)
-    return state, float(np.exp(np.mean(taken[len(taken) // 2 :])))
+# ---- one draw --------------------------------------------------------------------------------------------------------
+class _Path(NamedTuple):
+    """A piece of a trajectory: its ends in time (point, momentum), the draw from it, and sums over it."""
+
+    first: tuple[Point, Array]
+    last: tuple[Point, Array]
+    chosen: Point
+    weight: float
+    momentum: Array
+    ends: bool
+    ran_away: bool
+    accepted: float
+    steps: int
 
 
-def _drawn(
-    target: Target, key: jax.Array, state: HMCState, step: float, first: int, count: int
-) -> tuple[Any, Array, Array]:
-    rows: list[Array] = []
-    stats: list[Array] = []
-    for k in range(first, first + count):
-        state, row, told = _step(*target, jax.random.fold_in(key, (1 << 20) + k), state, step)
-        rows.append(np.asarray(row))
-        stats.append(np.asarray(told))
-    return state, np.array(rows), np.array(stats)
+def drawn(density: Density, at: Point, step: float, random: np.random.Generator) -> tuple[Point, tuple[float, ...]]:
+    """The next draw, and `_STATS` of how it was made."""
+    momentum = random.standard_normal(at.z.size)
+    energy = 0.5 * float(momentum @ momentum) - at.density
+    path, depth = _Path((at, momentum), (at, momentum), at, 0.0, momentum, False, False, 0.0, 0), 0
+    while depth < _DOUBLINGS and not path.ends:
+        ahead = random.random() < 0.5
+        more = _grown(density, path.last if ahead else path.first, step if ahead else -step, depth, energy, random)
+        path, depth = _joined(path, more, ahead, random, onward=True), depth + 1
+    told = (path.chosen.density, path.ran_away, energy, depth, path.steps, path.accepted / path.steps)
+    return path.chosen, tuple(map(float, told))
 
 
-# ---- the density in whitened numbers ---------------------------------------------------------------------------------
-def _prepared(traced: TracedCost, row: Row, optimum: Array, covariance: Array) -> dict[str, Any]:
-    """The arrays that the density needs, those of the likelihood among them."""
-    enable_double_precision()
-    numbers = whitening(row, optimum, covariance)
-    return {"likelihood": traced.data, **{name: jnp.asarray(value) for name, value in numbers.items()}}
+def _grown(
+    density: Density, end: tuple[Point, Array], step: float, depth: int, energy: float, random: np.random.Generator
+) -> _Path:
+    """2^depth leapfrog steps from an end on; fewer where they turn or run away."""
+    if depth:
+        near = _grown(density, end, step, depth - 1, energy, random)
+        if near.ends:
+            return near
+        far = _grown(density, near.last if step > 0.0 else near.first, step, depth - 1, energy, random)
+        return _joined(near, far, step > 0.0, random, onward=False)
+    point, momentum = end
+    half = momentum + 0.5 * step * point.slope
+    point = density(point.z + step * half)
+    momentum = half + 0.5 * step * point.slope
+    gained = energy - 0.5 * float(momentum @ momentum) + point.density
+    away = not gained > -_RAN_AWAY
+    accepted = float(np.exp(min(0.0, gained))) if np.isfinite(gained) else 0.0
+    return _Path((point, momentum), (point, momentum), point, gained, momentum, away, away, accepted, 1)
 
 
-def _evened(target: Target, pool: ThreadPoolExecutor) -> Target:
-    """The target in numbers in which it bends alike in every direction, by differences of gradients at the optimum."""
-    function, plan, data = target
-    numbers = data["middle"].shape[0]
-    sides = _ASIDE * np.stack([np.eye(numbers), -np.eye(numbers)], axis=1).reshape(-1, numbers)
-    slopes = list(pool.map(lambda z: np.asarray(_begin(*target, jnp.asarray(z)).logdensity_grad), sides))
-    high, low = np.array(slopes).reshape(numbers, 2, numbers).transpose(1, 0, 2)
-    bends = (low - high) / (2.0 * _ASIDE)
-    lost = ~np.all(np.isfinite(bends), axis=1)  # the model diverges there: as the information has it
-    bends[lost] = bends[:, lost] = 0.0
-    values, vectors = np.linalg.eigh(0.5 * (bends + bends.T) + np.diag(lost.astype(float)))
-    stretched = vectors / np.sqrt(np.maximum(values, _FLATTEST))
-    return function, plan, {**data, "root": data["root"] @ stretched}
-
-
-def _density(function: Density, plan: Hashable, data: Mapping[str, Any], z: jax.Array) -> Any:
-    row, stretch = unbent(data, z, jnp)
-    away = row - data["mean"]
-    total = -function(plan, data["likelihood"], row) - 0.5 * away @ data["prior"] @ away + stretch
-    allowed = jnp.all((row >= data["low"]) & (row <= data["high"]))
-    return jnp.where(jnp.isfinite(total) & allowed, total, -jnp.inf)
-
-
-@jit(static_argnums=(0, 1))
-def _begin(function: Density, plan: Hashable, data: Mapping[str, Any], z: jax.Array) -> Any:
-    return blackjax.nuts.init(z, lambda place: _density(function, plan, data, place))
-
-
-@jit(static_argnums=(0, 1))
-def _step(
-    function: Density, plan: Hashable, data: Mapping[str, Any], key: jax.Array, state: HMCState, step: float
-) -> tuple[Any, Any, Any]:
-    """The next state, its scaled row and its statistics."""
-    following, info = blackjax.nuts.build_kernel()(
-        key,
-        state,
-        lambda place: _density(function, plan, data, place),
-        step,
-        jnp.ones(data["middle"].shape[0]),
-        _DOUBLINGS,
+def _joined(near: _Path, far: _Path, ahead: bool, random: np.random.Generator, *, onward: bool) -> _Path:
+    """A path and what was added to it; `onward`: the draw rather comes from what was added, if that is whole."""
+    early, late = (near, far) if ahead else (far, near)
+    accepted, steps = near.accepted + far.accepted, near.steps + far.steps
+    if far.ends:
+        return near._replace(ends=True, ran_away=far.ran_away, accepted=accepted, steps=steps)
+    weight, momentum = float(np.logaddexp(near.weight, far.weight)), near.momentum + far.momentum
+    share = far.weight - (near.weight if onward else weight)
+    chosen = far.chosen if np.log(random.random()) < share else near.chosen
+    turned = any(
+        part @ begin[1] <= 0.0 or part @ end[1] <= 0.0
+        for part, begin, end in (
+            (momentum, early.first, late.last),
+            (early.momentum + late.first[1], early.first, late.first),
+            (late.momentum + early.last[1], early.last, late.last),
+        )
     )
-    told = (
-        following.logdensity,
-        info.is_divergent,
-        info.energy,
-        info.num_trajectory_expansions,
-        info.num_integration_steps,
-        info.acceptance_rate,
-    )
-    stats = jnp.stack([jnp.asarray(value, dtype=following.logdensity.dtype) for value in told])
-    return following, unbent(data, following.position, jnp)[0], stats
+    return _Path(early.first, late.last, chosen, weight, momentum, turned, False, accepted, steps)

@@ -140,7 +140,7 @@ class Posterior:
         chains, count = self.draws.shape[:2]
         dims, k = ("chain", "draw"), self.parameters
         coords = {"chain": np.arange(chains), "draw": np.arange(count)}
-        told = {"inference_library": "blackjax" if self.method == "nuts" else "swashplate", "seed": self.seed}
+        told = {"inference_library": "swashplate", "seed": self.seed}
         variables: dict[str, Any] = {
             name: (dims, self.draws[:, :, i], {"units": unit})
             for i, (name, unit) in enumerate(zip(self.names[:k], self.units, strict=True))

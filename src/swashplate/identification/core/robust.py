@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
-
-if TYPE_CHECKING:
-    from jax.typing import ArrayLike
 
 KNEE = 4.0
 """Whitened residuals beyond this many standard deviations count linearly (Huber 1964)."""
@@ -21,8 +18,8 @@ def huber(whitened: Array) -> float:
     return float(losses(whitened, np).sum())
 
 
-def losses(whitened: ArrayLike, xp: ModuleType) -> Any:
-    """The loss of each whitened residual, in NumPy or JAX."""
+def losses(whitened: Any, xp: ModuleType) -> Any:
+    """The loss of each whitened residual, by the array functions `xp`."""
     size = xp.abs(whitened)
     return xp.where(size < KNEE, 0.5 * size**2, KNEE * size - 0.5 * KNEE**2)
 

@@ -147,6 +147,21 @@ class TimeErrors(ABC):
             every.append(errors)
         return self._cost(np.concatenate(every)), gradient, information
 
+    def slope(self, row: Array) -> tuple[float, Array]:
+        """Cost and gradient at the row's own covariance, and nothing kept: for samplers, from several threads too.
+
+        A Kalman gain keeps the sensors' noise of the last `refresh`.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            moved = list(self._moved(row))
+        errors, gradient = np.concatenate([part for _, part, _ in moved]), np.zeros(len(self._row))
+        cost = self._cost_of(errors)
+        if np.isfinite(cost):
+            inverse = np.linalg.inv(self._covariance(errors))
+            for places, part, slopes in moved:
+                gradient[places] += slopes.reshape(places.size, -1) @ (part @ inverse).ravel()
+        return cost, gradient
+
     def sized(self, row: Array) -> Array:
         """A scaled row with what the errors' covariance alone tells: here nothing."""
         return row

@@ -7,10 +7,9 @@ The logarithm of a noise is stretched to the prior's width where the noise is to
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +17,15 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.identification.core.parameter_row import Row
 
-if TYPE_CHECKING:
-    import jax
-
 _NEAR = 8.0
 """Sigmas from the optimum within which a bound bends the scale; farther ones only end it."""
 _INSIDE = 0.5
 """Sigmas that the bent scale's middle keeps from a bound on which the optimum lies."""
+
+_ASIDE = 0.3
+"""Standard deviations to either side at which gradients say how the density bends."""
+_FLATTEST = 0.04
+"""Of the information: less bending than this is taken for as much, so that no direction is made wider than five."""
 
 _UNSEEN, _BLEND, _SHARE = 1.0, 0.3, 0.8
 """How far below the optimum the logarithm of a noise is that the data no longer see (its variance is a seventh there),
@@ -41,7 +42,7 @@ class Chains:
 
 
 def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, NDArray[Any]]:
-    """The arrays that `unbent` and `log_prior` take.
+    """The arrays that `unbent` takes.
 
     Args:
         row: entries, with bounds and priors. optimum: scaled row (p,).
@@ -67,40 +68,62 @@ def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, NDArray[
         "unseen": _UNSEEN / row.scale,
         "blend": np.minimum(_BLEND / row.scale, _SHARE * sigma),
         "root": sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)),
-        "mean": row.column("mean") / row.scale,
-        "prior": row.prior_information,
     }
 
 
-def unbent(data: Mapping[str, Any], z: Array | jax.Array, xp: ModuleType) -> tuple[Any, Any]:
-    """The scaled row of whitened numbers, and the logarithm of what the bent scales stretch.
+def evened(data: Mapping[str, Any], slopes: Callable[[Array], Sequence[Array]]) -> dict[str, Any]:
+    """The same for numbers in which the density bends alike in every direction, by differences of its gradients.
 
     Args:
-        data: from `whitening`. z: whitened numbers (p,). xp: NumPy, or JAX's.
+        data: from `whitening`. slopes: gradients of the density's logarithm at whitened places (n, p).
     """
+    numbers = data["middle"].size
+    sides = _ASIDE * np.stack([np.eye(numbers), -np.eye(numbers)], axis=1).reshape(-1, numbers)
+    high, low = np.array(slopes(sides)).reshape(numbers, 2, numbers).transpose(1, 0, 2)
+    bends = (low - high) / (2.0 * _ASIDE)
+    lost = np.all(low == 0.0, axis=1) | np.all(
+        high == 0.0, axis=1
+    )  # the model diverges there: as the information has it
+    bends[lost] = bends[:, lost] = 0.0
+    values, vectors = np.linalg.eigh(0.5 * (bends + bends.T) + np.diag(lost.astype(float)))
+    return {**data, "root": data["root"] @ (vectors / np.sqrt(np.maximum(values, _FLATTEST)))}
+
+
+class Unbent(NamedTuple):
+    """A scaled row, and the bent scales there.
+
+    Attributes:
+        row: (p,). stretch: logarithm of what all scales stretch.
+        slope: of each number by its straight one, (p,). bend: of the logarithm of that, (p,).
+    """
+
+    row: Array
+    stretch: float
+    slope: Array
+    bend: Array
+
+
+def unbent(data: Mapping[str, Any], z: Array) -> Unbent:
+    """The scaled row of whitened numbers (p,); `data` is that of `whitening`."""
     away = data["root"] @ z
     small = (-away - data["unseen"]) / data["blend"]
-    slope = 1.0 + data["wider"] * xp.exp(-xp.logaddexp(0.0, -small))
-    away = away - data["wider"] * data["blend"] * xp.logaddexp(0.0, small)
-    a, b = data["gap_low"], data["gap_high"]
-    up, down = xp.exp(away / a), xp.exp(-away / b)
-    both = data["below"] & data["above"]
-    width, share = a + b, a / (a + b)
-    steep = width / (a * b)
-    place = xp.log(a / b) + steep * away
-    low, high = -xp.logaddexp(0.0, -place), -xp.logaddexp(0.0, place)  # of the logistic function and its rest
-    value = xp.where(
-        both,
-        data["low"] + width * xp.exp(low),
-        xp.where(
-            data["below"],
-            data["low"] + a * up,
-            xp.where(data["above"], data["high"] - b * down, data["middle"] + away),
-        ),
-    )
-    logistic = low + high - xp.log(share * (1.0 - share))
-    stretch = xp.where(both, logistic, xp.where(data["below"], away / a, xp.where(data["above"], -away / b, 0.0)))
-    return value, stretch.sum() + xp.log(slope).sum()
+    unseen = np.exp(-np.logaddexp(0.0, -small))
+    widened = 1.0 + data["wider"] * unseen
+    away = away - data["wider"] * data["blend"] * np.logaddexp(0.0, small)
+    a, b, below, above = data["gap_low"], data["gap_high"], data["below"], data["above"]
+    both, steep, share = below & above, (a + b) / (a * b), a / (a + b)
+    place = np.log(a / b) + steep * away
+    low, high = -np.logaddexp(0.0, -place), -np.logaddexp(0.0, place)  # of the logistic function and its rest
+
+    def bent(by_both: Array, by_below: Array, by_above: Array, straight: Any) -> Array:
+        return np.where(both, by_both, np.where(below, by_below, np.where(above, by_above, straight)))
+
+    up, down = data["low"] + a * np.exp(away / a), data["high"] - b * np.exp(-away / b)
+    row = bent(data["low"] + (a + b) * np.exp(low), up, down, data["middle"] + away)
+    logs = bent(low + high - np.log(share * (1.0 - share)), away / a, -away / b, 0.0) + np.log(widened)
+    bend = bent(steep * (np.exp(high) - np.exp(low)), 1.0 / a, -1.0 / b, 0.0) * widened
+    bend = bend - data["wider"] * unseen * (1.0 - unseen) / (data["blend"] * widened)
+    return Unbent(row, float(logs.sum()), np.exp(logs), bend)
 
 
 def split_rhat(draws: Array) -> Array:

@@ -12,24 +12,16 @@ last, taken for white, bias the parameters by many times their bounds.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.filtering.riccati import kalman_gain
+from swashplate.filtering.white_noise import white_noise_gain
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.time_likelihood import SPREAD, gust_entries
 from swashplate.identification.time.linear_likelihood import Batch, OutputErrors
 from swashplate.models.linear.state_space import StateSpaceModel
-from swashplate.simulation.compilation import RUN_RARELY
-from swashplate.simulation.dynamics import enable_double_precision
-from swashplate.simulation.gathered_noise import gathered_noise
-
-if TYPE_CHECKING:
-    import jax
-    from jaxtyping import Complex, Float
 
 VELOCITIES = ("u", "v", "w")
 """States that are velocities through the air."""
@@ -49,8 +41,8 @@ class FilterErrors(OutputErrors):
         return np.diag(np.diag(super()._covariance(errors)))
 
     def _gain(self, batch: Batch, a: Batch, c: Batch, phi: Batch, dt: float) -> Any:
-        sensors = np.broadcast_to(np.diag(self.covariance), (len(batch), len(self.outputs)))
-        return np.einsum("pij,pjk->pik", phi, _filter(a, self._white(batch), c, sensors.astype(np.complex128), dt)[0])
+        sensors = np.broadcast_to(np.diag(np.diag(self.covariance)), (len(batch), *self.covariance.shape))
+        return phi @ white_noise_gain(a, self._white(batch), c, sensors, dt)[0]
 
     def _white(self, batch: Batch) -> Any:
         """Intensity of the white noise on every state's rate."""
@@ -105,10 +97,10 @@ class GustErrors(FilterErrors):
         size, last = (batch[:, [self._place[f"{what} {s}"] for s in moving]] for what in ("air", "fading"))
         intensity = np.concatenate([self._white(batch), 2.0 * np.exp(2.0 * size - last)], axis=1)
         sensors = np.exp(2.0 * batch[:, [self._place[f"noise {o}"] for o in self.outputs]])
-        return _filter(a, intensity, c, sensors, dt)
+        return white_noise_gain(a, intensity, c, sensors[:, :, None] * np.eye(len(self.outputs)), dt)
 
     def _gain(self, batch: Batch, a: Batch, c: Batch, phi: Batch, dt: float) -> Any:
-        return np.einsum("pij,pjk->pik", phi, self._kalman(batch, a, c, dt)[0])
+        return phi @ self._kalman(batch, a, c, dt)[0]
 
     def sized(self, row: Array) -> Array:
         numbers = np.asarray(row * self.row.scale)
@@ -118,30 +110,3 @@ class GustErrors(FilterErrors):
         larger = 0.5 * np.log(np.trace(errors) / len(told))
         noises = [i for i, entry in enumerate(self.row.entries) if entry.group == "noise"]
         return np.asarray(row + larger * np.isin(np.arange(row.size), noises))
-
-
-def _filter(a: Batch, intensity: Batch, c: Batch, sensors: Batch, dt: float) -> tuple[Any, Any]:
-    """Kalman gains (n_batch, n, m) and innovations' covariances of a batch of models, both noises' diagonals."""
-    gain, covariance = _filters()(a, intensity, c, sensors, dt)
-    return np.asarray(gain), np.asarray(covariance)
-
-
-@cache
-def _filters() -> Any:
-    """`_filter`, compiled for its shapes."""
-    import jax
-    import jax.numpy as jnp
-
-    enable_double_precision()
-
-    def gain(
-        a: Complex[jax.Array, "n n"],
-        intensity: Complex[jax.Array, " n"],
-        c: Complex[jax.Array, "m n"],
-        sensors: Complex[jax.Array, " m"],
-        dt: Float[jax.Array, ""],
-    ) -> Any:
-        phi, gathered = gathered_noise(a, jnp.diag(intensity), dt)
-        return kalman_gain(phi, c, gathered, jnp.diag(sensors))
-
-    return jax.jit(jax.vmap(gain, in_axes=(0, 0, 0, 0, None)), compiler_options=RUN_RARELY)

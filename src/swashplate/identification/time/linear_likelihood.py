@@ -5,33 +5,27 @@ Derivatives are exact to rounding: by complex steps through matrix exponentials,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Complex
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.filtering.filter_loop import filtered
+from swashplate.filtering.white_noise import STEP
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries
 from swashplate.identification.time.first_gain import first_gain, kalman_gains
+from swashplate.identification.time.linear_simulation import driven
 from swashplate.identification.time.linear_slopes import Coefficients, slopes_along
-from swashplate.jax_on_demand import jax
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.simulation.discretisation import first_order_hold
-from swashplate.simulation.dynamics import enable_double_precision
 
 Batch = NDArray[np.float64] | NDArray[np.complex128]
 """Rows of numbers, complex where a step is in one of them."""
-
-STEP = 1e-30
-"""Of the complex steps."""
 
 _FIRST_GUSTS = (0.3, 0.1, 0.03)
 """Shares of the states' sizes by which their rates are disturbed, in filters to begin with."""
@@ -108,7 +102,8 @@ class OutputErrors(TimeErrors):
         return gain_entries(self.model.states, size, spread) if self._gained else []
 
     def _plain(self, row: Array) -> Array:
-        return np.asarray(self._errors(np.asarray(row * self.row.scale)[None])[0].real)
+        loops = self._loops(np.asarray(row * self.row.scale)[None])
+        return np.concatenate([_ran(*(np.real(part) for part in one))[0] for (one,) in loops])
 
     def _moved(self, row: Array) -> Iterator[Moved]:
         for number in range(len(self.records)):
@@ -116,10 +111,8 @@ class OutputErrors(TimeErrors):
             base, moved = self._tangents(number, row, places, noises)
             late, later = self._later(number, base.lag)
             inputs = np.real(late)
-            one = [part[None] for part in (*base[:4], *self._driven(number, base, inputs))]
-            one = [*one[:4], *(np.moveaxis(part, 0, 1) for part in one[4:])]
-            errors, after = (np.asarray(run()(*one))[0] for run in (_recursion, _states))
-            every, states = np.concatenate([places, noises]), np.concatenate([base.x[None], after[:-1]])
+            errors, states = _ran(*base[:4], *self._driven(number, base, inputs))
+            every = np.concatenate([places, noises])
             for part, slopes in slopes_along(base, moved, inputs, later, errors, states):
                 yield every, part, slopes
 
@@ -162,16 +155,16 @@ class OutputErrors(TimeErrors):
 
     def _ahead(self, batch: Batch, ahead: Ahead) -> list[Any]:
         """Errors ahead of every record for a batch of rows, (n_batch, starts, horizons, outputs) each."""
-        steps = np.array(ahead.steps)
         by_record = []
-        for (x, phi, c, gain, measured, drive), starts in zip(self._loops(batch), ahead.starts, strict=True):
-            after = np.asarray(_states()(x, phi, c, gain, measured, drive))[:, np.array(starts, dtype=int)]
+        for loops, starts in zip(self._loops(batch), ahead.starts, strict=True):
+            after = np.stack([_ran(*loop)[1][np.array(starts, dtype=int) + 1] for loop in loops])
+            _, phi, c, _, measured, drive = (np.stack(part) for part in zip(*loops, strict=True))
             told = []
-            for step in range(1, steps[-1] + 1):
+            for step in range(1, ahead.steps[-1] + 1):
                 k = np.array(starts, dtype=int) + step
                 if step in ahead.steps:
-                    told.append(measured[k].transpose(1, 0, 2) - np.einsum("pij,psj->psi", c, after))
-                after = np.einsum("pij,psj->psi", phi, after) + drive[k].transpose(1, 0, 2)
+                    told.append(measured[:, k] - after @ c.swapaxes(1, 2))
+                after = after @ phi.swapaxes(1, 2) + drive[:, k]
             by_record.append(np.stack(told, axis=2))
         return by_record
 
@@ -197,26 +190,12 @@ class OutputErrors(TimeErrors):
     def _systems(self, batch: Batch) -> tuple[Any, ...]:
         return tuple(np.stack(part) for part in zip(*(self._matrices(numbers) for numbers in batch), strict=True))
 
-    def _errors(self, batch: Batch) -> Any:
-        """Output errors of every record, one after the other, for a batch of rows: (n_batch, n_t, n_outputs)."""
-        return np.concatenate([np.asarray(_recursion()(*loop)) for loop in self._loops(batch)], axis=1)
-
-    def _loops(self, batch: Batch) -> Iterator[tuple[Any, ...]]:
-        """Of every record, what `_recursion` takes."""
+    def _loops(self, batch: Batch) -> Iterator[list[tuple[Any, ...]]]:
+        """Of every record and model of a batch, what `_ran` takes."""
         systems = self._systems(batch)
         for number in range(len(self.records)):
-            yield self._loop(number, batch, systems)
-
-    def _loop(self, number: int, batch: Batch, systems: tuple[Any, ...]) -> tuple[Any, ...]:
-        """The same of one record."""
-        made = self._coefficients(number, batch, systems)
-        lags, turns = np.unique(made.lag, axis=0, return_inverse=True)
-        inputs = np.stack([self._later(number, lag)[0] for lag in lags])[np.ravel(turns)]
-        parts = [
-            self._driven(number, Coefficients(*one), u) for one, u in zip(zip(*made, strict=True), inputs, strict=True)
-        ]
-        measured, drive = (np.stack(part, axis=1) for part in zip(*parts, strict=True))
-        return *made[:4], measured, drive
+            made = [Coefficients(*one) for one in zip(*self._coefficients(number, batch, systems), strict=True)]
+            yield [(*one[:4], *self._driven(number, one, self._later(number, one.lag)[0])) for one in made]
 
     def _coefficients(self, number: int, batch: Batch, systems: tuple[Any, ...]) -> Coefficients:
         """What makes one record's errors, for a batch of rows."""
@@ -280,43 +259,12 @@ def _size(p: ModelParameter) -> float:
     return max(abs(p.value), p.cramer_rao if np.isfinite(p.cramer_rao) else 0.0) or 1.0
 
 
-@cache
-def _recursion() -> Any:
-    """Errors of a batch of models along one record, (n_batch, n_t, n_outputs), compiled for its shapes.
+def _ran(x: Batch, phi: Batch, c: Batch, gain: Batch, measured: Batch, drive: Batch) -> tuple[Any, Any]:
+    """Errors of one model along a record (n_t, n_outputs), and the states predicted for each sample (n_t, n_states).
 
-    Arguments, by model first: states at the start, transitions, outputs' and innovations' matrices; by sample first:
-    what is measured less what goes through, and what drives the states to the next sample.
+    Args:
+        x, phi, c, gain: states at the start, transition, outputs' and innovations' matrices.
+        measured: less what goes through. drive: of the states to the next sample.
     """
-    return _compiled(lambda errors, states: errors)
-
-
-@cache
-def _states() -> Any:
-    """The states predicted for the sample after each, (n_batch, n_t, n_states), compiled; arguments as before."""
-    return _compiled(lambda errors, states: states)
-
-
-def _compiled(chosen: Callable[[jax.Array, jax.Array], jax.Array]) -> Any:
-    """The innovations' form along a record for a batch of models: what is chosen of errors and predicted states."""
-    enable_double_precision()
-
-    def one(
-        x: Complex[jax.Array, " n"],
-        phi: Complex[jax.Array, "n n"],
-        c: Complex[jax.Array, "m n"],
-        gain: Complex[jax.Array, "n m"],
-        measured: Complex[jax.Array, "samples m"],
-        drive: Complex[jax.Array, "samples n"],
-    ) -> Any:
-        def correct(x: Complex[jax.Array, " n"], y: Complex[jax.Array, " m"], drive: Complex[jax.Array, " n"]) -> Any:
-            error = y - c @ x
-            return (x, drive + gain @ error), error
-
-        def predict(state: tuple[Any, Any], _: Complex[jax.Array, " n"]) -> Any:
-            x, pushed = state
-            return phi @ x + pushed
-
-        _, (errors, states) = filtered(x, measured, drive, correct=correct, predict=predict)
-        return chosen(errors, states[0] @ phi.T + states[1])
-
-    return jax.jit(jax.vmap(one, in_axes=(0, 0, 0, 0, 1, 1)))
+    states = driven(x[None], phi - gain @ c, (drive + measured @ gain.T)[:, None])[0][:, 0]
+    return measured - states @ c.T, states

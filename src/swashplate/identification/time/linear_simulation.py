@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import schur, solve_sylvester
 
 from swashplate.arrays import Array
@@ -45,13 +46,13 @@ def two_sided(a: Array, b: Array, inputs: Array, dt: float) -> tuple[Array, Arra
     aside = np.eye(n)
     aside[:k, k:] = solve_sylvester(form[:k, :k], -form[k:, k:], -form[:k, k:])
     to_states = turn @ aside
-    driven = np.linalg.solve(to_states, b)
+    forces = np.linalg.solve(to_states, b)
     forced, free, pushed = np.zeros((n_t, n, b.shape[1])), np.zeros((n_t, n, n)), np.zeros((n_t, n, n))
     if k:
-        parts = _from_rest(form[:k, :k], driven[:k], inputs, dt)
+        parts = _from_rest(form[:k, :k], forces[:k], inputs, dt)
         forced[:, :k], free[:, :k, :k], pushed[:, :k, :k] = parts
     if k < n:
-        parts = _from_rest(-form[k:, k:], -driven[k:], inputs[::-1], dt)
+        parts = _from_rest(-form[k:, k:], -forces[k:], inputs[::-1], dt)
         forced[:, k:], free[:, k:, k:], pushed[:, k:, k:] = (part[::-1] for part in parts)
     return tuple(to_states @ part for part in (forced, free, pushed))
 
@@ -63,11 +64,43 @@ def _from_rest(a: Array, b: Array, inputs: Array, dt: float) -> tuple[Array, Arr
     _, constant, _ = first_order_hold(a, np.eye(n), dt)
     drive = inputs[:-1, None, :] * q0 + np.diff(inputs, axis=0)[:, None, :] * q1
     drive = np.concatenate([drive, np.zeros((n_t - 1, n, n)), np.broadcast_to(constant, (n_t - 1, n, n))], axis=2)
-    every = np.zeros((n_t, n, m + 2 * n))
-    every[0, :, m : m + n] = np.eye(n)
-    for k in range(1, n_t):
-        every[k] = phi @ every[k - 1] + drive[k - 1]
+    start = np.concatenate([np.zeros((n, m)), np.eye(n), np.zeros((n, n))], axis=1)
+    last = np.zeros((1, n, m + 2 * n))
+    every = driven(start.T, phi, np.concatenate([drive, last]).swapaxes(1, 2))[0].swapaxes(1, 2)
     return every[:, :, :m], every[:, :, m : m + n], every[:, :, m + n :]
+
+
+def driven(start: NDArray[Any], phi: NDArray[Any], push: NDArray[Any]) -> tuple[Any, Any]:
+    """States along a record where the next are x Phi' + push: at every sample (n_t, k, n), and after the last (k, n).
+
+    Pieces of the record run side by side from rest, then one after the other what each begins with is added: some steps
+    of large matrices for many of small ones.
+
+    Args:
+        start: k states at the first sample, (k, n).
+        phi: transition (n, n).
+        push: what drives them to the next sample, (n_t, k, n).
+    """
+    n_t, k, n = push.shape
+    length = max(1, round(np.sqrt(n_t)))
+    pieces = -(-n_t // length)
+    made = np.zeros((length + 1, pieces, k, n), dtype=np.result_type(start, phi, push))
+    padded = np.zeros((pieces * length, k, n), dtype=push.dtype)
+    padded[:n_t] = push
+    padded = padded.reshape(pieces, length, k, n)
+    powers = [np.eye(n)]
+    for i in range(length):
+        made[i + 1] = made[i] @ phi.T + padded[:, i]
+        powers.append(powers[-1] @ phi.T)
+    begins = np.empty((pieces, k, n), dtype=made.dtype)
+    for piece in range(pieces):
+        begins[piece] = start
+        start = start @ powers[-1] + made[-1, piece]
+    for i in range(length):
+        made[i] += begins @ powers[i]
+    every = made[:-1].swapaxes(0, 1).reshape(-1, k, n)
+    after = every[n_t] if n_t < len(every) else start
+    return every[:n_t], after
 
 
 def answers(model: StateSpaceModel, outputs: Sequence[str], inputs: Array, dt: float) -> tuple[Array, Array]:

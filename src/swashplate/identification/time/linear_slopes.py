@@ -10,14 +10,12 @@ which stays in the processor's cache.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.jax_on_demand import jax
-from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.identification.time.linear_simulation import driven
 
 _BLOCK = 256
 """Samples."""
@@ -63,32 +61,20 @@ def slopes_along(
     seen = -np.concatenate(
         [moved.c, moved.d, none, base.d * lag, none, moved.bias[:, :, None], np.zeros((few, k, k))], axis=2
     )
-    driven = np.concatenate(
+    driving = np.concatenate(
         [moved.phi, moved.g0, moved.g1, base.g0 * lag, base.g1 * lag, moved.push[:, :, None], moved.gain[:few]], axis=2
     )
     pushing = np.zeros((many, n, seen.shape[2]))
-    pushing[:few] = driven + base.gain @ seen
+    pushing[:few] = driving + base.gain @ seen
     pushing[few:, :, -k:] = moved.gain[few:]
     by_signal, through = pushing.reshape(many * n, -1).T, seen.reshape(few * k, -1).T
-    whole = -(-n_t // _BLOCK) * _BLOCK
-    table = np.concatenate([np.hstack(signals), np.zeros((whole - n_t, seen.shape[2]))])
+    table = np.hstack(signals)
     x = np.concatenate([moved.x, np.zeros((many - few, n))])
     loop = base.phi - base.gain @ base.c
     for at in range(0, n_t, _BLOCK):
         block = table[at : at + _BLOCK]
-        x, ran = _linear()(x, loop, (block @ by_signal).reshape(_BLOCK, many, n))
-        slopes = (np.asarray(ran).reshape(-1, n) @ -base.c.T).reshape(_BLOCK, many, k)
-        slopes[:, :few] += (block @ through).reshape(_BLOCK, few, k)
-        count = min(_BLOCK, n_t - at)
-        yield errors[at : at + count], np.ascontiguousarray(np.moveaxis(slopes[:count], 1, 0))
-
-
-@cache
-def _linear() -> Any:
-    """The last x, and x of every sample (n_t, n_entries, n_states), where the next is x Phi' + push."""
-    enable_double_precision()
-
-    def run(x: jax.Array, phi: jax.Array, pushed: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return jax.lax.scan(lambda x, push: (x @ phi.T + push, x), x, pushed)
-
-    return jax.jit(run)
+        count = len(block)
+        ran, x = driven(x, loop, (block @ by_signal).reshape(count, many, n))
+        slopes = (ran.reshape(-1, n) @ -base.c.T).reshape(count, many, k)
+        slopes[:, :few] += (block @ through).reshape(count, few, k)
+        yield errors[at : at + count], np.ascontiguousarray(np.moveaxis(slopes, 1, 0))

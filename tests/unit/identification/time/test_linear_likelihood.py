@@ -12,6 +12,7 @@ from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.time.linear_filter import FilterErrors
 from swashplate.identification.time.linear_likelihood import OutputErrors
+from swashplate.identification.time.linear_simulation import driven
 from swashplate.identification.time.linear_time_fit import linear_records, torn
 from swashplate.models.linear.state_space_file import structure
 
@@ -46,6 +47,20 @@ def test_the_gradient_is_the_slope_of_the_cost_by_every_entry(method: str) -> No
     np.testing.assert_allclose(gradient, slopes, rtol=1e-4, atol=1e-5 * np.max(np.abs(gradient)))
     groups = {entry.group for entry in likelihood.row.entries}
     assert groups >= {"parameter", "initial", "nuisance"} | (set() if method == "output-error" else {"noise"})
+
+
+@pytest.mark.parametrize("samples", [1, 2, 7, 50])
+def test_states_in_pieces_are_those_one_after_the_other(samples: int) -> None:
+    random = np.random.default_rng(samples)
+    phi, start = np.array([[1.02, 0.3], [-0.2, 0.7]]), random.standard_normal((3, 2))
+    push = random.standard_normal((samples, 3, 2))
+    x, expected = start, []
+    for now in push:
+        expected.append(x)
+        x = x @ phi.T + now
+    every, after = driven(start, phi, push)
+    np.testing.assert_allclose(every, expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(after, x, rtol=1e-12, atol=1e-12)
 
 
 def test_a_first_gain_is_likelier_and_moves_nothing_else() -> None:
