@@ -11,6 +11,7 @@ import base64
 import gzip
 import hashlib
 import json
+import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
@@ -30,6 +31,8 @@ from swashplate.reporting.structure import Figure
 _LEVELS = 65534
 _GAP = 65535
 """The level that stands for no number."""
+LARGEST = 256 << 20
+"""Bytes that a page's figures may unpack to."""
 
 
 @cache
@@ -68,8 +71,15 @@ def figures_text(figures: Sequence[Figure]) -> str:
 
 
 def read_figures(text: str) -> list[dict[str, Any]]:
-    """What `figures_text` wrote, each with its rows as lists (None is a gap): what the page's script does."""
-    whole = gzip.decompress(base64.b64decode(text))
+    """What `figures_text` wrote, each with its rows as lists (None is a gap): what the page's script does.
+
+    Raises:
+        ValueError: where it unpacks to more than `LARGEST`; and whatever damaged text leads to.
+    """
+    machine = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)  # with gzip's header
+    whole = machine.decompress(base64.b64decode(text), LARGEST)
+    if not machine.eof:
+        raise ValueError(f"they are cut off, or unpack to more than {LARGEST:,} bytes")
     size = int.from_bytes(whole[:4], "little")
     rows = whole[4 + size :]
     specs: list[dict[str, Any]] = json.loads(whole[4 : 4 + size])
