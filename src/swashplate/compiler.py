@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import subprocess
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from swashplate.errors import ExportError
+from swashplate.systems import end_with_children
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror")
 
@@ -41,7 +40,7 @@ def ran(command: Sequence[str], *, where: str, seconds: float = LIMIT) -> tuple[
         try:
             out, err = process.communicate(timeout=seconds)
         except BaseException as error:
-            _end(process)
+            end_with_children(process, at_once=True)  # a compiler starts others, which would hold the pipes open
             if not isinstance(error, subprocess.TimeoutExpired):
                 raise
             raise ExportError(
@@ -50,14 +49,6 @@ def ran(command: Sequence[str], *, where: str, seconds: float = LIMIT) -> tuple[
                 hint="Try it by hand (`cc --version`), or take it off the PATH: then JAX computes.",
             ) from None
     return process.returncode, out.decode("utf-8", "replace"), err.decode("utf-8", "replace")
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and those of its session: a compiler starts others, which would hold the pipes open."""
-    if hasattr(os, "killpg"):
-        with suppress(OSError):
-            os.killpg(process.pid, signal.SIGKILL)
-    process.kill()
 
 
 def shared_library(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()) -> Path:

@@ -45,6 +45,7 @@ from swashplate.cli import (
 )
 from swashplate.cli.guard import Guarded
 from swashplate.cli.terminal import over
+from swashplate.systems import HANGUP
 
 app = typer.Typer(
     name="swash",
@@ -132,7 +133,7 @@ def main() -> NoReturn:
     sys.stdout, sys.stderr = over(sys.stdout), over(sys.stderr)
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # the compiler's remarks to its own developers
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # the terminal is closed; `nohup` ignores that
-        signal.signal(signal.SIGHUP, lambda *_: sys.exit(128 + signal.SIGHUP))
+    if HANGUP is not None and signal.getsignal(HANGUP) is signal.SIG_DFL:  # `nohup` ignores it
+        signal.signal(HANGUP, lambda number, _: sys.exit(128 + number))
     app(prog_name="swash")  # also as `python -m swashplate`: completion and help speak of swash
     raise AssertionError("typer ends the process itself")
