@@ -9,6 +9,7 @@ import pytest
 
 from swashplate import compiled
 from swashplate.compiler import compiler
+from swashplate.errors import ExportError
 
 pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -57,7 +58,16 @@ def test_where_nothing_can_be_kept_it_still_steps(cache: Path) -> None:
 
 def test_another_processor_has_a_library_of_its_own(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compiled.loaded(SOURCE, options=[compiled.NATIVE])
-    assert "__x86_64__" in compiled._processor(compiler()) or "__aarch64__" in compiled._processor(compiler())
-    monkeypatch.setattr(compiled, "_processor", lambda program: "another")
+    told, useless = compiled.answer(str(compiler()))
+    assert "__x86_64__" in told or "__aarch64__" in told
+    assert useless == ""
+    monkeypatch.setattr(compiled, "answer", lambda program: ("another", ""))
     compiled.loaded(SOURCE, options=[compiled.NATIVE])
     assert len(list(cache.iterdir())) == 2
+
+
+def test_what_does_not_load_is_not_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "shared_library", lambda sources, out, options: out.write_bytes(b"no library"))
+    with pytest.raises(ExportError, match=r"body\.so: what .* made does not load"):
+        _loaded(SOURCE)
+    assert list(cache.iterdir()) == []
