@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
-from pathlib import Path
-
-import platformdirs
 
 from swashplate.atomic import scratch_folder
 from swashplate.compiler import NATIVE, answer, compiler, shared_library
 from swashplate.errors import ExportError, WriteError
+from swashplate.kept import cache_folder
 from swashplate.visible import visible
 
 
@@ -43,18 +41,17 @@ def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
     """
     program = compiler() or ""
     told = "\0".join((source, program, *options, answer(program)[0] if program and NATIVE in options else ""))
-    folder = Path(platformdirs.user_cache_dir("swashplate")) / "c"
-    library = folder / f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
-    if library.is_file():
+    folder, name = cache_folder("c"), f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
+    library = None if folder is None else folder / name
+    if library is not None and library.is_file():
         try:
             return ctypes.CDLL(str(library))
         except OSError:  # damaged: made anew
             library.unlink(missing_ok=True)
     with ExitStack() as keeping:
         try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             made = keeping.enter_context(scratch_folder(folder))
-        except (OSError, WriteError):  # nothing can be kept
+        except WriteError:  # nothing can be kept
             made = keeping.enter_context(scratch_folder())
         text, place = made / "body.c", made / "body.so"
         text.write_text(source, encoding="utf-8")
@@ -63,6 +60,6 @@ def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
             made_now = ctypes.CDLL(str(place))  # what is loaded stays when its file goes
         except OSError as error:
             raise ExportError(f"what {program} made does not load: {error}.", where=place.name) from None
-        if made.parent == folder:
+        if library is not None and made.parent == folder:
             os.replace(place, library)
         return made_now

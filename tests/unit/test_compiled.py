@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from swashplate import compiled
+from swashplate import compiled, kept
 from swashplate.compiler import compiler
 from swashplate.errors import ExportError
 
@@ -24,7 +24,7 @@ SOURCE = "void body_frame(void);\nvoid body_frame(void) {}\n"
 
 @pytest.fixture
 def cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    monkeypatch.setattr(compiled.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
+    monkeypatch.setattr(kept.platformdirs, "user_cache_dir", lambda name, **_: str(tmp_path / name))
     return tmp_path / "swashplate" / "c"
 
 
@@ -43,7 +43,7 @@ def test_it_is_compiled_once_and_without_a_compiler_not_offered(cache: Path, mon
 def test_a_damaged_library_is_made_anew(cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _loaded(SOURCE)
     (found,) = cache.iterdir()
-    monkeypatch.setattr(compiled.platformdirs, "user_cache_dir", lambda name: str(tmp_path / "other" / name))
+    monkeypatch.setattr(kept.platformdirs, "user_cache_dir", lambda name, **_: str(tmp_path / "other" / name))
     damaged = tmp_path / "other" / "swashplate" / "c" / found.name  # a path that the loader has not seen
     damaged.parent.mkdir(parents=True)
     damaged.write_bytes(b"no library")

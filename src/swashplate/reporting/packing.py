@@ -15,16 +15,15 @@ import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import platformdirs
 
 from swashplate.arrays import Array
 from swashplate.atomic import write_text
 from swashplate.errors import WriteError
 from swashplate.extras import library
+from swashplate.kept import cache_folder
 from swashplate.reporting.figures.themes import unpacked
 from swashplate.reporting.structure import Figure
 
@@ -43,14 +42,16 @@ def plotly_script() -> str:
         SwashError: plotly missing, with the command that installs it.
     """
     script = str(library("plotly.offline", what="a page").get_plotlyjs()).encode("utf-8")
-    place = Path(platformdirs.user_cache_dir("swashplate")) / "pages" / f"plotly-{_digest(script)}.txt"
+    folder = cache_folder("pages")
+    if folder is None:
+        return _squeezed(script)
+    place = folder / f"plotly-{_digest(script)}.txt"
     with suppress(OSError, ValueError):
         digest, _, known = place.read_text(encoding="ascii").partition("\n")
         if digest == _digest(known.encode("ascii")):
             return known
     text = _squeezed(script)
     with suppress(OSError, WriteError):  # without it, it is made again the next time
-        place.parent.mkdir(parents=True, exist_ok=True)
         write_text(place, f"{_digest(text.encode('ascii'))}\n{text}")
     return text
 
