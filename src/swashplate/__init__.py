@@ -13,11 +13,12 @@ cache on (in the user's cache folder), for the whole process: models and fits ar
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from importlib import import_module
 
-from swashplate import public
-
+TYPE_CHECKING = False  # for those who check types it is True; `typing` takes a third of the time until `swash` begins
 if TYPE_CHECKING:
+    from typing import Any
+
     from swashplate.api.accept_autopilot import accept_autopilot
     from swashplate.api.autopilot_gains import autopilot_gains
     from swashplate.api.bench import evaluate_bench, simulate_bench
@@ -252,11 +253,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Names of `__all__` are loaded when first used (PEP 562)."""
     if name == "__version__":
-        from importlib import metadata
-
-        value: Any = metadata.version("swashplate")
-    elif name in public.NAMES:
-        value = public.resolve(name)
+        value: Any = import_module("importlib.metadata").version("swashplate")
+    elif name in __all__:
+        value = import_module("swashplate.public").resolve(name)
     else:
         raise AttributeError(f"module 'swashplate' has no attribute '{name}'")
     globals()[name] = value

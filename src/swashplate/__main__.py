@@ -1,29 +1,41 @@
-"""`swash`, also as `python -m swashplate`: an interrupt ends in words even while the verbs are still being loaded."""
+"""`swash`, also as `python -m swashplate`: an interrupt ends in words even while the verbs are still being loaded.
+
+What is imported before `main` has set its handler is kept to a few milliseconds: an interrupt there, as in Python's own
+start, is answered by Python.
+"""
 
 from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
-from typing import NoReturn
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import NoReturn
 
 if __name__ == "__main__" and not sys.flags.safe_path:
     del sys.path[0]  # `python -m` puts the folder that it works in there: what lies in it must not be imported
 
-from swashplate.threads import ONE_THREAD
+
+def _leave(*_: object) -> None:
+    """Nothing has been begun: there is nothing to clean up, and no import that could catch an exception and go on."""
+    os.write(2, b"Stopped. Nothing was left half-written.\n")
+    os._exit(130)
 
 
 def main() -> NoReturn:
     """The console script."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # in a shell's background it is ignored
+        signal.signal(signal.SIGINT, _leave)  # until the command line is read
+    from swashplate.threads import ONE_THREAD
+
     os.environ.update(ONE_THREAD)
     gc.set_threshold(50_000, 20, 20)  # cells of a large table are no cycles: looking for some took a fifth of reading
-    try:
-        from swashplate.cli.app import main as run
+    from swashplate.cli.app import main as run
 
-        run()
-    except KeyboardInterrupt:  # while the verbs are loaded, or the command line is read
-        print("Stopped. Nothing was left half-written.", file=sys.stderr)
-        sys.exit(130)
+    run()
 
 
 if __name__ == "__main__":

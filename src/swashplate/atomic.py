@@ -2,13 +2,12 @@
 
 A temporary file or folder is held by a lock of the process that writes it (`flock`, which the system drops when the
 process ends, however it ends). One that nobody holds was left by a process that was killed: the next one that writes to
-the same folder removes it.
+the same folder removes it. Windows renames nothing that is open: there nothing is held, and what a kill leaves stays.
 """
 
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 import secrets
@@ -20,6 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from swashplate import systems
 from swashplate.errors import WriteError
 from swashplate.json_text import as_json
 
@@ -52,22 +52,29 @@ def _named(path: str | os.PathLike[str]) -> Iterator[None]:
 def _held(path: Path) -> int | None:
     """A descriptor that holds the lock of a temporary file or folder; None where another process swept it first.
 
-    A file system without locks gives the descriptor all the same: nobody can sweep there.
+    A file system without locks gives the descriptor all the same: nobody can sweep there. -1 where nothing can be held.
     """
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    if not systems.HOLDS:
+        return -1
+    descriptor = os.open(path, os.O_RDONLY)
     with suppress(OSError):
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        systems.lock(descriptor, wait=True)
     if path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor)):
         return descriptor
     os.close(descriptor)
     return None
 
 
+def _let_go(held: int) -> None:
+    if held >= 0:
+        os.close(held)
+
+
 def _new_file(target: Path) -> tuple[Path, int]:
     while True:
         # The suffix stays: some writers choose their format by it.
         path = target.parent / f"{_MARK}{secrets.token_hex(6)}{target.suffix}"
-        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o666))
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         with suppress(FileNotFoundError):
             held = _held(path)
             if held is not None:
@@ -90,6 +97,8 @@ def sweep(folder: str | os.PathLike[str]) -> None:
     Only what this user owns and no living process holds is touched; what cannot be removed stays.
     """
     place = Path(folder)
+    if not systems.HOLDS:
+        return
     with suppress(OSError), os.scandir(place) as entries:
         for name in [entry.name for entry in entries if entry.name.startswith(_MARK)]:
             with suppress(OSError, ValueError, KeyError, TypeError):  # a note that nobody here wrote is left alone
@@ -97,11 +106,11 @@ def sweep(folder: str | os.PathLike[str]) -> None:
 
 
 def _sweep_one(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
+    descriptor = os.open(path, os.O_RDONLY | systems.NO_LINK | systems.NOT_WAITING)
     try:
         if os.fstat(descriptor).st_uid != os.geteuid():
             return
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # fails where its process lives
+        systems.lock(descriptor)  # fails where its process lives
         if not stat.S_ISDIR(os.fstat(descriptor).st_mode):
             path.unlink()
             return
@@ -115,7 +124,7 @@ def _sweep_one(path: Path) -> None:
 def _synced(folder: Path) -> None:
     """A folder's names on the disk, where the file system can promise it."""
     with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+        descriptor = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(descriptor)
         finally:
@@ -136,9 +145,9 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
     with _complete(Path(path)) as temporary:
         yield temporary
         with _named(path):
+            _on_disk(temporary)
             if Path(path).exists():
                 temporary.chmod(stat.S_IMODE(Path(path).stat().st_mode))
-            _on_disk(temporary)
             os.replace(temporary, path)
 
 
@@ -183,11 +192,11 @@ def _complete(target: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
         raise
     finally:
-        os.close(held)
+        _let_go(held)
 
 
 def _on_disk(file: Path) -> None:
-    descriptor = os.open(file, os.O_RDONLY | os.O_CLOEXEC)
+    descriptor = os.open(file, os.O_RDWR)  # Windows flushes only what may be written to
     try:
         os.fsync(descriptor)
     finally:
@@ -223,8 +232,9 @@ def write_bytes(path: str | os.PathLike[str], content: bytes | memoryview) -> Pa
     if target.exists() and not target.is_file() and not target.is_dir():  # a pipe or a device is never replaced
         with _named(path):
             # A pipe that nobody reads from is an error at once: opened to wait, it would wait for ever.
-            descriptor = os.open(target, os.O_WRONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-            os.set_blocking(descriptor, True)
+            descriptor = os.open(target, os.O_WRONLY | systems.NOT_WAITING | systems.BYTES)
+            if systems.NOT_WAITING:
+                os.set_blocking(descriptor, True)
             with os.fdopen(descriptor, "wb") as stream:
                 stream.write(content)
         return target
@@ -297,7 +307,7 @@ def folder_when_complete(target: str | os.PathLike[str], *, ours: Collection[str
     finally:
         if not (temporary / _COMMIT).exists() or not any((temporary / _NEW).iterdir()):  # otherwise it is still needed
             shutil.rmtree(temporary, ignore_errors=True)
-        os.close(held)
+        _let_go(held)
         _without_empty(missing)
 
 
@@ -319,7 +329,7 @@ def scratch_folder(place: str | os.PathLike[str] | None = None) -> Iterator[Path
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-        os.close(held)
+        _let_go(held)
 
 
 def _without_empty(folders: list[Path]) -> None:

@@ -5,24 +5,30 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
-from pathlib import Path
-
-import platformdirs
 
 from swashplate.atomic import scratch_folder
-from swashplate.compiler import LIMIT, compiler, ran, shared_library
-from swashplate.errors import WriteError
-
-NATIVE = "-march=native"
+from swashplate.compiler import NATIVE, answer, compiler, shared_library
+from swashplate.errors import ExportError, WriteError
+from swashplate.kept import cache_folder
+from swashplate.visible import visible
 
 
 def can_compile() -> bool:
-    """Whether this machine has CasADi and a C compiler."""
-    return compiler() is not None and find_spec("casadi") is not None
+    """Whether this machine has CasADi and a C compiler; of one that cannot be used standard error is told, once."""
+    program = compiler()
+    return program is not None and find_spec("casadi") is not None and _is_useful(program)
+
+
+@lru_cache(maxsize=4)
+def _is_useful(program: str) -> bool:
+    if useless := answer(program)[1]:
+        print(visible(f"No C is compiled: {useless} This takes longer without."), file=sys.stderr)
+    return not useless
 
 
 def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
@@ -31,35 +37,29 @@ def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
     It lies under the digest of source, compiler and options, and of this processor where it is compiled for it alone.
 
     Raises:
-        ExportError: without a compiler, or where it refuses the source.
+        ExportError: without a compiler, where it refuses the source, or where what it made does not load.
     """
-    told = "\0".join((source, compiler() or "", *options, _processor(compiler()) if NATIVE in options else ""))
-    folder = Path(platformdirs.user_cache_dir("swashplate")) / "c"
-    library = folder / f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
-    if library.is_file():
+    program = compiler() or ""
+    told = "\0".join((source, program, *options, answer(program)[0] if program and NATIVE in options else ""))
+    folder, name = cache_folder("c"), f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
+    library = None if folder is None else folder / name
+    if library is not None and library.is_file():
         try:
             return ctypes.CDLL(str(library))
         except OSError:  # damaged: made anew
             library.unlink(missing_ok=True)
     with ExitStack() as keeping:
         try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             made = keeping.enter_context(scratch_folder(folder))
-        except (OSError, WriteError):  # nothing can be kept
+        except WriteError:  # nothing can be kept
             made = keeping.enter_context(scratch_folder())
         text, place = made / "body.c", made / "body.so"
         text.write_text(source, encoding="utf-8")
         shared_library([text], place, options=options)
-        if made.parent == folder:
+        try:
+            made_now = ctypes.CDLL(str(place))  # what is loaded stays when its file goes
+        except OSError as error:
+            raise ExportError(f"what {program} made does not load: {error}.", where=place.name) from None
+        if library is not None and made.parent == folder:
             os.replace(place, library)
-            place = library
-        return ctypes.CDLL(str(place))  # what is loaded stays when its file goes
-
-
-@lru_cache(maxsize=4)
-def _processor(program: str | None) -> str:
-    """What the compiler takes this processor for: a cache may be shared with one that knows fewer instructions."""
-    if program is None:
-        return ""
-    asked = [program, NATIVE, "-dM", "-E", "-x", "c", os.devnull]
-    return ran(asked, where="the processor's instructions", seconds=LIMIT / 10.0)[1]
+        return made_now

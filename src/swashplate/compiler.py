@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import subprocess
 from collections.abc import Sequence
-from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 
 from swashplate.errors import ExportError
+from swashplate.systems import end_with_children
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror")
 
 
+NATIVE = "-march=native"
+PATIENCE = 5.0
+"""s until it must have said what it is, which takes it 0.02 s."""
+_BY_HAND = "Try it by hand (`cc --version`), or take it off the PATH: then it is done without."
 LIMIT = 300.0
 """s that the compiler may take; a filter of a Raptor 50 takes it one second of processor time."""
 
@@ -41,23 +45,25 @@ def ran(command: Sequence[str], *, where: str, seconds: float = LIMIT) -> tuple[
         try:
             out, err = process.communicate(timeout=seconds)
         except BaseException as error:
-            _end(process)
+            end_with_children(process, at_once=True)  # a compiler starts others, which would hold the pipes open
             if not isinstance(error, subprocess.TimeoutExpired):
                 raise
             raise ExportError(
                 f"the C compiler {command[0]} has not ended after {seconds:g} s.",
                 where=where,
-                hint="Try it by hand (`cc --version`), or take it off the PATH: then JAX computes.",
+                hint=_BY_HAND,
             ) from None
     return process.returncode, out.decode("utf-8", "replace"), err.decode("utf-8", "replace")
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and those of its session: a compiler starts others, which would hold the pipes open."""
-    if hasattr(os, "killpg"):
-        with suppress(OSError):
-            os.killpg(process.pid, signal.SIGKILL)
-    process.kill()
+@lru_cache(maxsize=4)
+def answer(program: str) -> tuple[str, str]:
+    """What a compiler takes this processor for, and why it cannot be used, "" where it can; asked once a process."""
+    asked = [program, NATIVE, "-dM", "-E", "-x", "c", os.devnull]
+    try:
+        return ran(asked, where="the processor's instructions", seconds=PATIENCE)[1], ""
+    except ExportError as error:
+        return "", f"{error.problem} {error.hint or ''}".strip()
 
 
 def shared_library(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()) -> Path:
@@ -74,6 +80,8 @@ def shared_library(sources: Sequence[Path], out: Path, *, options: Sequence[str]
     program = compiler()
     if program is None:
         raise ExportError("there is no C compiler here (cc, gcc or clang).", where=out.name)
+    if useless := answer(program)[1]:
+        raise ExportError(useless, where=out.name)
     command = [program, *STRICT, "-fPIC", "-shared", *options, "-o", str(out), *(str(file) for file in sources), "-lm"]
     code, _, said = ran(command, where=out.name)
     if code != 0:
@@ -82,4 +90,6 @@ def shared_library(sources: Sequence[Path], out: Path, *, options: Sequence[str]
             where=out.name,
             hint="Please report this with the model.",
         )
+    if not out.is_file():
+        raise ExportError(f"{program} says that all is well, and wrote nothing.", where=out.name, hint=_BY_HAND)
     return out

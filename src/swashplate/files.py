@@ -7,6 +7,8 @@ import os
 import stat
 from pathlib import Path
 
+from swashplate.systems import BYTES, NOT_WAITING
+
 _AT_LEAST = 1 << 16
 """Bytes that are read of a file whose size the system does not say."""
 
@@ -23,7 +25,7 @@ def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
             one, the other may have no end), or has more bytes.
         ValueError: for a path with a zero byte.
     """
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    descriptor = os.open(path, os.O_RDONLY | NOT_WAITING | BYTES)
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):

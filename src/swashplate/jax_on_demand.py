@@ -16,11 +16,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from swashplate.errors import SwashError
-
-try:
-    import resource
-except ImportError:  # Windows knows no such limits
-    resource = None
+from swashplate.systems import resource
 
 _SETTINGS: dict[str, object] = {}
 _LOCK = RLock()

@@ -214,3 +214,34 @@ def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path, nu
         process.send_signal(number)
         assert process.wait(20) == 128 + number
     assert os.listdir(tmp_path) == []
+
+
+INTERRUPTED = """
+import os, signal, sys
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1]:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupting())
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background ignores it
+from swashplate.__main__ import main
+sys.argv = ["swash", "trim", "--vehicle", "coax"]
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    "loaded", ["swashplate.threads", "typer", "swashplate.cli.campaign", "swashplate.cli.trim", "numpy", "casadi"]
+)
+def test_an_interrupt_while_something_is_loaded_ends_in_words(loaded: str) -> None:
+    words = [sys.executable, "-P", "-c", INTERRUPTED, loaded]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "Stopped. Nothing was left half-written.\n")
+
+
+def test_little_is_loaded_before_an_interrupt_ends_in_words() -> None:
+    code = "import sys; had = set(sys.modules); import swashplate.__main__; print(*sorted(set(sys.modules) - had))"
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
+    mine = [name for name in done.stdout.split() if name.startswith("swashplate")]
+    assert mine == ["swashplate", "swashplate.__main__"]
+    assert not {"typing", "inspect", "pathlib", "importlib.metadata"} & set(done.stdout.split())

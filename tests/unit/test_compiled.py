@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from swashplate import compiled
+from swashplate import compiled, kept
 from swashplate.compiler import compiler
+from swashplate.errors import ExportError
 
 pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -23,7 +24,7 @@ SOURCE = "void body_frame(void);\nvoid body_frame(void) {}\n"
 
 @pytest.fixture
 def cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    monkeypatch.setattr(compiled.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
+    monkeypatch.setattr(kept.platformdirs, "user_cache_dir", lambda name, **_: str(tmp_path / name))
     return tmp_path / "swashplate" / "c"
 
 
@@ -42,7 +43,7 @@ def test_it_is_compiled_once_and_without_a_compiler_not_offered(cache: Path, mon
 def test_a_damaged_library_is_made_anew(cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _loaded(SOURCE)
     (found,) = cache.iterdir()
-    monkeypatch.setattr(compiled.platformdirs, "user_cache_dir", lambda name: str(tmp_path / "other" / name))
+    monkeypatch.setattr(kept.platformdirs, "user_cache_dir", lambda name, **_: str(tmp_path / "other" / name))
     damaged = tmp_path / "other" / "swashplate" / "c" / found.name  # a path that the loader has not seen
     damaged.parent.mkdir(parents=True)
     damaged.write_bytes(b"no library")
@@ -57,7 +58,16 @@ def test_where_nothing_can_be_kept_it_still_steps(cache: Path) -> None:
 
 def test_another_processor_has_a_library_of_its_own(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compiled.loaded(SOURCE, options=[compiled.NATIVE])
-    assert "__x86_64__" in compiled._processor(compiler()) or "__aarch64__" in compiled._processor(compiler())
-    monkeypatch.setattr(compiled, "_processor", lambda program: "another")
+    told, useless = compiled.answer(str(compiler()))
+    assert "__x86_64__" in told or "__aarch64__" in told
+    assert useless == ""
+    monkeypatch.setattr(compiled, "answer", lambda program: ("another", ""))
     compiled.loaded(SOURCE, options=[compiled.NATIVE])
     assert len(list(cache.iterdir())) == 2
+
+
+def test_what_does_not_load_is_not_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "shared_library", lambda sources, out, options: out.write_bytes(b"no library"))
+    with pytest.raises(ExportError, match=r"body\.so: what .* made does not load"):
+        _loaded(SOURCE)
+    assert list(cache.iterdir()) == []

@@ -37,6 +37,28 @@ def test_one_that_hangs_is_ended_with_all_that_it_has_started(tmp_path: Path, mo
     os.close(reader)
 
 
+def test_one_that_does_not_answer_is_told_of_once_and_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
+    cc = made(tmp_path, b"exec sleep 1000\n", monkeypatch)
+    monkeypatch.setattr(compiler, "PATIENCE", 0.2)
+    assert not compiled.can_compile()
+    assert capsys.readouterr().err.startswith(
+        f"No C is compiled: the C compiler {cc} has not ended after 0.2 s. Try it"
+    )
+    assert not compiled.can_compile()
+    assert capsys.readouterr().err == ""
+    with pytest.raises(ExportError, match=r"a\.so: the C compiler .* has not ended after 0\.2 s"):
+        compiler.shared_library([tmp_path / "a.c"], tmp_path / "a.so")
+
+
+def test_one_that_lies_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made(tmp_path, b"exit 0\n", monkeypatch)
+    with pytest.raises(ExportError, match=r"a\.so: .*cc says that all is well, and wrote nothing"):
+        compiler.shared_library([tmp_path / "a.c"], tmp_path / "a.so")
+
+
 def test_one_that_cannot_be_started_is_told(tmp_path: Path) -> None:
     (tmp_path / "cc").write_text("no program")
     with pytest.raises(ExportError, match=r"cc cannot be started: Permission denied"):

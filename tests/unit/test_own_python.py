@@ -39,10 +39,11 @@ STARTS = {
     "api/campaigns/program.py": "asks for its parent",
     "api/campaigns/verbs.py": "asks the pool",
     "compiler.py": "the C compiler",
-    "flights/hdf5.py": "own_python",
+    "flights/foreign.py": "own_python",
     "links/ardupilot/sitl.py": "an autopilot that the user names",
     "links/live/film.py": "ffmpeg",
     "links/live/identifying.py": "own_python",
+    "systems.py": "ends what sitl.py has started",
 }
 """Files that start processes, and what: a new one is looked at here before it is added."""
 

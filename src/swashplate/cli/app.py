@@ -45,6 +45,7 @@ from swashplate.cli import (
 )
 from swashplate.cli.guard import Guarded
 from swashplate.cli.terminal import over
+from swashplate.systems import HANGUP
 
 app = typer.Typer(
     name="swash",
@@ -126,13 +127,19 @@ def _open_closed_streams() -> None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
+def _clean_up_when_interrupted() -> None:
+    """From now on: a verb begins. Before, `swashplate.__main__` ends at once."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as in the background of a shell
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def main() -> NoReturn:
     """The console script. A polite kill ends as an interrupt does: temporary files are removed."""
     _open_closed_streams()
     sys.stdout, sys.stderr = over(sys.stdout), over(sys.stderr)
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # the compiler's remarks to its own developers
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # the terminal is closed; `nohup` ignores that
-        signal.signal(signal.SIGHUP, lambda *_: sys.exit(128 + signal.SIGHUP))
-    app(prog_name="swash")  # also as `python -m swashplate`: completion and help speak of swash
+    if HANGUP is not None and signal.getsignal(HANGUP) is signal.SIG_DFL:  # `nohup` ignores it
+        signal.signal(HANGUP, lambda number, _: sys.exit(128 + number))
+    app(prog_name="swash", obj=_clean_up_when_interrupted)  # also as `python -m swashplate`: help speaks of swash
     raise AssertionError("typer ends the process itself")

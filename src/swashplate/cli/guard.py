@@ -57,7 +57,10 @@ def _file_trouble(error: OSError) -> str:
 
 
 class Guarded(TyperGroup):
-    """A group of verbs that ends in words: `SwashError` and trouble with files give 2, anything unforeseen 1."""
+    """A group of verbs that ends in words: `SwashError` and trouble with files give 2, anything unforeseen 1.
+
+    The context's object is called when a verb begins.
+    """
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         name, command, rest = super().resolve_command(ctx, args)
@@ -75,6 +78,8 @@ class Guarded(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         debug = bool(ctx.params.get("debug")) or os.environ.get("SWASHPLATE_DEBUG", "") not in ("", "0")
         try:
+            if ctx.obj is not None:  # as a program
+                ctx.obj()
             return self._judged(ctx)
         except (typer.Exit, typer.Abort, typer.TyperException, BrokenPipeError):
             raise  # typer knows what to do with these: usage errors are 2 already

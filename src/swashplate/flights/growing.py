@@ -26,17 +26,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate import documents
+from swashplate import documents, systems
 from swashplate.errors import FlightError
 from swashplate.flights import storage
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import ProcessingStep, Provenance
 from swashplate.flights.schema import SCHEMA_VERSION
-
-try:
-    import fcntl
-except ImportError:  # Windows: what is open there cannot be removed, which serves the same end
-    fcntl = None
 
 Schema = TypeVar("Schema")
 
@@ -111,8 +106,12 @@ class Growing:
 
     def discard(self) -> None:
         """Remove the file."""
-        self.path.unlink(missing_ok=True)
-        self.close()
+        if systems.HOLDS:  # while it is locked, so that nobody saves it
+            self.path.unlink(missing_ok=True)
+            self.close()
+        else:  # Windows removes nothing that is open
+            self.close()
+            self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Growing:
         return self
@@ -126,10 +125,8 @@ class Growing:
 def _claimed(path: Path) -> int:
     """A new, locked file. Somebody who cleans up may have removed it between being made and being locked."""
     while True:
-        made = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-        if fcntl is None:
-            return made
-        fcntl.flock(made, fcntl.LOCK_EX)
+        made = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | systems.BYTES, 0o666)
+        systems.lock(made, wait=True)
         try:
             if os.stat(path).st_ino == os.fstat(made).st_ino:
                 return made
@@ -155,8 +152,7 @@ class Abandoned:
     def __enter__(self) -> Abandoned:
         try:
             self._file = os.open(self.path, os.O_RDWR)
-            if fcntl is not None:
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            systems.lock(self._file)
             self.free = os.stat(self.path).st_ino == os.fstat(self._file).st_ino
         except OSError:
             self.free = False

@@ -11,25 +11,27 @@ import base64
 import gzip
 import hashlib
 import json
+import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import platformdirs
 
 from swashplate.arrays import Array
 from swashplate.atomic import write_text
 from swashplate.errors import WriteError
 from swashplate.extras import library
+from swashplate.kept import cache_folder
 from swashplate.reporting.figures.themes import unpacked
 from swashplate.reporting.structure import Figure
 
 _LEVELS = 65534
 _GAP = 65535
 """The level that stands for no number."""
+LARGEST = 256 << 20
+"""Bytes that a page's figures may unpack to."""
 
 
 @cache
@@ -40,14 +42,16 @@ def plotly_script() -> str:
         SwashError: plotly missing, with the command that installs it.
     """
     script = str(library("plotly.offline", what="a page").get_plotlyjs()).encode("utf-8")
-    place = Path(platformdirs.user_cache_dir("swashplate")) / "pages" / f"plotly-{_digest(script)}.txt"
+    folder = cache_folder("pages")
+    if folder is None:
+        return _squeezed(script)
+    place = folder / f"plotly-{_digest(script)}.txt"
     with suppress(OSError, ValueError):
         digest, _, known = place.read_text(encoding="ascii").partition("\n")
         if digest == _digest(known.encode("ascii")):
             return known
     text = _squeezed(script)
     with suppress(OSError, WriteError):  # without it, it is made again the next time
-        place.parent.mkdir(parents=True, exist_ok=True)
         write_text(place, f"{_digest(text.encode('ascii'))}\n{text}")
     return text
 
@@ -68,8 +72,15 @@ def figures_text(figures: Sequence[Figure]) -> str:
 
 
 def read_figures(text: str) -> list[dict[str, Any]]:
-    """What `figures_text` wrote, each with its rows as lists (None is a gap): what the page's script does."""
-    whole = gzip.decompress(base64.b64decode(text))
+    """What `figures_text` wrote, each with its rows as lists (None is a gap): what the page's script does.
+
+    Raises:
+        ValueError: where it unpacks to more than `LARGEST`; and whatever damaged text leads to.
+    """
+    machine = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)  # with gzip's header
+    whole = machine.decompress(base64.b64decode(text), LARGEST)
+    if not machine.eof:
+        raise ValueError(f"they are cut off, or unpack to more than {LARGEST:,} bytes")
     size = int.from_bytes(whole[:4], "little")
     rows = whole[4 + size :]
     specs: list[dict[str, Any]] = json.loads(whole[4 : 4 + size])

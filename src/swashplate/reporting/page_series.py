@@ -15,6 +15,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import ExportError
+from swashplate.files import read_text
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.reporting.packing import read_figures
@@ -22,6 +23,7 @@ from swashplate.reporting.packing import read_figures
 _FIGURES = re.compile(r'id="figures-gzip">([^<]*)<')
 _TITLE = re.compile(r"(.*?)\s*\[([^\]]*)\]$")
 _TIME = "time [s]"
+_LARGEST = 256 << 20  # bytes of a page
 
 
 def page_series(path: str | Path) -> Flight:
@@ -35,15 +37,15 @@ def page_series(path: str | Path) -> Flight:
     """
     page = Path(path)
     try:
-        match = _FIGURES.search(page.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
+        match = _FIGURES.search(read_text(page, most=_LARGEST))
+    except (OSError, ValueError) as error:
         raise ExportError(f"cannot be read: {error}.", where=page) from error
     if match is None:
         raise ExportError("is no report of swashplate.", where=page, hint="Name a report.html, or a flight.")
     try:
         specs = read_figures(match[1])
         lines = {name: line for spec in specs for name, line in _lines(spec)}
-    except (ValueError, LookupError, TypeError, OSError, EOFError, AttributeError, zlib.error) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError, zlib.error) as error:
         raise ExportError(f"its figures cannot be read: {error}.", where=page, hint="Write it again.") from error
     if not lines:
         raise ExportError("draws nothing over time.", where=page)

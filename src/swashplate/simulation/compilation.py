@@ -9,12 +9,11 @@ import zlib
 from contextlib import suppress
 from pathlib import Path
 
-import platformdirs
-
 from swashplate.arrays import lengthened as lengthened
 from swashplate.atomic import write_text
 from swashplate.errors import WriteError
 from swashplate.jax_on_demand import option, set_option
+from swashplate.kept import cache_folder
 
 QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
 """Options for `jax.jit`: a helicopter's exact derivatives compile four times faster, loops of one vehicle by a sixth to
@@ -58,11 +57,10 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     Returns:
         The folder, or None where it cannot be written (then nothing is kept, and nothing else changes).
     """
-    chosen = Path(
-        folder
-        or option("jax_compilation_cache_dir")
-        or Path(platformdirs.user_cache_dir("swashplate", appauthor=False)) / "jax"
-    )
+    asked = folder or option("jax_compilation_cache_dir") or cache_folder("jax")
+    if asked is None:
+        return None
+    chosen = Path(asked)
     try:
         chosen.mkdir(parents=True, exist_ok=True)
     except OSError:

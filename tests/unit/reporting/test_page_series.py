@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import io
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +14,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import ExportError
+from swashplate.reporting import packing
 from swashplate.reporting.packing import figures_text
 from swashplate.reporting.page_series import page_series
 from swashplate.reporting.structure import Figure
@@ -72,3 +76,14 @@ def test_other_pages_are_refused(tmp_path: Path) -> None:
         (tmp_path / "b.html").write_text(damaged[:cut] + "<", encoding="utf-8")
         with pytest.raises(ExportError, match="figures cannot be read"):
             page_series(tmp_path / "b.html")
+
+
+def test_a_page_of_zeros_and_a_pipe_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(packing, "LARGEST", 100_000)
+    zeros = base64.b64encode(gzip.compress(bytes(1_000_000))).decode()
+    (tmp_path / "report.html").write_text(f'<script id="figures-gzip">{zeros}</script>')
+    with pytest.raises(ExportError, match="are cut off, or unpack to more than 100,000 bytes"):
+        page_series(tmp_path / "report.html")
+    os.mkfifo(tmp_path / "pipe.html")
+    with pytest.raises(ExportError, match="it is a pipe or a device"):
+        page_series(tmp_path / "pipe.html")

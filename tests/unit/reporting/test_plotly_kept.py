@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from swashplate import kept
 from swashplate.reporting import packing
 
 
 def test_a_damaged_or_missing_copy_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packing.platformdirs, "user_cache_dir", lambda *_: str(tmp_path))
+    monkeypatch.setattr(kept.platformdirs, "user_cache_dir", lambda *_, **__: str(tmp_path))
     monkeypatch.setattr(packing, "library", lambda *_, **__: type("", (), {"get_plotlyjs": lambda: "let a = 1;"}))
     made = []
     squeezed = packing._squeezed
@@ -22,9 +23,9 @@ def test_a_damaged_or_missing_copy_is_made_anew(tmp_path: Path, monkeypatch: pyt
     assert gzip.decompress(base64.b64decode(text)) == b"let a = 1;"
     assert asked() == text
     assert len(made) == 1, "the second time it was read"
-    (kept,) = (tmp_path / "pages").iterdir()
-    kept.write_text(kept.read_text().replace("H4s", "H4x"))
+    (copy,) = (tmp_path / "pages").iterdir()
+    copy.write_text(copy.read_text().replace("H4s", "H4x"))
     assert asked() == text
     assert len(made) == 2, "what is damaged is not believed"
-    monkeypatch.setattr(packing.platformdirs, "user_cache_dir", lambda *_: str(kept))  # no folder
+    monkeypatch.setattr(kept.platformdirs, "user_cache_dir", lambda *_, **__: str(copy))  # no folder
     assert asked() == text

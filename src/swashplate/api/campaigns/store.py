@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -16,7 +15,7 @@ from typing import Any
 
 import msgspec
 
-from swashplate import atomic, documents
+from swashplate import atomic, documents, systems
 from swashplate.api.campaigns.result_files import ENDINGS, LARGEST, packed, unpacked, usual_ending
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
 from swashplate.errors import CampaignError, MissingLibraryError
@@ -220,7 +219,7 @@ class CampaignStore:
         """
         atomic.make_folder(self.folder)
         path = self.folder / LOCK
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | systems.BYTES, 0o644)
         try:
             if not _locked(descriptor):
                 raise CampaignError(
@@ -231,7 +230,8 @@ class CampaignStore:
             now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
             me = {"process": os.getpid(), "host": platform.node(), "since": now}
             os.ftruncate(descriptor, 0)
-            os.pwrite(descriptor, json.dumps(me).encode(), 0)
+            os.lseek(descriptor, 0, os.SEEK_SET)
+            os.write(descriptor, json.dumps(me).encode())
             yield
             os.ftruncate(descriptor, 0)
         finally:
@@ -241,11 +241,11 @@ class CampaignStore:
     def owner(self) -> str:
         """Who is at work here, in words; "" where nobody is."""
         try:
-            descriptor = os.open(self.folder / LOCK, os.O_RDONLY | os.O_CLOEXEC)
+            descriptor = os.open(self.folder / LOCK, os.O_RDONLY)
         except OSError:
             return ""
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            systems.lock(descriptor, shared=True)
         except OSError:
             return _owner(self.folder / LOCK)
         finally:
@@ -257,7 +257,7 @@ def _locked(descriptor: int) -> bool:
     """The lock, taken; asked some times, for whoever only looks at a store holds it for an instant."""
     for attempt in range(5):
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            systems.lock(descriptor)
             return True
         except OSError:
             time.sleep(0.02 * (attempt < 4))

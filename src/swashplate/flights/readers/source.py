@@ -76,6 +76,11 @@ class Source:
         )
 
 
+def largest_content(size: int) -> int:
+    """Bytes that a file of so many bytes may unpack to."""
+    return min(LARGEST_CONTENT, _FREE_CONTENT + _LARGEST_RATIO * size)
+
+
 def refuse_oversized(claimed: int, *, size: int, where: str, what: str) -> None:
     """Refuses a header that claims more bytes than its file can hold, before anything is allocated for it.
 
@@ -85,7 +90,7 @@ def refuse_oversized(claimed: int, *, size: int, where: str, what: str) -> None:
         where: the file, for the error.
         what: the part that claims them, for the error.
     """
-    if claimed > min(LARGEST_CONTENT, _FREE_CONTENT + _LARGEST_RATIO * size):
+    if claimed > largest_content(size):
         raise FlightError(
             f"{what} claims {claimed:,} bytes in a file of {size:,} bytes: the header is damaged or forged.",
             where=where,
@@ -100,7 +105,13 @@ def _files(place: Path) -> list[Path]:
     metadata = place / _FOLDER_MARK
     if not metadata.is_file():
         raise FlightError("is a folder, expected a flight log.", where=place, hint="Name one file in it.")
-    return [metadata, *sorted(file for file in place.iterdir() if file.is_file() and file != metadata)]
+    inside = sorted(file for file in place.iterdir() if not file.is_dir() and file != metadata)
+    for file in inside:
+        if not file.is_file():
+            raise FlightError(
+                "is a pipe, a device or a link to nothing, expected a file of the bag.", where=file, hint="Remove it."
+            )
+    return [metadata, *inside]
 
 
 def open_source(path: str | os.PathLike[str]) -> Source:

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from swashplate.errors import LinkError
+from swashplate.systems import end_with_children
 
 MAVLINK_PORT, RC_PORT, PHYSICS_PORT = 5760, 5501, 9002
 """Of instance 0."""
@@ -100,11 +101,10 @@ class Sitl:
         """End it and everything that it started."""
         if self._process is None:
             return
-        for number in (signal.SIGTERM, signal.SIGKILL):
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(self._process.pid, number)
+        for at_once in (False, True):
+            end_with_children(self._process, at_once=at_once)
             with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(_PATIENCE if number is signal.SIGTERM else None)
+                self._process.wait(None if at_once else _PATIENCE)
 
     def ended(self, *, patience: float = 0.0) -> str:
         """How it ended, with its last words; empty where it still runs after `patience` [s]."""

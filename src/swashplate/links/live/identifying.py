@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from swashplate import progress_lines
 from swashplate.models.vehicle import Vehicle
 from swashplate.own_python import own_python
+from swashplate.systems import step_back
 
 How = Literal["model", "responses"]
 Window = tuple[float, float]
@@ -151,8 +152,7 @@ class Identifying:
             stderr=asyncio.subprocess.PIPE,
             env={**os.environ, progress_lines.SWITCH: "lines"},
         )
-        with contextlib.suppress(OSError):  # the flight goes on meanwhile and comes first
-            os.setpriority(os.PRIO_PROCESS, self._process.pid, 10)
+        step_back(self._process.pid)  # the flight goes on meanwhile and comes first
         stream, said, begun = self._process.stderr, "", None
         assert stream is not None
         while heard := await stream.readline():

@@ -20,6 +20,7 @@ from starlette.types import ASGIApp
 from swashplate.errors import SwashError
 from swashplate.links.web.connections import OneLine, Punctual
 from swashplate.links.web.priority import come_first
+from swashplate.systems import HANGUP
 
 _POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
 
@@ -116,15 +117,15 @@ class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         with super().capture_signals():
-            own = threading.current_thread() is threading.main_thread() and hasattr(signal, "SIGHUP")
-            if not own or signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # as `nohup` asks for
+            own = threading.current_thread() is threading.main_thread()
+            if HANGUP is None or not own or signal.getsignal(HANGUP) is signal.SIG_IGN:  # as `nohup` asks for
                 yield
                 return
-            before = signal.signal(signal.SIGHUP, self.handle_exit)
+            before = signal.signal(HANGUP, self.handle_exit)
             try:
                 yield
             finally:
-                signal.signal(signal.SIGHUP, before)
+                signal.signal(HANGUP, before)
 
 
 def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0, first: bool = True) -> None:

@@ -148,6 +148,6 @@ def test_a_bag_that_was_not_closed_or_has_nothing_known_is_refused(tmp_path: Pat
 
 def test_without_rosbags_the_error_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bag = _bag1(tmp_path / "a.bag")
-    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(MissingLibraryError, match=r"needs the library rosbags,.*pip install 'swashplate\[logs\]'"):
         read(bag)

@@ -1,21 +1,13 @@
-"""The process that reads HDF5 files: with some damaged ones the library ends its process, with others it has no end.
+"""What is in an HDF5 file, told in frames by the process that reads it (`foreign_process`).
 
 HDF5 can say that a data set's bytes lie in any other file (external storage, virtual data sets, external links), ask
 for a plugin that unpacks them, and claim sizes for which nothing was ever stored. None of our files does, and a file
 is looked through for it before anything in it is read.
-
-Lines in are JSON (`path`, `wanted`); each is answered by frames (see `frames`): the length of a JSON text as eight
-bytes, the text, and as many bytes as its entry `bytes` says.
 """
 
 from __future__ import annotations
 
-import json
-import os
-import resource
-import sys
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +15,9 @@ import h5py
 import numpy as np
 
 from swashplate.errors import FlightError
+from swashplate.flights.foreign_process import Frame
 from swashplate.flights.readers.source import refuse_oversized
 
-Frame = tuple[dict[str, Any], bytes]
-
-MEMORY = 6 << 30
-"""Bytes that the process may have: three times the largest content."""
 _OWN_FILTERS = {
     h5py.h5z.FILTER_DEFLATE,
     h5py.h5z.FILTER_SHUFFLE,
@@ -41,12 +30,7 @@ _OF_NETCDF = {"REFERENCE_LIST", "CLASS", "DIMENSION_LIST", "NAME", "_Netcdf4Dimi
 _OF_NETCDF |= {"_NCProperties", "_nc3_strict"}
 
 
-def seconds(size: int) -> int:
-    """s of the processor that a file of so many bytes may take."""
-    return 3 + size // (20 << 20)
-
-
-def frames(path: Path, wanted: str) -> Iterator[Frame]:
+def frames(path: Path, *, wanted: str) -> Iterator[Frame]:
     """A file's groups and what is in them; a frame without entries is the last one.
 
     Args:
@@ -157,37 +141,3 @@ def _refused(path: Path, name: str, what: str) -> FlightError:
         channel=name.removeprefix("/"),
         hint="No file of swashplate's is so; do not trust this one.",
     )
-
-
-# ---- the process --------------------------------------------------------------------------------------------------
-def answered(path: Path, wanted: str) -> Iterator[Frame]:
-    """`frames`, with what is raised as a last frame: {"refused": (problem, channel, hint)} or {"failed": words}."""
-    try:
-        yield from frames(path, wanted)
-    except FlightError as error:
-        yield {"refused": (error.problem, error.channel, error.hint)}, b""
-    except Exception as error:
-        yield {"failed": str(error) or type(error).__name__}, b""
-
-
-def main() -> None:
-    out = os.fdopen(os.dup(1), "wb")
-    for kind, most in ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_DATA, MEMORY)):
-        with suppress(OSError, ValueError):  # a lower limit of the system stays
-            resource.setrlimit(kind, (most, resource.getrlimit(kind)[1]))
-    for line in sys.stdin.buffer:
-        asked = json.loads(line)
-        path = Path(asked["path"])
-        with suppress(OSError):
-            used = resource.getrusage(resource.RUSAGE_SELF)
-            most = int(used.ru_utime + used.ru_stime) + 1 + seconds(path.stat().st_size)
-            resource.setrlimit(resource.RLIMIT_CPU, (most, resource.getrlimit(resource.RLIMIT_CPU)[1]))
-        for told, content in answered(path, asked["wanted"]):
-            text = json.dumps(told).encode()
-            out.write(len(text).to_bytes(8, "little") + text)
-            out.write(content)
-        out.flush()
-
-
-if __name__ == "__main__":
-    main()
