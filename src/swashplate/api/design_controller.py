@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from swashplate.arrays import Array
+from swashplate.control.analysis.gain_premises import refused_by_card
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.controller_file import save_controller
 from swashplate.control.lateness import lateness
@@ -42,6 +43,7 @@ class ControllerDesign(Shown):
         speeds: of the trims [m/s].
         late: how late commands are taken to be, in words.
         fast: loops that cross higher than what is late together asks for, in words; "" for none.
+        premise: why the model carries no controller, in words; "" where it does.
     """
 
     controller: Lqg
@@ -49,6 +51,7 @@ class ControllerDesign(Shown):
     speeds: tuple[float, ...]
     late: str
     fast: str = ""
+    premise: str = ""
 
     def save(self, path: str | Path) -> Path:
         """Write the controller's file (.toml)."""
@@ -70,6 +73,7 @@ class ControllerDesign(Shown):
             "delays": [d / made.rate for d in made.plan.delays],
             "late": self.late,
             **({"fast": self.fast} if self.fast else {}),
+            **({"premise": self.premise} if self.premise else {}),
             "trims": [
                 {
                     "speed": speed,
@@ -86,7 +90,13 @@ class ControllerDesign(Shown):
         """What `sp.report` writes."""
         rows = spread_rows(self.controller, self.analyses[0])
         return compose_design(
-            self.controller, self.speeds, self.analyses, rows, title=title, late=self.late, fast=self.fast
+            self.controller,
+            self.speeds,
+            self.analyses,
+            rows,
+            title=title,
+            late=self.late,
+            fast=" ".join(filter(None, (self.premise, self.fast))),
         )
 
     def __repr__(self) -> str:
@@ -95,7 +105,11 @@ class ControllerDesign(Shown):
         lines = [f"{'LQG' if plan.sensors else 'LQR'} of {vehicle.called}, {plan.rate:g} Hz, {plan.n} states"]
         if plan.period:
             told += f"; constant gains, a cycle of {plan.period}"
-        lines += [f"sensors: {told}", f"late: {self.late}", *([f"Careful: {self.fast}"] if self.fast else [])]
+        lines += [
+            f"sensors: {told}",
+            f"late: {self.late}",
+            *(f"Careful: {told}" for told in (self.premise, self.fast) if told),
+        ]
         waits = ", ".join(f"{name} {d}" for name, d in zip(vehicle.input_names, plan.delays, strict=True) if d)
         if waits:
             lines.append(f"in whole samples: {waits}")
@@ -189,7 +203,9 @@ def design_controller(
         analyses = [replace(each, uncertainty={n: kept[n] for n in each.uncertainty if n in kept}) for each in analyses]
     took = "not known, one sample is left for it" if computation is None else f"{1e3 * computation:g} ms"
     late = f"{lateness(vehicle, None, given=delays)}; computation: {took}"
-    return ControllerDesign(made, tuple(analyses), tuple(speeds), late, _fast(made, analyses))
+    return ControllerDesign(
+        made, tuple(analyses), tuple(speeds), late, _fast(made, analyses), refused_by_card(vehicle.card)
+    )
 
 
 def _fast(made: Lqg, analyses: Sequence[Analysis]) -> str:

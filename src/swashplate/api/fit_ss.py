@@ -148,7 +148,7 @@ def fit_ss(
     if flights:
         say("flying the model along what the fit has not seen")
         verification = marked(verify_inside(fit.solution, flights, band=band), responses.sources)
-    advice = suggest_gains(fit, responses) if gains else ()
+    advice = suggest_gains(fit, responses, unseen=verification) if gains else ()
     material = ResponseMaterial(responses, fit=fit, search=searched, verification=verification, gains=advice)
     return LinearStudy(material, structure=fit.solution, remarks=remarks)
 

@@ -97,7 +97,7 @@ def fit_tf(
         wanted = (*model.inputs, *model.outputs)
         flights = uniform_records(unseen, wanted, rate=rate, cutoff=cutoff, names=called)
         verification = marked(verify_inside(model, flights, band=band), responses.sources)
-    advice = suggest_gains(fit, responses) if gains else ()
+    advice = suggest_gains(fit, responses, unseen=verification) if gains else ()
     measured = responses.select(tuple(m.output for m in fit.solution), (input,))
     read = (*margin_lines(responses, fit, fit.targets), *handling_lines(measured, (fit,))) if margins else ()
     material = ResponseMaterial(measured, (fit,), trials, verification=verification, gains=advice)

@@ -85,7 +85,7 @@ def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answer
         for half, middle, number in wide:
             if np.isfinite(half).all():
                 edges = middle - half, middle + half
-                traces.append(_band(omega / TWO_PI, *edges, color=_BOUND, name="±2 CR", axis=number))
+                traces.append(_band(omega / TWO_PI, *edges, color=_BOUND, name="±2 σ", axis=number))
         traces += [
             line(omega / TWO_PI, decibel(answer), name="model", color=MODEL, dash="dash", width=2.0, hover=hover),
             line(omega / TWO_PI, turned, name="model", color=MODEL, dash="dash", width=2.0, hover=hover, axis="2"),

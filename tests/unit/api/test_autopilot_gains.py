@@ -118,6 +118,9 @@ def test_an_axis_that_was_fitted_though_nothing_moved_it_gets_no_gains(coax: Aut
     assert "no flight moved it" in told[0]
     only = sp.autopilot_gains(unmoved, parameters=coax.parameters, fly=False)
     assert any("no flight moved it" in text for text in only.problems)
+    design = sp.design_controller(unmoved, method="lqr")
+    assert "Careful: yaw: fitted although no flight moved it" in repr(design)
+    assert "no flight moved it" in design.to_document()["premise"]
 
 
 def test_hand_made_gains_miss_their_margins(tmp_path: Path) -> None:

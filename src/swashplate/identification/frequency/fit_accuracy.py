@@ -27,7 +27,7 @@ from swashplate.identification.responses.shared_errors import correlation_of_err
 _UNSEEN = 1e-10
 """Information on a combination of parameters, of one on each alone, below which it is not seen."""
 
-_GIVEN = 10.0
+GIVEN = 10.0
 """Degrees of freedom that the responses' own errors count for, where the fit leaves less than they say."""
 
 _CHANCE = 3.0
@@ -79,8 +79,10 @@ def accuracy_of_fit(cost: ResponseCost, row: Array) -> FitAccuracy:
     """
     targets = [t for t in cost.targets if not t.ceiling]
     residual, slopes = (part[_rows(cost.targets)] for part in cost.residuals(row))
-    known = any(_has_errors(t) for t in targets)
-    spread, covariance = _weighted_errors(targets, known=known)
+    known = any(has_errors(t) for t in targets)
+    weight = np.concatenate([DB * t.weights[0] for t in targets] + [DEG * t.weights[1] for t in targets])
+    covariance = error_covariance(targets, known=known) * np.outer(weight, weight)
+    spread = np.sqrt(np.diag(covariance))
     size = np.sqrt(np.sum(slopes**2, axis=0))
     seen = np.isfinite(size) & (size > 0.0)
     normal = slopes[:, seen] / size[seen]
@@ -97,7 +99,7 @@ def accuracy_of_fit(cost: ResponseCost, row: Array) -> FitAccuracy:
     unit = covariance / np.outer(spread, spread)
     freedom = np.array([expected[k] ** 2 / np.sum(unit[np.ix_(of == k, of == k)] ** 2) for k in range(len(targets))])
     misfit = missed / np.maximum(expected, np.finfo(float).tiny)
-    factor = np.sqrt(_counted(misfit, freedom, given=_GIVEN if known else 0.0))[of]
+    factor = np.sqrt(_counted(misfit, freedom, given=GIVEN if known else 0.0))[of]
 
     score = normal.T @ (covariance * np.outer(factor, factor)) @ normal
     bound = inverse @ score @ inverse + (vectors[:, ~told] / _UNSEEN) @ vectors[:, ~told].T
@@ -127,12 +129,13 @@ def _rows(targets: Sequence[Target]) -> NDArray[np.int64]:
     return np.concatenate([*gains, *phases])
 
 
-def _has_errors(target: Target) -> bool:
+def has_errors(target: Target) -> bool:
+    """Whether a target's random errors are known."""
     return target.error is not None and bool(np.all(np.isfinite(target.error)) and np.all(target.error > 0.0))
 
 
-def _weighted_errors(targets: Sequence[Target], *, known: bool) -> tuple[Array, Array]:
-    """Standard deviations (2 n,) and covariance (2 n, 2 n) of the weighted gains and phases, in the order of `_rows`.
+def error_covariance(targets: Sequence[Target], *, known: bool = True) -> Array:
+    """Covariance (2 n, 2 n) of the logarithms' gains and phases, in the order of `_rows`.
 
     Where no errors are known, all relative errors are taken as one.
     """
@@ -142,9 +145,7 @@ def _weighted_errors(targets: Sequence[Target], *, known: bool) -> tuple[Array, 
     complete = np.outer(turned, turned.conj()) * correlation_of_errors(
         [t.omega for t in targets], [t.shared for t in targets]
     )
-    parts = np.block([[complete.real, -complete.imag], [complete.imag, complete.real]])
-    weight = np.concatenate([DB * t.weights[0] for t in targets] + [DEG * t.weights[1] for t in targets])
-    return weight * np.tile(np.concatenate(relative), 2), parts * np.outer(weight, weight)
+    return np.block([[complete.real, -complete.imag], [complete.imag, complete.real]])
 
 
 def _counted(misfit: Array, freedom: Array, *, given: float) -> Array:

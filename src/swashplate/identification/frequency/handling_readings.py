@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -40,7 +40,7 @@ class Line:
     Attributes:
         response: "phi / mixer_roll". source: "flight" or "model".
         read: the numbers; None where there are none.
-        problem: why.
+        problem: why; beside numbers, what a reader must know of them.
     """
 
     response: str
@@ -62,7 +62,8 @@ class Line:
             return head + (_NO_LOOP if flew else f"delay margin {r.delay_in_words()}")
         if r is None:
             return head + self.problem
-        return head + f"bandwidth {r.bandwidth!r} rad/s, phase delay {r.phase_delay_line!r} s"
+        told = f"; {self.problem}" if self.problem else ""
+        return head + f"bandwidth {r.bandwidth!r} rad/s, phase delay {r.phase_delay_line!r} s{told}"
 
 
 def own_input(responses: FrequencyResponse, output: str) -> str | None:
@@ -93,17 +94,22 @@ def handling_lines(responses: FrequencyResponse, fits: Sequence[Fitted] = ()) ->
         title = f"{angle} / {name}"
         try:
             omega, attitude, error, coherence = attitude_of(responses, rate, name)
-            flown = handling_qualities(omega, _pilots(attitude), error=error, coherence=coherence)
-            lines.append(Line(title, "flight", flown))
+            sign = _pilots(attitude)
+            flown = handling_qualities(omega, sign * attitude, error=error, coherence=coherence)
+            lines.append(Line(title, "flight", flown, _turned(sign, name, angle)))
         except IdentificationError as problem:
             lines.append(Line(title, "flight", None, problem.problem))
 
-        def by_model(h: Complex) -> Handling:
-            return handling_qualities(_WIDE, _pilots(h / (1j * _WIDE)))
+        for fit in fits:
+            if has_pair(fit, rate, name):
+                h = fit.solution.response(_WIDE)[:, fit.solution.outputs.index(rate), fit.solution.inputs.index(name)]
+                sign = _pilots(h / (1j * _WIDE))
 
-        lines += [
-            _of_model(title, fit, rate, name, _WIDE, by_model, Handling) for fit in fits if has_pair(fit, rate, name)
-        ]
+                def by_model(h: Complex, sign: float = sign) -> Handling:
+                    return handling_qualities(_WIDE, sign * h / (1j * _WIDE))
+
+                line = _of_model(title, fit, rate, name, _WIDE, by_model, Handling)
+                lines.append(replace(line, problem=line.problem or _turned(sign, name, angle)))
     return lines
 
 
@@ -155,7 +161,13 @@ def _of_model(
     return Line(title, "model", kind(*(ReadNumber(float(v), float(s)) for v, s in zip(value, sigma, strict=True))))
 
 
-def _pilots(attitude: Complex) -> Complex:
-    """The response with the sign that a pilot expects: a positive command turns the aircraft positively."""
-    middle = attitude[len(attitude) // 4]
-    return -attitude if (1j * middle).real < 0.0 else attitude
+def _pilots(attitude: Complex) -> float:
+    """What turns a response to the sign that a pilot expects, 1 or -1: a positive command turns positively."""
+    return -1.0 if (1j * attitude[len(attitude) // 4]).real < 0.0 else 1.0
+
+
+def _turned(sign: float, input: str, angle: str) -> str:
+    """That a response was read with its sign turned, in words."""
+    if sign > 0.0:
+        return ""
+    return f"read with its sign turned: a positive {input} makes {angle} negative, look at the units of both"

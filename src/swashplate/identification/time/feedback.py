@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.flights.excitation import CONTROLLER, Excitation, of_inputs
 from swashplate.flights.feedback import ANSWER, NOTHING, AnswerShares, told_by_motion
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
@@ -142,6 +143,17 @@ def mark_unmoved(vehicle: Vehicle, free: Collection[str], axes: Sequence[AxisExc
     moved = {item.axis for item in axes if item.identifiable}
     fitted = [axis.name for axis in vehicle.traits.axes if axes and set(axis.parameters) & set(free)]
     unmoved = {name: 1.0 for name in fitted if name not in moved}
+    card = vehicle.card
+    return vehicle.with_card(replace(card, observer={**card.observer, UNMOVED: unmoved})) if unmoved else vehicle
+
+
+def mark_answers(vehicle: Vehicle, moved: Collection[Excitation]) -> Vehicle:
+    """The identified vehicle whose card names the inputs that only a controller moved.
+
+    Args:
+        moved: what moved each input of each record.
+    """
+    unmoved = {name: 1.0 for name, one in of_inputs(tuple(moved)).items() if one.kind == CONTROLLER}
     card = vehicle.card
     return vehicle.with_card(replace(card, observer={**card.observer, UNMOVED: unmoved})) if unmoved else vehicle
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from swashplate.errors import IdentificationError
+from swashplate.flights.excitation import CONTROLLER, excitations, of_inputs
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.parameters import Free, Parameterization, parameterize
@@ -22,6 +23,7 @@ from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.identification.core.time_fit import Solved, TimeDetails, ahead_of, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.time.feedback import mark_answers
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.surroundings import environment_of
@@ -102,7 +104,8 @@ def fit_vehicle(
         biases=tuple(biases),
     )
     solved = solve(likelihood, iterations=iterations, progress=progress, horizon=ahead)
-    return vehicle_result(
+    moved = excitations(flights, vehicle.input_names, outputs=outputs)
+    result = vehicle_result(
         vehicle,
         table,
         solved,
@@ -111,6 +114,8 @@ def fit_vehicle(
         settings={"outputs": list(outputs), "shifts": shifts, "biases": list(biases)},
         seconds=time.perf_counter() - began,
     )
+    answers = tuple(f"{one.input}: {one.words}" for one in of_inputs(moved).values() if one.kind == CONTROLLER)
+    return replace(result, solution=mark_answers(result.solution, moved), warnings=(*result.warnings, *answers))
 
 
 def check_biases(biases: Sequence[str], outputs: Sequence[str]) -> None:

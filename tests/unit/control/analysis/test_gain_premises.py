@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from swashplate.errors import ControllerError
 from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space_file import structure
+from swashplate.validation.refutation import OPEN, REFUTED, STANDS, Judgement
 
 OMEGA = 2.0 * np.pi * np.geomspace(0.3, 12.0, 80)
 SWEPT = {"mixer_roll": {"kind": "sweep", "words": "a sweep."}}
@@ -121,6 +123,16 @@ def test_a_controllers_answer_gets_none_even_where_it_is_called_a_sweep() -> Non
     assert "the aircraft flew" in roll.refused
     assert roll.flown == FLOWN
     assert "it is unstable" not in repr(roll), "what flew is not called unstable"
+
+
+@pytest.mark.parametrize("verdict", [REFUTED, STANDS, OPEN])
+def test_a_flight_that_was_held_out_and_refutes_the_model_gives_none(verdict: str) -> None:
+    responses = measured(plant())
+    fit = fit_transfer_function(responses, "0/2", input="mixer_roll")
+    seen: Any = SimpleNamespace(judgement=Judgement(verdict, ("p misses by 40 % of the motion.",)))
+    (roll,) = sp.suggest_gains(fit, responses, unseen=seen)
+    told = "the held-out flight refutes the model: p misses by 40 % of the motion." in roll.refused
+    assert told == (roll.parameters == {}) == (verdict == REFUTED)
 
 
 def test_flown_gains_refute_a_model_and_do_not_where_they_are_stable() -> None:

@@ -161,8 +161,11 @@ def test_every_axis_is_judged_by_its_own_input() -> None:
     for row in np.random.default_rng(6).multivariate_normal(np.zeros(bounds.size), fit.correlation, size=300):
         moved = {n: fit[n].value + 0.1 * b * float(x) for n, b, x in zip(fit.names, bounds, row, strict=True)}
         steps.append(np.log(fit.solution.with_values(moved).response(omega)[:, 1, 0] / band.response))
-    assert band.gain == pytest.approx(10.0 * np.std(np.real(steps), axis=0), rel=0.2)
-    assert band.phase == pytest.approx(10.0 * np.std(np.imag(steps), axis=0), rel=0.2)
+    # Where the form is right they are those; narrower where errors, which no cost weighs by, tell more.
+    for found_sigma, scatter in ((band.gain, np.real(steps)), (band.phase, np.imag(steps))):
+        ratio = found_sigma / (10.0 * np.std(scatter, axis=0))
+        assert 0.75 < np.median(ratio) < 1.05
+        assert ratio.max() < 1.2
     lines = handling_lines(found, (fit,))
     assert [(a.response, a.source) for a in lines] == [
         ("phi / mixer_roll", "flight"), ("phi / mixer_roll", "model"),
@@ -174,6 +177,12 @@ def test_every_axis_is_judged_by_its_own_input() -> None:
     assert modelled.bandwidth.value == pytest.approx(flown.bandwidth.value, rel=0.02)
     assert 0.0 < modelled.bandwidth.sigma < 0.2 * modelled.bandwidth.value
     assert lines[1].as_dict()["bandwidth"] == [modelled.bandwidth.value, modelled.bandwidth.sigma]
+    assert not any(line.problem for line in lines)
+    # The other way round the numbers are the same, and it is told.
+    turned = handling_lines(replace(found, response=-found.response))
+    assert [repr(line.read) for line in turned] == [repr(line.read) for line in lines if line.source == "flight"]
+    assert "a positive mixer_roll makes phi negative" in repr(turned[0])
+    assert "a positive mixer_pitch makes theta negative" in turned[1].as_dict()["problem"]
 
 
 def test_a_delay_of_a_second_and_more_is_told_in_seconds() -> None:

@@ -9,9 +9,12 @@ import pytest
 
 from hfb320 import OUTPUTS, START, flight, hfb320
 from rolling import SAME, TRUTH, gusty, rolling
+from swashplate.control.analysis.gain_premises import refused_by_card
 from swashplate.errors import IdentificationError
+from swashplate.flights.excitation import Excitation
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Problem
+from swashplate.identification.time import vehicle_time_fit
 from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.identification.time.vehicle_time_fit import fit_vehicle
 from swashplate.models.linear.state_space_file import parse
@@ -47,6 +50,18 @@ def test_a_fit_carries_a_channel_that_is_off_by_a_factor_and_is_not_failed() -> 
     assert fit_vehicle(rolling(), flown, free=list(TRUTH), outputs=("p", "pdot", "ay"), biases=["ay"]).problems == (
         f"log.csv: {scaled.text}",
     )
+
+
+@pytest.mark.parametrize("kind", ["controller", "sticks"])
+def test_what_only_a_controller_moved_is_told_and_gets_no_gains(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def moved(*_: object, **__: object) -> tuple[Excitation, ...]:
+        return (Excitation("log", "stick", kind, "past motion explains it."),)
+
+    monkeypatch.setattr(vehicle_time_fit, "excitations", moved)
+    found = fit_vehicle(rolling(), gusty(), free=list(TRUTH), outputs=("p", "pdot", "ay"), biases=["ay"], iterations=2)
+    refused = refused_by_card(found.model.card)
+    assert ("stick: fitted although no flight moved it from outside" in refused) == (kind == "controller")
+    assert any("stick: past motion explains it." in text for text in found.warnings) == (kind == "controller")
 
 
 def test_a_delay_of_a_stick_that_rests_is_what_was_known_before() -> None:
