@@ -19,16 +19,19 @@ from swashplate.visible import visible
 
 
 def can_compile() -> bool:
-    """Whether this machine has CasADi and a C compiler; of one that cannot be used standard error is told, once."""
-    program = compiler()
-    return program is not None and find_spec("casadi") is not None and _is_useful(program)
+    """Whether this machine has CasADi and a C compiler; of none that can be used standard error is told, once."""
+    return find_spec("casadi") is not None and _is_useful(compiler())
 
 
 @lru_cache(maxsize=4)
-def _is_useful(program: str) -> bool:
-    if useless := answer(program)[1]:
-        print(visible(f"No C is compiled: {useless} This takes longer without."), file=sys.stderr)
+def _is_useful(program: tuple[str, ...] | None) -> bool:
+    useless = _NONE if program is None else answer(program)[1]
+    if useless:
+        print(visible(f"No C is compiled: {useless} This takes some ten times as long without."), file=sys.stderr)
     return not useless
+
+
+_NONE = "there is no C compiler here. pip install 'swashplate[compiler]' brings one."
 
 
 def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
@@ -39,8 +42,8 @@ def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
     Raises:
         ExportError: without a compiler, where it refuses the source, or where what it made does not load.
     """
-    program = compiler() or ""
-    told = "\0".join((source, program, *options, answer(program)[0] if program and NATIVE in options else ""))
+    program = compiler() or ()
+    told = "\0".join((source, *program, *options, answer(program)[0] if program and NATIVE in options else ""))
     folder, name = cache_folder("c"), f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
     library = None if folder is None else folder / name
     if library is not None and library.is_file():
@@ -59,7 +62,7 @@ def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
         try:
             made_now = ctypes.CDLL(str(place))  # what is loaded stays when its file goes
         except OSError as error:
-            raise ExportError(f"what {program} made does not load: {error}.", where=place.name) from None
+            raise ExportError(f"what {' '.join(program)} made does not load: {error}.", where=place.name) from None
         if library is not None and made.parent == folder:
             os.replace(place, library)
         return made_now

@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Sequence
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 
 from swashplate.errors import ExportError
@@ -23,10 +25,13 @@ LIMIT = 300.0
 """s that the compiler may take; a filter of a Raptor 50 takes it one second of processor time."""
 
 
-def compiler() -> str | None:
-    """The absolute path of `cc`, `gcc` or `clang`, or None. What lies in the folder one works in is none of them."""
+def compiler() -> tuple[str, ...] | None:
+    """The words that start a C compiler: `cc`, `gcc` or `clang` by its absolute path, else that of the package ziglang
+    (extra `compiler`); None where there is none. What lies in the folder one works in is none of them."""
     found = (shutil.which(name) for name in ("cc", "gcc", "clang"))
-    return next((path for path in found if path is not None and os.path.isabs(path)), None)
+    if path := next((path for path in found if path is not None and os.path.isabs(path)), None):
+        return (path,)
+    return (sys.executable, "-I", "-m", "ziglang", "cc") if find_spec("ziglang") is not None else None
 
 
 def ran(command: Sequence[str], *, where: str, seconds: float = LIMIT) -> tuple[int, str, str]:
@@ -57,9 +62,9 @@ def ran(command: Sequence[str], *, where: str, seconds: float = LIMIT) -> tuple[
 
 
 @lru_cache(maxsize=4)
-def answer(program: str) -> tuple[str, str]:
+def answer(program: tuple[str, ...]) -> tuple[str, str]:
     """What a compiler takes this processor for, and why it cannot be used, "" where it can; asked once a process."""
-    asked = [program, NATIVE, "-dM", "-E", "-x", "c", os.devnull]
+    asked = [*program, NATIVE, "-dM", "-E", "-x", "c", os.devnull]
     try:
         return ran(asked, where="the processor's instructions", seconds=PATIENCE)[1], ""
     except ExportError as error:
@@ -79,17 +84,20 @@ def shared_library(sources: Sequence[Path], out: Path, *, options: Sequence[str]
     """
     program = compiler()
     if program is None:
-        raise ExportError("there is no C compiler here (cc, gcc or clang).", where=out.name)
+        raise ExportError("there is no C compiler here (cc, gcc or clang, or the extra 'compiler').", where=out.name)
     if useless := answer(program)[1]:
         raise ExportError(useless, where=out.name)
-    command = [program, *STRICT, "-fPIC", "-shared", *options, "-o", str(out), *(str(file) for file in sources), "-lm"]
+    command = [*program, *STRICT, "-fPIC", "-shared", *options, "-o", str(out), *(str(file) for file in sources), "-lm"]
+    named = " ".join(program)
     code, _, said = ran(command, where=out.name)
     if code != 0:
         raise ExportError(
-            f"{program} refused the exported sources: {said.strip()[:300]}",
+            f"{named} refused the exported sources: {said.strip()[:300]}",
             where=out.name,
             hint="Please report this with the model.",
         )
     if not out.is_file():
-        raise ExportError(f"{program} says that all is well, and wrote nothing.", where=out.name, hint=_BY_HAND)
+        raise ExportError(
+            f"{' '.join(program)} says that all is well, and wrote nothing.", where=out.name, hint=_BY_HAND
+        )
     return out

@@ -16,6 +16,7 @@ EXTRA_OF: Mapping[str, str] = {
     "control": "model",
     "matplotlib": "plot",
     "casadi": "model",
+    "ziglang": "compiler",
     "pymavlink": "link",
     "imageio_ffmpeg": "live",
     "pyulog": "logs",

@@ -58,7 +58,9 @@ def test_where_nothing_can_be_kept_it_still_steps(cache: Path) -> None:
 
 def test_another_processor_has_a_library_of_its_own(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compiled.loaded(SOURCE, options=[compiled.NATIVE])
-    told, useless = compiled.answer(str(compiler()))
+    program = compiler()
+    assert program is not None
+    told, useless = compiled.answer(program)
     assert "__x86_64__" in told or "__aarch64__" in told
     assert useless == ""
     monkeypatch.setattr(compiled, "answer", lambda program: ("another", ""))

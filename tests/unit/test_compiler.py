@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import importlib.util
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -67,9 +70,37 @@ def test_one_that_cannot_be_started_is_told(tmp_path: Path) -> None:
 
 def test_what_lies_in_the_folder_one_works_in_is_no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cc = made(tmp_path, b"exit 0\n", monkeypatch)
-    assert compiler.compiler() == str(cc)
+    assert compiler.compiler() == (str(cc),)
     monkeypatch.chdir(tmp_path)
     for path in (".", "", f".{os.pathsep}"):
         monkeypatch.setenv("PATH", path)
-        assert compiler.compiler() is None
-        assert not compiled.can_compile()
+        assert compiler.compiler() in (None, ZIG)
+
+
+ZIG = (sys.executable, "-I", "-m", "ziglang", "cc")
+
+
+def test_without_one_that_of_ziglang_is_taken_and_without_that_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    there = importlib.util.find_spec("casadi")
+    monkeypatch.setattr(compiler, "find_spec", lambda name: there)
+    assert compiler.compiler() == ZIG
+    monkeypatch.setattr(compiler, "find_spec", lambda name: None)
+    monkeypatch.setattr(compiled, "find_spec", lambda name: there)
+    compiled._is_useful.cache_clear()
+    assert not compiled.can_compile()
+    assert not compiled.can_compile()
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "pip install 'swashplate[compiler]'" in told
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="the extra 'compiler' is not installed")
+def test_ziglang_compiles_what_gcc_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.c").write_text("double twice(double x);\ndouble twice(double x) { return 2 * x; }\n")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    made = ctypes.CDLL(str(compiler.shared_library([tmp_path / "a.c"], tmp_path / "a.so")))
+    made.twice.restype, made.twice.argtypes = ctypes.c_double, [ctypes.c_double]
+    assert made.twice(2.5) == 5.0

@@ -227,7 +227,7 @@ def test_the_example_flies(tmp_path: Path) -> None:
     program = compiler()
     assert program is not None
     strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror"]
-    subprocess.run([program, *strict, "-O1", "coax_example.c", "coax.c", "-lm", "-o", "fly"], cwd=tmp_path, check=True)
+    subprocess.run([*program, *strict, "-O1", "coax_example.c", "coax.c", "-lm", "-o", "fly"], cwd=tmp_path, check=True)
     lines = subprocess.run([tmp_path / "fly"], capture_output=True, text=True, check=True).stdout.splitlines()
     assert len(lines) == 11
     numbers = np.array([line.split()[2:] for line in lines], dtype=float)

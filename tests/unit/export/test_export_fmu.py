@@ -266,7 +266,7 @@ def test_the_sources_link_statically_under_the_models_prefix(unit: Path, tmp_pat
     )
     program = compiler()
     assert program is not None
-    command = [program, "-std=c99", "-DFMI2_STATIC_LINKING", "main.c", "fmu2.c", "coax.c", "-lm", "-o", "main"]
+    command = [*program, "-std=c99", "-DFMI2_STATIC_LINKING", "main.c", "fmu2.c", "coax.c", "-lm", "-o", "main"]
     subprocess.run(command, cwd=tmp_path / "sources", check=True)
     subprocess.run([tmp_path / "sources" / "main"], check=True)
 

@@ -66,7 +66,7 @@ def built(made: Export, name: str, folder: Path) -> Path:
     program = compiler()
     assert program is not None
     command = [
-        program,
+        *program,
         *STRICT,
         "-O0",
         f"-I{STUBS}",
