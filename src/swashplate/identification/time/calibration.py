@@ -5,39 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
-from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Parameterization, trim_of_record
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.scoring import minimise
 from swashplate.identification.core.spans import CALIBRATION
-from swashplate.identification.time.innovations import Filtered, RecordRun
 from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle
-
-_STEP = 1e-3
-"""Of a scaled entry, to either side."""
-
-
-class DifferencedError(PredictionError):
-    """The same likelihood with slopes by differences of whole runs.
-
-    A record has ten numbers of its own, and a run takes milliseconds: tangent planes would be compiled for seconds.
-    """
-
-    def _moved(self, mine: RecordRun, run: Filtered, row: Array) -> tuple[Array, Array]:
-        given, scale = (self.table.card_row, np.array(self.noise, dtype=np.float64)), self.row.scale
-        sides = [
-            [mine.filtered(*given, (row + side * step) * scale) for side in (1.0, -1.0)]
-            for step in _STEP * np.eye(len(row))
-        ]
-        innovations = np.array([high.innovations - low.innovations for high, low in sides])
-        covariances = np.array([high.begin.gain.covariance - low.begin.gain.covariance for high, low in sides])
-        return innovations / (2.0 * _STEP), covariances / (2.0 * _STEP)
 
 
 def as_begun(vehicle: Vehicle, record: Record) -> Vehicle:
@@ -75,8 +51,7 @@ def calibrate(
     vehicle = as_begun(vehicle, record)
     further = vehicle.card.observer.get("trims", {}) if trims is None else trims
     table = Parameterization(vehicle, (), of_records=tuple(trim_of_record(n, sigma) for n, sigma in further.items()))
-    likelihood = DifferencedError(
-        table, [first_part(record, seconds)], noise=noise, estimate_noise=False, nuisance=prior
-    )
+    piece = first_part(record, seconds)
+    likelihood = PredictionError(table, [piece], noise=noise, estimate_noise=False, nuisance=prior)
     calibrated = likelihood.numbers(minimise(likelihood, iterations=30).row)[0]
     return Nuisance(*calibrated.nuisance.tolist())

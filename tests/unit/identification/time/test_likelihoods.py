@@ -20,7 +20,7 @@ from swashplate.identification.core import accuracy
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.scoring import minimise
-from swashplate.identification.time.calibration import DifferencedError, first_part
+from swashplate.identification.time.calibration import first_part
 from swashplate.identification.time.output_error import WINDOW, OutputError
 from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.physics.backend import ArrayBackend
@@ -103,17 +103,6 @@ def test_a_heading_that_only_turns_the_innovations_tells_nothing() -> None:
     np.testing.assert_allclose(told[0, 0], -1.0 * heading, atol=1e-7)
     np.testing.assert_allclose(nothing[0, 0], 0.0, atol=1e-9)
     assert likelihood._foreseen(every, innovation(0.0), 0.0 * with_it, spread, 0)[1][0, 0] > 0.1
-
-
-def test_slopes_by_differences_of_runs_are_those_of_the_filter() -> None:
-    likelihood = _prediction_error()
-    row = _somewhere(likelihood)
-    cost, gradient, information = DifferencedError(likelihood.table, [_start()]).scores(row)
-    exact, slope, curved = likelihood.scores(row)
-    assert cost == exact
-    size = np.sqrt(np.diag(curved))
-    np.testing.assert_allclose(gradient / size, slope / size, atol=1e-4)
-    np.testing.assert_allclose(information / np.outer(size, size), curved / np.outer(size, size), atol=1e-4)
 
 
 def test_records_beside_others_are_run_alike() -> None:
