@@ -47,7 +47,7 @@ def ran(command: Sequence[str], *, where: str, seconds: float = LIMIT) -> tuple[
             raise ExportError(
                 f"the C compiler {command[0]} has not ended after {seconds:g} s.",
                 where=where,
-                hint="Try it by hand (`cc --version`), or take it off the PATH: then JAX computes.",
+                hint="Try it by hand (`cc --version`), or take it off the PATH: then nothing is compiled.",
             ) from None
     return process.returncode, out.decode("utf-8", "replace"), err.decode("utf-8", "replace")
 

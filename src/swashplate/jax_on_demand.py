@@ -22,7 +22,7 @@ try:
 except ImportError:  # Windows knows no such limits
     resource = None
 
-_SETTINGS: dict[str, object] = {}
+_SETTINGS: dict[str, object] = {"jax_enable_x64": True}
 _LOCK = RLock()
 
 
