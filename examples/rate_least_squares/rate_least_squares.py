@@ -8,8 +8,8 @@ from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.result import Estimate, Result, correlation_of
 from swashplate.identification.core.sources import sources_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import enable_double_precision, rates_function
 
 
 class RateLeastSquares:
@@ -25,9 +25,8 @@ class RateLeastSquares:
         return f"the flights do not have the states {', '.join(missing)}" if missing else ""
 
     def estimate(self, model, data, question):
-        enable_double_precision()
         table = parameterize(model, question.free or "full", fixed=question.fixed)
-        rates, air = rates_function(model), Environment()
+        air, xp = Environment(), ArrayBackend()
         pieces = [piece for flight in data for piece in flight.split()]
         states = [piece.array(model.state_names) for piece in pieces]
         inputs = [piece.array(model.input_names) for piece in pieces]
@@ -37,7 +36,9 @@ class RateLeastSquares:
 
         def errors(row):
             numbers = table.layout.values(table.card_row, row)
-            told = [np.asarray(rates(x.T, u.T, numbers, air)).T for x, u in zip(states, inputs, strict=True)]
+            told = [
+                np.stack(model.rates(x.T, u.T, numbers, air, xp), axis=1) for x, u in zip(states, inputs, strict=True)
+            ]
             return np.concatenate([((a - b) / size).ravel() for a, b in zip(told, slopes, strict=True)])
 
         best = least_squares(errors, table.starts(), bounds=table.bounds(), x_scale="jac")

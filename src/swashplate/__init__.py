@@ -6,9 +6,7 @@
     validation = sp.validate(fit, sp.read("b.mat").condition(rate=100, cutoff=0))
     sp.report(fit, validation, path="report.html")
 
-Importing this package loads nothing heavy and changes no setting of any library. The first use of a verb that computes
-(`identify`, `validate`, `simulate`, `trim`, `linearize`, ...) sets JAX to float64 and turns its persistent compilation
-cache on (in the user's cache folder), for the whole process: models and fits are float64.
+Importing this package loads nothing heavy and changes no setting of any library.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from swashplate.errors import SwashError
 from swashplate.systems import resource
 
-_SETTINGS: dict[str, object] = {}
+_SETTINGS: dict[str, object] = {"jax_enable_x64": True}
 _LOCK = RLock()
 
 

@@ -16,7 +16,7 @@ def plain(value: Any) -> Any:
         return value
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
-    if hasattr(value, "tolist"):  # NumPy and JAX arrays and numbers
+    if hasattr(value, "tolist"):  # arrays and their numbers
         return plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):
         return [plain(entry) for entry in value]

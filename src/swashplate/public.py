@@ -21,7 +21,7 @@ from swashplate.errors import MissingLibraryError
 from swashplate.extras import EXTRA_OF, missing
 from swashplate.meant import taking_names
 
-_LIGHT: Mapping[str, str] = {
+_VERBS: Mapping[str, str] = {
     "CHOICES": "swashplate.models.coax_choices:CHOICES",
     "Card": "swashplate.models.card:Card",
     "DaskScheduler": "swashplate.api.campaigns.scheduler:DaskScheduler",
@@ -83,8 +83,6 @@ _LIGHT: Mapping[str, str] = {
     "verify": "swashplate.validation.verify:verify",
     "fit_ss": "swashplate.api.fit_ss:fit_ss",
     "validate_linear": "swashplate.api.validate_linear:validate_linear",
-}
-_COMPUTING: Mapping[str, str] = {
     "QUIET": "swashplate.simulation.sensors:QUIET",
     "Sensors": "swashplate.simulation.sensors:Sensors",
     "accept_autopilot": "swashplate.api.accept_autopilot:accept_autopilot",
@@ -148,7 +146,7 @@ _COMPUTING: Mapping[str, str] = {
     "validate": "swashplate.validation.verb:validate",
     "write_ardupilot_parameters": "swashplate.api.link:write_ardupilot_parameters",
 }
-"""Names that set JAX up when they are first used; the others leave it alone."""
+"""What `swashplate` offers by name, the version besides."""
 
 _BEHIND_METHODS: Mapping[str, str] = {
     "condition": "swashplate.flights.conditioning.condition:condition",
@@ -175,12 +173,7 @@ _BEHIND_METHODS: Mapping[str, str] = {
 }
 """Verbs that are reached as methods (`flight.condition(...)`) and have no name in `swashplate`."""
 
-_SET_UP = (
-    "swashplate.simulation.dynamics:enable_double_precision",
-    "swashplate.simulation.compilation:enable_compilation_cache",
-)
-NAMES = tuple(sorted((*_LIGHT, *_COMPUTING)))
-"""What `swashplate` offers by name, the version besides."""
+NAMES = tuple(sorted(_VERBS))
 
 
 def place(name: str) -> str:
@@ -189,13 +182,7 @@ def place(name: str) -> str:
     Raises:
         KeyError: where no table has the name.
     """
-    return {**_BEHIND_METHODS, **_LIGHT, **_COMPUTING}[name]
-
-
-def set_up() -> None:
-    """Set JAX up as the first use of a verb that computes does: float64, compiled code kept between runs."""
-    for step in _SET_UP:
-        _load(step)()
+    return {**_BEHIND_METHODS, **_VERBS}[name]
 
 
 def _load(where: str) -> Any:
@@ -222,15 +209,13 @@ _LOADED_BY: Mapping[str, str] = {"Vehicle": "vehicle", "Flight": "read", "Freque
 
 
 def resolve(name: str) -> Any:
-    """What a name of the tables stands for; its module is loaded now, and JAX is set up where it computes.
+    """What a name of the tables stands for; its module is loaded now.
 
     Raises:
         KeyError: where no table has the name.
         MissingLibraryError: where it computes with a library that is not installed, with the command.
     """
     try:
-        if name in _COMPUTING:
-            set_up()
         named = _load(place(name))
         return _taking_names(name, named) if inspect.isfunction(named) else named
     except ModuleNotFoundError as error:

@@ -27,6 +27,7 @@ from swashplate.models.linear.state_space_file import is_state_space, structure
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import nearest
 from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.simulation.linearize import linearize
 from swashplate.validation.structure_reduction import reduce as reduced
 from swashplate.validation.verify import verify, verify_inside
 
@@ -210,6 +211,4 @@ def _started(
 
 def _from_hover(model: StateSpaceModel, source: Vehicle) -> StateSpaceModel:
     """With the start values that a vehicle has, linearised in hover."""
-    from swashplate.simulation.linearize import linearize  # the rest of this verb needs no JAX
-
     return from_linear_model(model, linearize(source))

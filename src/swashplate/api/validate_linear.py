@@ -56,7 +56,7 @@ def _other(vehicle: Vehicle) -> StateSpaceModel:
     """What an identified model is compared with: another model, or a vehicle linearised in hover."""
     if vehicle.structure is not None:
         return vehicle.structure
-    from swashplate.identification.time.linearised_model import model_of  # the rest of this verb needs no JAX
+    from swashplate.identification.time.linearised_model import model_of
     from swashplate.simulation.linearize import linearize
 
     return model_of(linearize(vehicle), name=f"{vehicle.name}, linearised in hover")

@@ -64,7 +64,7 @@ def _version(wanted: bool) -> None:
 
         from swashplate.extras import version_of
 
-        told = ", ".join(f"{name} {version_of(name)}" for name in ("jax", "numpy", "scipy"))
+        told = ", ".join(f"{name} {version_of(name)}" for name in ("casadi", "numpy", "scipy"))
         typer.echo(f"swashplate {version_of('swashplate')} (Python {platform.python_version()}, {told})")
         raise typer.Exit
 

@@ -1,4 +1,4 @@
-"""A vehicle stepped by its own exported C, compiled on this machine: half the time of a call of XLA."""
+"""A vehicle stepped by its own exported C, compiled on this machine."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class Plant:
         around: wind, air and battery.
         recorder: keeps the flights; None keeps none.
         record_rate: samples per second that it gets [Hz].
-        engine: makes what moves it; None for XLA.
+        engine: makes what moves it; None for CasADi's virtual machine.
         estimating: estimates numbers while the vehicle is in the air; None for nothing.
 
     Attributes:

@@ -15,6 +15,7 @@ from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.summary import banners, summary
 from swashplate.reporting.versions import date, versions
+from swashplate.simulation.linearize import linearize
 from swashplate.simulation.modes import Mode
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
@@ -74,8 +75,6 @@ def hover_modes(
     fit: Result[Any, Any] | None, validation: Validation | None
 ) -> tuple[dict[str, Sequence[Mode]], list[str]]:
     """Modes of the published and the identified vehicle at hover, and why one has none."""
-    from swashplate.simulation.linearize import linearize  # pages of linear models need no JAX
-
     modes: dict[str, Sequence[Mode]] = {}
     problems = []
     for label, vehicle in sections_data.vehicles(fit, validation).items():

@@ -12,7 +12,7 @@ from typing import Any
 from swashplate.extras import version_of
 from swashplate.models.card import Card
 
-_PACKAGES = ("swashplate", "jax", "jaxlib", "numpy", "scipy", "xarray", "plotly")
+_PACKAGES = ("swashplate", "casadi", "numpy", "scipy", "xarray", "plotly")
 
 
 def versions() -> dict[str, str]:

@@ -32,7 +32,7 @@ def fastest_mode(vehicle: Vehicle, x: Array, u: Array, environment: Environment)
     try:
         with np.errstate(all="ignore"):
             slopes = [(rates(x + d) - rates(x - d)) / (2.0 * h) for d, h in zip(moved, step, strict=True)]
-    except (ArithmeticError, ValueError):  # plain floats divide by zero, or take a root, where XLA gives NaN
+    except (ArithmeticError, ValueError):  # plain floats divide by zero, or take a root, where a graph gives NaN
         return complex(math.nan)
     matrix = np.array(slopes).T
     if not np.all(np.isfinite(matrix)):

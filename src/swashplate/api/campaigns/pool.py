@@ -18,6 +18,7 @@ from swashplate.api.campaigns import program
 from swashplate.api.campaigns.engine import TaskOutcome, Work
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
 from swashplate.own_python import SAFE_PATH
+from swashplate.threads import ONE_THREAD
 
 
 @dataclass
@@ -94,7 +95,7 @@ class ProcessPool:
     def _lane(self) -> _Lane:
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(theirs, self._work), name="worker", daemon=True)
-        with _environment({**program.worker_environment(), **SAFE_PATH}):
+        with _environment({**ONE_THREAD, **SAFE_PATH}):
             process.start()
         theirs.close()
         return _Lane(process, ours)

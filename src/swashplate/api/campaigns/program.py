@@ -18,10 +18,7 @@ from swashplate.errors import CampaignError, SwashError
 from swashplate.extras import version_of
 from swashplate.threads import ONE_THREAD
 
-_LIBRARIES = ("swashplate", "jax", "jaxlib", "numpy", "scipy")
-_OURS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000"
-"""What `compile_small_loops_whole` adds to XLA's flags of a process that has computed; no choice of the user's."""
-_ONE_THREAD = "--xla_cpu_multi_thread_eigen=false"
+_LIBRARIES = ("swashplate", "casadi", "numpy", "scipy")
 _FIRST_PROCESSES = 0xEFFFFFFC
 """Number of the namespace of processes that Linux starts with (`PROC_PID_INIT_INO`); containers have others."""
 _LOCK = "\0swashplate-core-"
@@ -30,23 +27,9 @@ _held: list[tuple[int, socket.socket | None]] = []
 """The core that this process has pinned itself to, and its lock."""
 
 
-def worker_environment() -> dict[str, str]:
-    """Environment variables of every worker, to be set before anything is imported there.
-
-    One thread for every library, and XLA's flags as the client has them: they may change the last bits of a result.
-    """
-    flags = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in (_OURS, _ONE_THREAD)]
-    cache_folder = os.environ.get("JAX_COMPILATION_CACHE_DIR")
-    shared = {} if cache_folder is None else {"JAX_COMPILATION_CACHE_DIR": cache_folder}
-    return {**ONE_THREAD, "XLA_FLAGS": " ".join([*flags, _ONE_THREAD]), "TF_CPP_MIN_LOG_LEVEL": "3", **shared}
-
-
 def program() -> dict[str, str]:
-    """What a result depends on beside its task, by name: versions, our own source, XLA's flags, and whether the filters
-    of fits are C or XLA's."""
-    versions = dict(_versions())
-    flags = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in (_OURS, _ONE_THREAD)]
-    return versions | {"XLA flags": " ".join(flags)}
+    """What a result depends on beside its task, by name: versions, our own source, and whether its equations are C."""
+    return dict(_versions())
 
 
 @cache
@@ -54,7 +37,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
     versions = {"python": ".".join(platform.python_version_tuple()[:2])} | {
         name: version_of(name) for name in _LIBRARIES
     }
-    versions["generated code"] = f"C by CasADi {version_of('casadi')}" if _c_runs() else "XLA"
+    versions["equations"] = "compiled C" if _c_runs() else "CasADi's virtual machine"
     every = metadata.entry_points()
     for group in (name for name in every.groups if name.startswith("swashplate.")):
         for point in every.select(group=group):  # packages that bring models, estimators or kinds of their own
@@ -64,7 +47,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 
 def _c_runs() -> bool:
-    """Whether the filters of fits can be C here: with CasADi, and a compiler that has its headers."""
+    """Whether equations can be C here: with CasADi, and a compiler that has its headers."""
     if not can_compile():
         return False
     try:
@@ -106,8 +89,7 @@ def check_program(wanted: Mapping[str, str], *, where: str) -> None:
 
 
 def prepare() -> int | None:
-    """Make this process a worker: JAX's threads one, and one core of its own; returns the core. A second call does
-    nothing.
+    """Make this process a worker: one thread, and one core of its own; returns the core. A second call does nothing.
 
     Cores are shared out by locks, one a core, among all workers of a machine whoever started them: the lock goes when
     the process ends, however it ends. Where all are taken, two workers share one. In a container no core is chosen:
@@ -115,8 +97,7 @@ def prepare() -> int | None:
     """
     if _held:
         return _held[0][0]
-    for name, value in worker_environment().items():
-        os.environ[name] = value
+    os.environ |= ONE_THREAD
     if not hasattr(os, "sched_setaffinity") or _in_container():
         return None
     cores = sorted(os.sched_getaffinity(0))

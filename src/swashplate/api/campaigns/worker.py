@@ -50,9 +50,6 @@ def replay(task: CampaignTask, row: int) -> Any:
 
 def opened(task: CampaignTask) -> tuple[CampaignKind, Any, Mapping[str, Path]]:
     """A task's kind, its settings as the kind reads them, and where its files lie on this machine."""
-    from swashplate.public import set_up
-
-    set_up()
     kind = CAMPAIGNS[task.kind]
     return kind, settings_of(task.kind, task.settings), {n: _put(n, c) for n, c in task.files.items()}
 

@@ -1,4 +1,4 @@
-"""What trims, derivatives and linear models show of themselves; apart from `views`, for these need JAX."""
+"""What trims, derivatives and linear models show of themselves."""
 
 from __future__ import annotations
 

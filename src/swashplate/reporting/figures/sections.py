@@ -33,7 +33,7 @@ SECTIONS: Registry[Callable[[Any], Section]] = Registry(
         "Spectrum": f"{_RESULTS}:section_of_spectrum",
     },
 )
-"""What shows an object, by the name of its class; loaded when it is asked for, for those of models need JAX."""
+"""What shows an object, by the name of its class; loaded when it is asked for."""
 
 
 def own_section(shown: Any) -> Section | None:

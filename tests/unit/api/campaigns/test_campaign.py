@@ -107,10 +107,10 @@ def test_stopped_and_gone_on_with_it_is_as_in_one_go(
         sp.replay_campaign(tmp_path / "whole", 2)
 
     # Another program.
-    monkeypatch.setattr(verbs, "program", lambda: {"jax": "9.9"})
-    with pytest.raises(CampaignError, match=r"was begun with another program: .*jax is 9\.9"):
+    monkeypatch.setattr(verbs, "program", lambda: {"numpy": "9.9"})
+    with pytest.raises(CampaignError, match=r"was begun with another program: .*numpy is 9\.9"):
         sp.resume_campaign(tmp_path / "parts")
-    with pytest.raises(CampaignError, match=r"was begun with another program: .*jax is 9\.9"):
+    with pytest.raises(CampaignError, match=r"was begun with another program: .*numpy is 9\.9"):
         sp.replay_campaign(tmp_path / "whole", 1)
 
 
