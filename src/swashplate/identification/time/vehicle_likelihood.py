@@ -21,7 +21,7 @@ from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries, gust_entries
+from swashplate.identification.core.time_likelihood import NOTHING, Moved, TimeErrors, gain_entries, gust_entries
 from swashplate.identification.time.prediction_error import parameter_entries
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
@@ -104,7 +104,7 @@ class VehicleErrors(TimeErrors):
 
     def _plain(self, row: Array) -> Array:
         every = range(len(self.records))
-        return np.concatenate([self._ran(number, row, _NONE)[0].errors for number in every])
+        return np.concatenate([self._ran(number, row, NOTHING)[0].errors for number in every])
 
     def _moved(self, row: Array) -> Iterator[Moved]:
         for number in range(len(self.records)):
@@ -151,12 +151,8 @@ class VehicleErrors(TimeErrors):
         gain = white_noise_gain(slopes[:, :n], np.exp(2.0 * logs), slopes[:, n:], sensors, filter.dt)[0]
         return np.concatenate([gain[:1].real, gain[1:].imag / STEP]).reshape(len(start), -1)
 
-    def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
-        return self.errors_ahead_moved(row, ahead, _NONE)[0]
-
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
-        """The same, and the slopes by some entries of the scaled row, (places, starts, horizons, outputs)."""
+        """Per record errors ahead, and their slopes by some entries of the scaled row, (places, starts, ...)."""
         parts = [self._ahead(number, row, ahead, places) for number in range(len(self.records))]
         return [errors for errors, _ in parts], [slopes for _, slopes in parts]
 
@@ -174,10 +170,6 @@ class VehicleErrors(TimeErrors):
             parts.append(self._filters[number].run(begin, numbers, *tables))
         told = list(ahead.steps)
         return np.stack([p.errors[told] for p in parts]), np.stack([p.errors_moved[:, told] for p in parts], axis=1)
-
-
-_NONE = np.array([], dtype=np.intp)
-"""Places of no entries."""
 
 
 def driving_rows(record: Record, environment: Environment) -> Array:
