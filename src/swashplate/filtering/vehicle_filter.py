@@ -75,34 +75,27 @@ class VehicleFilter:
             numbers: the filter's row, and how it moves along the same, (1 + k, n_numbers).
             rows: what drives it, straight between samples (n, n_driving). readings: of the outputs (n, n_outputs).
         """
-        sizes = [(len(rows), width) for width in (readings.shape[1], start.shape[1])]
-        tables = [np.empty((*front, *size)) for front in ((), (len(start) - 1,)) for size in sizes]
         if self._library is None:
-            self._run_virtually(start, numbers, rows, readings, tables)
-            return Ran(*tables)
+            return self._run_virtually(start, numbers, rows, readings)
         count, own = len(start) - 1, [np.ascontiguousarray(part) for part in (start, numbers, rows, readings)]
+        sizes = [(len(rows), width) for width in (readings.shape[1], start.shape[1])]
+        tables = [np.empty((*front, *size)) for front in ((), (count,)) for size in sizes]
         for first in range(0, max(1, count), self._library.directions()):
             given = own[0][0], own[1][0], own[2], own[3], first, count, own[0][1:], own[1][1:]
             self._library.run(len(rows), self.dt, *given, *tables)
         return Ran(*tables)
 
-    def _run_virtually(
-        self, start: Array, numbers: Array, rows: Array, readings: Array, tables: Sequence[Array]
-    ) -> None:
-        along = _sample(self.equations, self._seen, self.dt).mapaccum(len(rows))
+    def _run_virtually(self, start: Array, numbers: Array, rows: Array, readings: Array) -> Ran:
+        along, count = _sample(self.equations, self._seen, self.dt).mapaccum(len(rows)), len(start) - 1
         now = np.concatenate([rows, np.concatenate([rows[1:], rows[-1:]]), readings], axis=1).T
-        sizes = [table.shape[-1] for table in tables]
-        for place in range(max(1, len(start) - 1)):
-            x, g = (
-                np.concatenate([part[0], part[place + 1] if len(part) > 1 else 0.0 * part[0]])
-                for part in (start, numbers)
-            )
-            told = np.asarray(along(x, now, np.repeat(g[:, None], len(rows), axis=1))[1]).T
-            for table, part in zip(tables, np.split(told, np.cumsum(sizes[:-1]), axis=1), strict=True):
-                if table.ndim == part.ndim:
-                    table[:] = part
-                elif len(table):
-                    table[place] = part
+        runs = []
+        for place in range(max(1, count)):
+            moved = (part[place + 1] if count else 0.0 * part[0] for part in (start, numbers))
+            x, g = (np.concatenate(pair) for pair in zip((start[0], numbers[0]), moved, strict=True))
+            runs.append(np.asarray(along(x, now, np.repeat(g[:, None], len(rows), axis=1))[1]).T)
+        ends = np.cumsum([readings.shape[1], start.shape[1], readings.shape[1]])
+        errors, states, errors_moved, states_moved = np.split(np.stack(runs), ends, axis=2)
+        return Ran(errors[0], states[0], errors_moved[:count], states_moved[:count])
 
     def linear(self, x: Array, w: Array, p: Array) -> Array:
         """Slopes by the state of its rates and of the outputs, and how these move.
