@@ -40,7 +40,6 @@ from swashplate.identification.time.vehicle_time_fit import fit_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse
 from swashplate.physics.backend import FloatBackend
-from swashplate.simulation.dynamics import enable_double_precision
 
 
 @pytest.fixture
@@ -139,7 +138,6 @@ def off(fit: Result[Any, Any], name: str) -> float:
 
 def test_published_numbers_give_the_published_innovations(hfb: dict[str, np.ndarray]) -> None:
     """Data, equations and filter are his: at his estimates the innovations have the variances that he found."""
-    enable_double_precision()
     aeroplane, start, inputs = hfb320(PUBLISHED), np.array(FIRST), [float(hfb[n][0]) for n in Inputs._fields]
 
     def seen(x: np.ndarray) -> list[float]:

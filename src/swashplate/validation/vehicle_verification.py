@@ -22,8 +22,6 @@ from swashplate.identification.time.vehicle_likelihood import VehicleErrors, mea
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation.verification import Trace, Verification
 from swashplate.validation.verify import verified
 
@@ -49,8 +47,6 @@ def verify_vehicle(
         FlightError: an input that the flights lack, or no output that both have.
         IdentificationError: equations that diverge along the record.
     """
-    enable_double_precision()
-    enable_compilation_cache()
     flights = as_flights(flights)
     known = measurable(vehicle)
     shared = tuple(n for n in (outputs or known) if n in known and all(n in f for f in flights))

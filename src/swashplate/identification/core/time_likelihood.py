@@ -17,6 +17,9 @@ from swashplate.identification.core.records import Record
 Moved = tuple[NDArray[np.intp], Array, Array]
 """Places of entries (m,), errors of a record (n_t, n_outputs), their slopes by those entries (m, n_t, n_outputs)."""
 
+NOTHING = np.array([], dtype=np.intp)
+"""Places of no entries."""
+
 _FIRST_GAIN = 0.3
 _DIVERGED = 1e9
 _EXACT = 1e-6
@@ -101,9 +104,9 @@ class TimeErrors(ABC):
         """Of samples that follow each other, never of two records: places of the entries that move their errors, the
         errors, their slopes by those entries."""
 
-    @abstractmethod
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
         """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
+        return self.errors_ahead_moved(row, ahead, NOTHING)[0]
 
     @abstractmethod
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:

@@ -16,6 +16,7 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from swashplate.arrays import Array
 from swashplate.filtering.riccati import gain_at, settled_covariance, through
+from swashplate.identification.time.linear_simulation import driven
 
 _ITERATIONS, _SMALL = 15, 1.0
 _DAMPING, _HOPELESS = 1e-2, 1e3
@@ -78,8 +79,4 @@ def first_gain(phi: Array, c: Array, candidates: Sequence[Array], run: Run) -> t
 
 def _backward(pushed: Array, loop: Array) -> Array:
     """mu of the sample after each, (n_t, n), where mu = push + loop' mu of the sample after; none after the last."""
-    multipliers, mu = np.zeros_like(pushed), np.zeros(pushed.shape[1])
-    for at in range(len(pushed) - 1, 0, -1):
-        mu = pushed[at] + mu @ loop
-        multipliers[at - 1] = mu
-    return multipliers
+    return np.asarray(driven(np.zeros((1, len(loop))), loop.T, pushed[::-1, None])[0][::-1, 0])

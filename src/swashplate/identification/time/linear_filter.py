@@ -19,7 +19,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.filtering.white_noise import white_noise_gain
 from swashplate.identification.core.parameter_row import Entry
-from swashplate.identification.core.time_likelihood import SPREAD, gust_entries
+from swashplate.identification.core.time_likelihood import NOTHING, SPREAD, gust_entries
 from swashplate.identification.time.linear_likelihood import Batch, OutputErrors
 from swashplate.models.linear.state_space import StateSpaceModel
 
@@ -103,9 +103,9 @@ class GustErrors(FilterErrors):
         return phi @ self._kalman(batch, a, c, dt)[0]
 
     def sized(self, row: Array) -> Array:
-        numbers = np.asarray(row * self.row.scale)
-        a, _, c, _, _ = self._systems(self._stepped(row, np.array([], dtype=np.intp)))
-        told = np.real(self._kalman(numbers[None].astype(np.complex128), a, c, self.records[0].dt)[1][0])
+        numbers = self._stepped(row, NOTHING)
+        a, _, c, _, _ = self._systems(numbers)
+        told = np.real(self._kalman(numbers, a, c, self.records[0].dt)[1][0])
         errors = np.linalg.solve(told, self.covariance)
         larger = 0.5 * np.log(np.trace(errors) / len(told))
         noises = [i for i, entry in enumerate(self.row.entries) if entry.group == "noise"]

@@ -16,7 +16,7 @@ from swashplate.filtering.white_noise import STEP
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries
+from swashplate.identification.core.time_likelihood import NOTHING, Moved, TimeErrors, gain_entries
 from swashplate.identification.time.first_gain import first_gain, kalman_gains
 from swashplate.identification.time.linear_simulation import driven
 from swashplate.identification.time.linear_slopes import Coefficients, slopes_along
@@ -76,8 +76,7 @@ class OutputErrors(TimeErrors):
         places = [self._place[name] for name in names if name in self._place]
         if not places:
             return row
-        none = np.array([], dtype=np.intp)
-        batch = self._stepped(row, none)
+        batch = self._stepped(row, NOTHING)
         made = self._coefficients(0, batch, self._systems(batch))
         phi, c = (np.ascontiguousarray(part[0].real) for part in (made.phi, made.c))
 
@@ -102,7 +101,7 @@ class OutputErrors(TimeErrors):
         return gain_entries(self.model.states, size, spread) if self._gained else []
 
     def _plain(self, row: Array) -> Array:
-        loops = self._loops(np.asarray(row * self.row.scale)[None])
+        loops = self._loops(self._stepped(row, NOTHING))
         return np.concatenate([_ran(*(np.real(part) for part in one))[0] for (one,) in loops])
 
     def _moved(self, row: Array) -> Iterator[Moved]:
@@ -127,31 +126,22 @@ class OutputErrors(TimeErrors):
         self, number: int, row: Array, places: NDArray[np.intp], noises: NDArray[np.intp]
     ) -> tuple[Coefficients, Coefficients]:
         """What makes one record's errors, and its slopes by the scaled row at places and noises, those first."""
-        scale = self.row.scale
         batch = self._stepped(row, places)
         systems = self._systems(batch)
         whole = self._coefficients(number, batch, systems)
         base = Coefficients(*(np.ascontiguousarray(part[0].real) for part in whole))
-        moved = Coefficients(
-            *((scale[places] * part[1:].imag.T / STEP).T for part in whole)  # the batch is the first axis
-        )
+        moved = Coefficients(*(part[1:].imag / STEP for part in whole))
         if not noises.size:
             return base, moved
-        noisy = self._stepped(row, noises)
-        still = (systems[0], systems[2], whole.phi)
+        noisy, still = self._stepped(row, noises), (systems[0], systems[2], whole.phi)
         a, c, phi = (np.broadcast_to(part[:1], (len(noisy), *part.shape[1:])) for part in still)
-        gain = (scale[noises] * self._gain(noisy, a, c, phi, self.records[number].dt)[1:].imag.T / STEP).T
+        gain = self._gain(noisy, a, c, phi, self.records[number].dt)[1:].imag / STEP
         return base, moved._replace(gain=np.concatenate([moved.gain, gain]))
 
-    def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
-        return [part[0].real for part in self._ahead(np.asarray(row * self.row.scale)[None], ahead)]
-
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
-        """The same, and the slopes by some entries of the scaled row, (places, starts, horizons, outputs)."""
+        """Per record errors ahead, and their slopes by some entries of the scaled row, (places, starts, ...)."""
         parts = self._ahead(self._stepped(row, places), ahead)
-        scale = self.row.scale[places][:, None, None, None]
-        return [part[0].real for part in parts], [part[1:].imag / STEP * scale for part in parts]
+        return [part[0].real for part in parts], [part[1:].imag / STEP for part in parts]
 
     def _ahead(self, batch: Batch, ahead: Ahead) -> list[Any]:
         """Errors ahead of every record for a batch of rows, (n_batch, starts, horizons, outputs) each."""
@@ -168,11 +158,10 @@ class OutputErrors(TimeErrors):
             by_record.append(np.stack(told, axis=2))
         return by_record
 
-    def _stepped(self, row: Array, places: Places | None = None) -> Any:
-        """A row's numbers, plain and with a complex step in each, or in some."""
-        numbers = np.asarray(row * self.row.scale)
-        stepped = np.eye(numbers.size) if places is None else np.eye(numbers.size)[places]
-        return numbers + 1j * STEP * np.vstack([np.zeros(numbers.size), stepped])
+    def _stepped(self, row: Array, places: Places) -> Any:
+        """A scaled row's numbers, and behind them with a complex step in some entries of the row."""
+        steps = np.vstack([np.zeros(row.size), np.diag(self.row.scale)[places]])
+        return row * self.row.scale + 1j * STEP * steps
 
     def _matrices(self, numbers: Batch) -> tuple[Any, Any, Any, Any, Any]:
         """A, B, C, D and the effect of rate shifts on the outputs, complex where the numbers are."""

@@ -8,36 +8,25 @@ is that of continuous time: there a constraint has to keep the gain from passing
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, Equations, equations_of
+from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, equations_of
 from swashplate.errors import IdentificationError
-from swashplate.filtering.filter_loop import Correct, Predict, filtered
-from swashplate.filtering.riccati import kalman_gain
+from swashplate.filtering.vehicle_filter import FORCES, Ran, VehicleFilter
+from swashplate.filtering.white_noise import STEP, white_noise_gain
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
-from swashplate.identification.core.parameters import Layout, Parameterization
+from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.scoring import TracedCost
-from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries, gust_entries
+from swashplate.identification.core.time_likelihood import NOTHING, Moved, TimeErrors, gain_entries, gust_entries
 from swashplate.identification.time.prediction_error import parameter_entries
-from swashplate.jax_on_demand import jax, jit, jnp
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.simulation.dynamics import row_force, row_rates
-from swashplate.simulation.gathered_noise import gathered_noise
-from swashplate.simulation.runge_kutta import rk4_step
-
-FORCES = ("ax", "ay", "az")
-"""Channels of the specific force, in the order in which a vehicle gives it."""
 
 
 def measurable(vehicle: Vehicle) -> tuple[str, ...]:
@@ -98,32 +87,10 @@ class VehicleErrors(TimeErrors):
             shifts=shifts,
             biases=biases,
         )
-        self._plans = [self._plan(number, record) for number, record in enumerate(records)]
-        around = environment_of(vehicle, environment)
-        self._data = [_data(record, around) for record in records]
-        self._given = {
-            "card": jnp.asarray(table.card_row),
-            "constants": jnp.asarray([getattr(around, name) for name in CONSTANTS], dtype=float),
-        }
-
-    def _plan(self, number: int, record: Record) -> _Plan:
-        def places(pattern: str, names: Sequence[str]) -> tuple[int, ...]:
-            return tuple(self._place.get(pattern.format(name), _NOWHERE) for name in names)
-
-        states = self.table.vehicle.state_names
-        gains = [f"gain {s}/{o}" for s in states for o in self.outputs]
-        return _Plan(
-            equations=equations_of(self.table.vehicle),
-            layout=self.table.layout,
-            outputs=self.outputs,
-            dt=round(record.dt, 9),
-            method=self.method,
-            start=places(f"start {{}}[{number}]", states),
-            shift=places(f"shift {{}}[{number}]", states),
-            bias=places(f"bias {{}}[{number}]", self.outputs),
-            gust=places("gust {}", states),
-            gain=places("{}", gains),
-        )
+        around, equations = environment_of(vehicle, environment), equations_of(vehicle)
+        self._driving = [driving_rows(record, around) for record in records]
+        self._constants = np.array([getattr(around, name) for name in CONSTANTS], dtype=np.float64)
+        self._filters = [VehicleFilter(equations, outputs, round(record.dt, 9)) for record in records]
 
     def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
         states = self.table.vehicle.state_names
@@ -136,206 +103,76 @@ class VehicleErrors(TimeErrors):
         return np.diag(np.diag(whole)) if self.method == "filter-error" else whole
 
     def _plain(self, row: Array) -> Array:
-        numbers, given = jnp.asarray(row * self.row.scale), self._given | {"sensors": jnp.asarray(self.covariance)}
-        parts = [_errors(p, given, d, numbers) for p, d in zip(self._plans, self._data, strict=True)]
-        return np.concatenate([np.asarray(part) for part in parts])
+        every = range(len(self.records))
+        return np.concatenate([self._ran(number, row, NOTHING)[0].errors for number in every])
 
     def _moved(self, row: Array) -> Iterator[Moved]:
-        numbers, scale = jnp.asarray(row * self.row.scale), jnp.asarray(self.row.scale)
-        given, every = self._given | {"sensors": jnp.asarray(self.covariance)}, np.arange(len(self.row))
-        for plan, data in zip(self._plans, self._data, strict=True):
-            errors, slopes = _slopes(plan, given, data, numbers, scale)
-            yield every, np.asarray(errors), np.asarray(slopes)
+        for number in range(len(self.records)):
+            own = [i for i, n in enumerate(self.row.names) if n.endswith(f"[{number}]") or not n.endswith("]")]
+            ran, _ = self._ran(number, row, places := np.array(own, dtype=np.intp))
+            yield places, ran.errors, ran.errors_moved
 
-    def traced(self) -> TracedCost:
-        """The cost as a function that JAX differentiates; a Kalman gain keeps the sensors' noise of the last row."""
-        data = {
-            "given": self._given | {"sensors": jnp.asarray(self.covariance)},
-            "records": self._data,
-            "scale": jnp.asarray(self.row.scale),
-            "floor": jnp.asarray(self.floor),
-        }
-        return TracedCost(_traced_cost, tuple(self._plans), data)
+    def _ran(self, number: int, row: Array, places: Places) -> tuple[Ran, Array]:
+        """The filter along a record, and its numbers with those of its directions behind."""
+        start, numbers = self._given(number, row * self.row.scale, places)
+        return self._filters[number].run(start, numbers, self._driving[number], self.records[number].outputs), numbers
 
-    def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
-        numbers, given = jnp.asarray(row * self.row.scale), self._given | {"sensors": jnp.asarray(self.covariance)}
-        return [
-            np.asarray(_ahead(p, ahead.steps, given, d, jnp.asarray(starts, dtype=int), numbers))
-            for p, d, starts in zip(self._plans, self._data, ahead.starts, strict=True)
-        ]
+    def _given(self, number: int, plain: Array, places: Places) -> tuple[Array, Array]:
+        """Where the filter begins and its numbers, and behind both how they move with some entries of the row."""
+        directions = np.diag(self.row.scale)[places]
+        every = np.concatenate([plain[None], directions])
+
+        def at(names: Sequence[str]) -> Array:
+            found = [self._place.get(name) for name in names]
+            return np.stack([np.zeros(len(every)) if i is None else every[:, i] for i in found], axis=1)
+
+        states, layout, card = self.table.vehicle.state_names, self.table.layout, self.table.card_row
+        free = len(layout.free)
+        p = np.zeros((len(every), len(card) + len(CONSTANTS)))
+        p[0] = *layout.values(card, plain[:free]), *self._constants
+        if free:
+            p[1:, : len(card)] = directions[:, :free] @ layout.moved(card, plain[:free])
+        start, shift = (at([f"{what} {s}[{number}]" for s in states]) for what in ("start", "shift"))
+        bias = at([f"bias {o}[{number}]" for o in self.outputs])
+        if self.method == "filter-error":
+            gain = self._kalman(number, start, p, at([f"gust {s}" for s in states]))
+        else:  # zeros for output error
+            gain = at([f"gain {s}/{o}" for s in states for o in self.outputs])
+        return start, np.hstack([p, shift, bias, gain])
+
+    def _kalman(self, number: int, start: Array, p: Array, gusts: Array) -> Array:
+        """The steady gain where the record begins, row by row, and behind it how it moves."""
+        filter, n = self._filters[number], start.shape[1]
+        slopes, logs = (
+            part[0] + 1j * STEP * np.concatenate([np.zeros_like(part[:1]), part[1:]])
+            for part in (filter.linear(start, self._driving[number][0], p), gusts)
+        )
+        sensors = np.broadcast_to(self.covariance, (len(start), *self.covariance.shape))
+        gain = white_noise_gain(slopes[:, :n], np.exp(2.0 * logs), slopes[:, n:], sensors, filter.dt)[0]
+        return np.concatenate([gain[:1].real, gain[1:].imag / STEP]).reshape(len(start), -1)
 
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
-        """The same, and the slopes by some entries of the scaled row, (places, starts, horizons, outputs)."""
-        numbers, given = jnp.asarray(row * self.row.scale), self._given | {"sensors": jnp.asarray(self.covariance)}
-        directions = jnp.asarray(np.diag(self.row.scale)[places])
-        parts = [
-            _ahead_moved(p, ahead.steps, given, d, jnp.asarray(starts, dtype=int), numbers, directions)
-            for p, d, starts in zip(self._plans, self._data, ahead.starts, strict=True)
-        ]
-        return [np.asarray(errors) for errors, _ in parts], [np.asarray(slopes) for _, slopes in parts]
+        """Per record errors ahead, and their slopes by some entries of the scaled row, (places, starts, ...)."""
+        parts = [self._ahead(number, row, ahead, places) for number in range(len(self.records))]
+        return [errors for errors, _ in parts], [slopes for _, slopes in parts]
 
-
-_NOWHERE = -1
-"""Place of a number that is not estimated: the zero that stands behind the row."""
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """What compiled code depends on: everything but numbers; places are those in the row."""
-
-    equations: Equations
-    layout: Layout
-    outputs: tuple[str, ...]
-    dt: float
-    method: str
-    start: tuple[int, ...]
-    shift: tuple[int, ...]
-    bias: tuple[int, ...]
-    gust: tuple[int, ...]
-    gain: tuple[int, ...]
+    def _ahead(self, number: int, row: Array, ahead: Ahead, places: Places) -> tuple[Array, Array]:
+        """Of one record: the filter again from its corrected states, which nothing corrects any more."""
+        ran, numbers = self._ran(number, row, places)
+        numbers[:, -len(self.outputs) * ran.states.shape[1] :] = 0.0
+        parts = []
+        for first in ahead.starts[number]:
+            begin = np.concatenate([ran.states[None, first], ran.states_moved[:, first]])
+            tables = (
+                table[first : first + ahead.steps[-1] + 1]
+                for table in (self._driving[number], self.records[number].outputs)
+            )
+            parts.append(self._filters[number].run(begin, numbers, *tables))
+        told = list(ahead.steps)
+        return np.stack([p.errors[told] for p in parts]), np.stack([p.errors_moved[:, told] for p in parts], axis=1)
 
 
 def driving_rows(record: Record, environment: Environment) -> Array:
     """Inputs, wind and voltage of a record at every sample, (n, n_driving)."""
     wind = [np.full(record.time.size, float(getattr(environment, name))) for name in SURROUNDINGS[:-1]]
     return np.column_stack([record.inputs, *wind, record.voltage])
-
-
-def _data(record: Record, environment: Environment) -> dict[str, Any]:
-    """What a record gives: the driving row at every sample, and what was measured."""
-    return {"driving": jnp.asarray(driving_rows(record, environment)), "outputs": jnp.asarray(record.outputs)}
-
-
-@dataclass(frozen=True)
-class _Filter:
-    """A filter with all its numbers (traced): where it starts, what holds at each sample, and its functions."""
-
-    start: Any
-    along: tuple[Any, Any]
-    correct: Correct
-    predict: Predict
-    expected: Callable[[Any, Any], Any]
-
-
-def _filter(plan: _Plan, given: Mapping[str, jax.Array], data: Mapping[str, jax.Array], numbers: jax.Array) -> _Filter:
-    """The filter of one record."""
-    vehicle = plan.equations.vehicle
-    row = jnp.append(numbers, 0.0)
-
-    def at(places: tuple[int, ...]) -> Any:
-        return row[jnp.array(places)]
-
-    free = numbers[: len(plan.layout.free)]
-    p = jnp.concatenate([jnp.stack(list(plan.layout.values(given["card"], free))), given["constants"]])
-    equations, force = row_rates(plan.equations, padded=False), row_force(plan.equations)
-    shift, bias = at(plan.shift), at(plan.bias)
-
-    def rates(x: Any, w: Any) -> Any:
-        return equations(x, w, p) + shift
-
-    def expected(x: Any, w: Any) -> Any:
-        every = jnp.concatenate([x, rates(x, w), force(x, w, p)])
-        return every[jnp.array([measurable(vehicle).index(name) for name in plan.outputs])] + bias
-
-    driving, start = data["driving"], at(plan.start)
-    gain = _gain(plan, at, given["sensors"], (rates, expected), (start, driving[0]))
-
-    def correct(x: Any, measured: Any, now: tuple[Any, Any]) -> tuple[Any, Any]:
-        error = measured - expected(x, now[0])
-        # As a sum of products: XLA makes one function of a loop that calls no matrix product.
-        return x if gain is None else x + jnp.sum(gain * error, axis=1), error
-
-    def predict(x: Any, now: tuple[Any, Any]) -> Any:
-        w, after = now
-        return rk4_step(rates, x, lambda share: w + share * (after - w), plan.dt, looped=True)
-
-    after = jnp.concatenate([driving[1:], driving[-1:]])
-    return _Filter(start, (driving, after), correct, predict, expected)
-
-
-def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:
-    """Errors of one record (n, n_outputs): measured less predicted from earlier samples (output error: from none)."""
-    f = _filter(plan, given, data, numbers)
-    return filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[1][0]
-
-
-def _traced_cost(plans: tuple[_Plan, ...], data: Mapping[str, Any], row: jax.Array) -> Any:
-    """Negative log-likelihood at its own covariance, without constants (traceable), as `TimeErrors.cost` has it."""
-    numbers = row * data["scale"]
-    parts = [_traced_errors(p, data["given"], d, numbers) for p, d in zip(plans, data["records"], strict=True)]
-    errors = jnp.concatenate(parts)
-    covariance = errors.T @ errors / len(errors) + jnp.diag(data["floor"])
-    if plans[0].method == "filter-error":
-        return 0.5 * len(errors) * jnp.log(jnp.diag(covariance)).sum()
-    return 0.5 * len(errors) * jnp.linalg.slogdet(covariance)[1]
-
-
-def _traced_ahead(
-    plan: _Plan,
-    steps: tuple[int, ...],
-    given: Mapping[str, jax.Array],
-    data: Mapping[str, jax.Array],
-    starts: jax.Array,
-    numbers: jax.Array,
-) -> Any:
-    """Measured less predicted, `steps` samples after the filter's state at each start (starts, horizons, outputs)."""
-    f = _filter(plan, given, data, numbers)
-    _, states = filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[1]
-
-    def run(start: jax.Array) -> Any:
-        def sample(x: jax.Array, k: jax.Array) -> tuple[Any, Any]:
-            following = f.predict(x, jax.tree.map(lambda rows: rows[k], f.along))
-            return following, f.expected(following, f.along[1][k])
-
-        told = jax.lax.scan(sample, states[start], start + jnp.arange(steps[-1]))[1]
-        return data["outputs"][start + jnp.array(steps)] - told[jnp.array(steps) - 1]
-
-    return jax.vmap(run)(starts)
-
-
-_ahead = jit(static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)(_traced_ahead)
-
-
-@jit(static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
-def _ahead_moved(
-    plan: _Plan,
-    steps: tuple[int, ...],
-    given: Mapping[str, jax.Array],
-    data: Mapping[str, jax.Array],
-    starts: jax.Array,
-    numbers: jax.Array,
-    directions: jax.Array,
-) -> tuple[Any, Any]:
-    """The errors ahead and their slopes along directions of the row (directions, starts, horizons, outputs)."""
-
-    def errors(moved: jax.Array) -> Any:
-        return _traced_ahead(plan, steps, given, data, starts, moved)
-
-    return jax.vmap(lambda d: jax.jvp(errors, (numbers,), (d,)), out_axes=(None, 0))(directions)
-
-
-_errors = jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)(_traced_errors)
-
-
-def _gain(plan: _Plan, at: Any, sensors: Any, functions: Any, place: Any) -> Any:
-    """From an innovation to the state, (n_states, n_outputs); None for output error."""
-    n = len(plan.start)
-    if plan.method == "output-error":
-        return None
-    if plan.method == "prediction-error":
-        return at(plan.gain).reshape(n, -1)
-    A, C = (jax.jacfwd(function)(*place) for function in functions)
-    phi, gathered = gathered_noise(A, jnp.diag(jnp.exp(2.0 * at(plan.gust))), plan.dt)
-    return kalman_gain(phi, C, gathered, sensors)[0]
-
-
-@jit(static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _slopes(plan: _Plan, given: Any, data: Any, numbers: Any, scale: Any) -> tuple[Any, Any]:
-    """Errors, and their slopes by every scaled entry of the row (n_entries, n, n_outputs)."""
-
-    def errors(moved: Any) -> Any:
-        return _traced_errors(plan, given, data, moved)
-
-    directions = jnp.diag(scale)
-    return jax.vmap(lambda d: jax.jvp(errors, (numbers,), (d,)), out_axes=(None, 0))(directions)

@@ -29,8 +29,6 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision
 
 
 def fit_vehicle(
@@ -78,8 +76,6 @@ def fit_vehicle(
     began = time.perf_counter()
     check_method(method)
     ahead = ahead_of(horizon, method)
-    enable_double_precision()
-    enable_compilation_cache()
     outputs = tuple(outputs)
     flights = as_flights(flights)
     refuse_lowpassed(flights)
