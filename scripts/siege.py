@@ -107,14 +107,17 @@ def stamp(*, resumed: bool) -> str:
     return f"{'Gone on with' if resumed else 'Begun'} on {now:%Y-%m-%d} at {now:%H:%M} UTC, {code}."
 
 
-def siege_section(folder: Path) -> str:
-    """All that was found, as one part of the page."""
+def siege_section(folder: Path, page: str) -> str:
+    """All that was found, as one part of the page; campaigns that have not run here stay as the page has them."""
     parts = [
         f"# Siege\n\nWritten by `make siege`; do not edit. {platform.machine()}, {os.cpu_count()} cores. Each campaign "
         "says when and on what code it ran. Other programs on the machine make the numbers smaller, and nothing else."
     ]
-    for file in sorted(folder.glob("*.json")):
-        parts.append(proof.section(json.loads(file.read_text(encoding="utf-8"))))
+    found = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(folder.glob("*.json"))]
+    titles = {document["title"] for document in found}
+    before = page.partition(proof.BEGIN)[2].partition(proof.END)[0].split("\n## ")[1:]
+    parts += [f"## {part.strip()}" for part in before if part.splitlines()[0] not in titles]
+    parts += map(proof.section, found)
     return "\n\n".join(parts)
 
 
@@ -150,7 +153,7 @@ def main() -> int:
             fell = fell or not outcome["passed"]
             print(proof.section(outcome), flush=True)
     page = proof.PAGE.read_text(encoding="utf-8") if proof.PAGE.exists() else ""
-    proof.PAGE.write_text(proof.with_siege(page, siege_section(FOLDER)), encoding="utf-8")
+    proof.PAGE.write_text(proof.with_siege(page, siege_section(FOLDER, page)), encoding="utf-8")
     print(f"Written: {proof.PAGE.relative_to(ROOT)}")
     return 1 if fell else 0
 
