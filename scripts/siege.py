@@ -4,8 +4,9 @@
 
 Campaigns: `files` (damaged logs and documents), `kills` (hard kills, and disks that break), `disks` (a small disk that
 is full or read-only, mounted for it), `places` (paths that are no file), `packets` (everything that listens), `pages`
-(hostile pages). Each ends at its number or at its share of the minutes, whichever is first, and the page says what was
-reached. Exit code 1 where anything fell. `make proof` leaves the section as it is.
+(hostile pages), `forged` (containers built by rule), `neighbours` (other users of the machine), `small` (machines with
+little of everything). Each ends at its number or at its share of the minutes, whichever is first, and the page says
+what was reached. Exit code 1 where anything fell. `make proof` leaves the section as it is.
 
 What is found on top of these (a soak of links, say) is a JSON file build/siege/NAME.json in the form of
 `scripts/proof.py`; all that are there are written.
@@ -27,24 +28,32 @@ import proof
 
 ROOT = proof.ROOT
 FOLDER = ROOT / "build" / "siege"
-SHARES = {"files": 0.45, "kills": 0.35, "disks": 0.05, "places": 0.05, "packets": 0.08, "pages": 0.02}
-"""Of the minutes; disks, places and pages take what they take."""
+_SHARES = {"files": 0.35, "forged": 0.15, "kills": 0.3, "disks": 0.05, "places": 0.04, "packets": 0.07, "pages": 0.02}
+SHARES = _SHARES | {"neighbours": 0.01, "small": 0.01}
+"""Of the minutes; disks, places, pages, neighbours and small machines take what they take."""
 
 
 def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[dict[str, object]]]]:
     """What runs, by name, from its seconds to sections of the page."""
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
-    from tests.siege import disks, files, kills, packets, pages, places
-    from tests.siege.targets import TARGETS
+    from tests.siege import disks, files, kills, neighbours, packets, pages, places, small
+    from tests.siege.targets import FORGED, TARGETS
 
     def besiege_files(seconds: float) -> list[dict[str, object]]:
+        return read_by_workers(list(TARGETS), "files", chosen.files, seconds)
+
+    def besiege_forged(seconds: float) -> list[dict[str, object]]:
+        return read_by_workers(list(FORGED), "forged", chosen.forged * len(FORGED), seconds)
+
+    def read_by_workers(names: list[str], campaign: str, count: int, seconds: float) -> list[dict[str, object]]:
         siege = files.Files(
-            list(TARGETS),
-            files=chosen.files,
+            names,
+            files=count,
             seconds=seconds,
             workers=chosen.workers,
             seed=chosen.seed,
-            kept=FOLDER / "files.kept",
+            kept=FOLDER / f"{campaign}.kept",
+            about=files.ABOUT[campaign],
         )
         return [siege.run().as_dict()]
 
@@ -69,13 +78,22 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
     def besiege_pages(seconds: float) -> list[dict[str, object]]:
         return [pages.besiege(half_open=chosen.half_open).as_dict()]
 
+    def besiege_neighbours(seconds: float) -> list[dict[str, object]]:
+        return [neighbours.besiege().as_dict()]
+
+    def besiege_small(seconds: float) -> list[dict[str, object]]:
+        return [small.besiege().as_dict()]
+
     return {
         "files": besiege_files,
+        "forged": besiege_forged,
         "kills": besiege_writers,
         "disks": besiege_disks,
         "places": besiege_places,
         "packets": besiege_links,
         "pages": besiege_pages,
+        "neighbours": besiege_neighbours,
+        "small": besiege_small,
     }
 
 
@@ -89,20 +107,24 @@ def stamp(*, resumed: bool) -> str:
     return f"{'Gone on with' if resumed else 'Begun'} on {now:%Y-%m-%d} at {now:%H:%M} UTC, {code}."
 
 
-def siege_section(folder: Path) -> str:
-    """All that was found, as one part of the page."""
+def siege_section(folder: Path, page: str) -> str:
+    """All that was found, as one part of the page; campaigns that have not run here stay as the page has them."""
     parts = [
         f"# Siege\n\nWritten by `make siege`; do not edit. {platform.machine()}, {os.cpu_count()} cores. Each campaign "
         "says when and on what code it ran. Other programs on the machine make the numbers smaller, and nothing else."
     ]
-    for file in sorted(folder.glob("*.json")):
-        parts.append(proof.section(json.loads(file.read_text(encoding="utf-8"))))
+    found = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(folder.glob("*.json"))]
+    titles = {document["title"] for document in found}
+    before = page.partition(proof.BEGIN)[2].partition(proof.END)[0].split("\n## ")[1:]
+    parts += [f"## {part.strip()}" for part in before if part.splitlines()[0] not in titles]
+    parts += map(proof.section, found)
     return "\n\n".join(parts)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description="Besiege the program and write what came out into docs/proof.md.")
     parser.add_argument("--files", type=int, default=1_000_000, help="damaged files and documents")
+    parser.add_argument("--forged", type=int, default=1_000_000, help="forged containers for each reader")
     parser.add_argument("--kills", type=int, default=1_000, help="hard kills of commands that write")
     parser.add_argument("--failures", type=int, default=500, help="runs on full and broken disks")
     parser.add_argument("--packets", type=int, default=1_000_000, help="mutated packets for each link")
@@ -131,7 +153,7 @@ def main() -> int:
             fell = fell or not outcome["passed"]
             print(proof.section(outcome), flush=True)
     page = proof.PAGE.read_text(encoding="utf-8") if proof.PAGE.exists() else ""
-    proof.PAGE.write_text(proof.with_siege(page, siege_section(FOLDER)), encoding="utf-8")
+    proof.PAGE.write_text(proof.with_siege(page, siege_section(FOLDER, page)), encoding="utf-8")
     print(f"Written: {proof.PAGE.relative_to(ROOT)}")
     return 1 if fell else 0
 

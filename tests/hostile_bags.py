@@ -43,8 +43,13 @@ def bzip2_bag(folder: Path) -> Path:
     return path
 
 
-def _second(folder: Path, plugin: StoragePlugin, mode: CompressionMode) -> Path:
-    path, store = folder / "bomb", get_typestore(Stores.ROS2_HUMBLE)
+def packed_bag(folder: Path) -> Path:
+    """A good one, whose file is packed."""
+    return _second(folder, StoragePlugin.SQLITE3, CompressionMode.FILE, name="packed")
+
+
+def _second(folder: Path, plugin: StoragePlugin, mode: CompressionMode, *, name: str = "bomb") -> Path:
+    path, store = folder / name, get_typestore(Stores.ROS2_HUMBLE)
     writer = Writer2(path, version=9, storage_plugin=plugin)
     if mode is not CompressionMode.NONE:
         writer.set_compression(mode, CompressionFormat.ZSTD)

@@ -32,6 +32,9 @@ def main() -> NoReturn:
     from swashplate.threads import ONE_THREAD
 
     os.environ.update(ONE_THREAD)
+    if "PATH" in os.environ:  # libraries start programs by name: none is taken from the folder that we work in
+        folders = os.environ["PATH"].split(os.pathsep)
+        os.environ["PATH"] = os.pathsep.join(folder for folder in folders if os.path.isabs(folder))
     gc.set_threshold(50_000, 20, 20)  # cells of a large table are no cycles: looking for some took a fifth of reading
     from swashplate.cli.app import main as run
 

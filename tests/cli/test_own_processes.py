@@ -85,6 +85,19 @@ def test_reading_and_campaigns_import_nothing_from_the_folder(folder: Path) -> N
     assert marks(folder) == []
 
 
+def test_programs_in_the_folder_are_not_started(folder: Path) -> None:
+    """h5py starts `uname` by its name; with "." on the PATH a shell would take one that lies beside a log."""
+    for name in ("uname", "cc", "gcc", "clang", "ldconfig", "ffmpeg"):
+        (folder / name).write_text(f"#!/bin/sh\n: > {folder}/ran-{name}\n")
+        (folder / name).chmod(0o755)
+    words = command(folder, "simulate", "--vehicle", "coax", "--maneuver", "hover:1s", "-o", "a.nc")
+    here = environment(PATH=os.pathsep.join((".", "", os.environ["PATH"])))
+    subprocess.run(words, cwd=folder, env=here, check=True, capture_output=True)
+    assert marks(folder) == []
+    subprocess.run(["uname"], cwd=folder, env={**here, "PATH": "."}, check=True)  # the test's own test
+    assert marks(folder) == ["ran-uname"]
+
+
 def test_as_a_module_only_what_python_loads_first_is_taken_from_the_folder(folder: Path) -> None:
     """`python -m swashplate` looks in the folder until it is at work (documented); what it starts does not."""
     for name in PLANTED:

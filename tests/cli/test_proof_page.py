@@ -67,3 +67,15 @@ def test_what_ran_by_itself_stays_where_a_later_run_lacks_it(proof: Any) -> None
     assert kept == proof.with_siege(
         f"{fresh}\n## Slurm\n\n**Passed.** Run by itself on 2026-11-28. two jobs.", "## Siege\n\nkills"
     )
+
+
+def test_a_campaign_that_has_not_run_here_stays_as_the_page_has_it(tmp_path: Path) -> None:
+    spec = importlib.util.spec_from_file_location("besieging", ROOT / "scripts" / "siege.py")
+    assert spec is not None
+    assert spec.loader is not None
+    siege = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(siege)
+    page = siege.proof.with_siege("# Proof", "# Siege\n\nx\n\n## Disks\n\nold disks\n\n## Files\n\nold files")
+    (tmp_path / "files-0.json").write_text(json.dumps({"title": "Files", "text": "new files"}), encoding="utf-8")
+    made = siege.siege_section(tmp_path, page)
+    assert made.endswith("## Disks\n\nold disks\n\n## Files\n\nnew files")

@@ -15,8 +15,6 @@ from commands import swash, swash_process
 from typer.testing import CliRunner
 
 import swashplate as sp
-from swashplate import __main__ as entry
-from swashplate.cli import app as app_module
 from swashplate.cli.app import app
 from swashplate.cli.console import console
 from swashplate.flights import inspect as inspect_module
@@ -136,36 +134,6 @@ def test_an_interrupt_is_130(simulated: Path, monkeypatch: pytest.MonkeyPatch) -
     assert (outcome.code, "Stopped" in outcome.err) == (130, True)
 
 
-def test_an_interrupt_while_loading_is_words_too(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    class Interrupting:
-        def find_spec(self, name: str, *_: Any) -> None:
-            if name == "swashplate.cli.app":
-                raise KeyboardInterrupt
-
-    monkeypatch.delitem(sys.modules, "swashplate.cli.app", raising=False)
-    monkeypatch.setattr(sys, "meta_path", [Interrupting(), *sys.meta_path])
-    with pytest.raises(SystemExit) as ended:
-        entry.main()
-    assert ended.value.code == 130
-    assert capsys.readouterr().err == "Stopped. Nothing was left half-written.\n"
-
-
-def test_an_interrupt_while_the_command_line_is_made_is_words_too(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupted(**_: Any) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(app_module, "app", interrupted)
-    monkeypatch.setattr(signal, "signal", lambda *_: None)  # those of this process stay
-    with pytest.raises(SystemExit) as ended:
-        entry.main()
-    assert ended.value.code == 130
-    assert capsys.readouterr().err == "Stopped. Nothing was left half-written.\n"
-
-
 def test_colour_can_be_forbidden(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
     assert "\x1b[31m" in CliRunner().invoke(app, ["inspect", "none.mat"], color=True).stderr
@@ -218,20 +186,25 @@ def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path, nu
 
 INTERRUPTED = """
 import os, signal, sys
+wanted = sys.argv[1]
 class Interrupting:
     def find_spec(self, name, path=None, target=None):
-        if name == sys.argv[1]:
+        if name == wanted:
             os.kill(os.getpid(), signal.SIGINT)
 sys.meta_path.insert(0, Interrupting())
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background ignores it
 from swashplate.__main__ import main
+if wanted == "the command line":
+    from typer.core import TyperGroup
+    TyperGroup.make_context = lambda *_, **__: os.kill(os.getpid(), signal.SIGINT)
 sys.argv = ["swash", "trim", "--vehicle", "coax"]
 main()
 """
 
 
 @pytest.mark.parametrize(
-    "loaded", ["swashplate.threads", "typer", "swashplate.cli.campaign", "swashplate.cli.trim", "numpy", "casadi"]
+    "loaded",
+    ["swashplate.threads", "swashplate.cli.app", "typer", "swashplate.cli.trim", "numpy", "casadi", "the command line"],
 )
 def test_an_interrupt_while_something_is_loaded_ends_in_words(loaded: str) -> None:
     words = [sys.executable, "-P", "-c", INTERRUPTED, loaded]

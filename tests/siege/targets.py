@@ -37,6 +37,8 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.links.servos import servo_mapping
 from swashplate.models.linear.expressions import parse_tie
 
+from . import forged
+from .forged import by_records
 from .more_targets import MORE
 from .target import Target, Use, by_bytes, by_entries, by_hdf5, by_matlab
 
@@ -310,9 +312,35 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     **MORE,
 }
 """By name, made when asked for: some take seconds."""
+FORGED: Mapping[str, Callable[[], Target]] = {
+    "PX4 ULog, forged": _logs(
+        lambda: (made_autopilot_logs.ulog(15),), ".ulg", by_records(forged.split_ulog, forged.join_ulog)
+    ),
+    "ArduPilot log, forged": _logs(
+        lambda: (made_autopilot_logs.dataflash(_rows(120)),),
+        ".bin",
+        by_records(forged.split_dataflash, forged.join_dataflash),
+    ),
+    "Blackbox log, forged": _logs(_blackbox, ".bbl", forged.by_header_lines),
+    "MATLAB file, forged": _logs(
+        lambda: (_saved_mat(False),), ".mat", by_records(forged.split_matlab, forged.join_matlab)
+    ),
+    "growing recording, forged": _logs(lambda: (_written("a.growing", _growing),), ".growing", forged.by_growing_head),
+    "ROS bag, first form, forged": _logs(lambda: _bags(1), ".bag", by_records(forged.split_bag1, forged.join_bag1)),
+    "MCAP, forged": _logs(
+        lambda: tuple(whole.partition(BAG_MARK)[2] for whole in _bags(2)),
+        ".mcap",
+        by_records(forged.split_mcap, forged.join_mcap),
+    ),
+    "SQLite bag, forged": _logs(
+        lambda: tuple(whole.partition(BAG_MARK)[2] for whole in _bags(2, plugin="SQLITE3")), ".db3", forged.by_sqlite
+    ),
+    "metadata of a bag, forged": lambda: Target("", _bags(2), forged.by_metadata(BAG_MARK), _look_at_bag),
+}
+"""Containers that are well-formed outside and wrong inside; HDF5 and MATLAB with odd shapes are among `TARGETS`."""
 
 
-def _bags(generation: int) -> tuple[bytes, ...]:
+def _bags(generation: int, *, plugin: str = "MCAP") -> tuple[bytes, ...]:
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
@@ -332,7 +360,7 @@ def _bags(generation: int) -> tuple[bytes, ...]:
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.bag"
-        made = Writer1(path) if generation == 1 else Writer2(path, version=9, storage_plugin=StoragePlugin.MCAP)
+        made = Writer1(path) if generation == 1 else Writer2(path, version=9, storage_plugin=StoragePlugin[plugin])
         with made as writer:
             connection = writer.add_connection("/mocap/pose", kind, typestore=store)
             for k in range(40):

@@ -13,17 +13,18 @@ import pytest
 
 from swashplate.errors import FlightError
 
-from . import files, kills, packets, pages, places, worker
+from . import files, forged, kills, neighbours, packets, pages, places, small, worker
 from .files import Files
 from .kills import Case
-from .targets import TARGETS, Target
+from .plain import Ended
+from .targets import FORGED, TARGETS, Target
 
 MUTANTS = 6
 
 
-@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("name", [*TARGETS, *FORGED])
 def test_whole_files_are_read_and_damaged_ones_refused_in_words(name: str, tmp_path: Path) -> None:
-    target = TARGETS[name]()
+    target = {**TARGETS, **FORGED}[name]()
     for content in target.whole:
         path = tmp_path / f"whole{target.suffix}"
         path.write_bytes(content)
@@ -31,6 +32,24 @@ def test_whole_files_are_read_and_damaged_ones_refused_in_words(name: str, tmp_p
             target.use(path)
     found = [worker.outcome(name, seed, tmp_path) for seed in range(MUTANTS)]
     assert {told[0] for told in found} <= set("arw"), found
+
+
+@pytest.mark.parametrize(
+    ("name", "split", "join"),
+    [
+        ("PX4 ULog, forged", forged.split_ulog, forged.join_ulog),
+        ("ArduPilot log, forged", forged.split_dataflash, forged.join_dataflash),
+        ("MATLAB file, forged", forged.split_matlab, forged.join_matlab),
+        ("growing recording, forged", forged.split_growing, forged.join_growing),
+        ("ROS bag, first form, forged", forged.split_bag1, forged.join_bag1),
+        ("MCAP, forged", forged.split_mcap, forged.join_mcap),
+    ],
+)
+def test_what_is_taken_apart_and_put_together_is_the_same(name: str, split: forged.Split, join: forged.Join) -> None:
+    for content in FORGED[name]().whole:
+        start, records = split(content)
+        assert len(records) > 4
+        assert join(start, records) == content
 
 
 def _raises(error: Exception) -> Callable[[Path], object]:
@@ -172,3 +191,62 @@ def test_hostile_pages_in_short() -> None:
     found = pages.besiege(half_open=70, live=False, every=4)
     assert found.bad == []
     assert sum(row[2] for row in found.rows) > 90
+
+
+def test_small_machines_in_short() -> None:
+    found = small.besiege(
+        commands=("inspect a bag",), machines=("1 GB of memory", "64 open files", "no standard streams")
+    )
+    assert found.bad == []
+    assert [row[1] for row in found.rows] == [1, 1, 1]
+    lying = small.besiege(commands=("simulate",), machines=("a compiler that says yes and writes nothing",))
+    assert lying.bad == []
+    assert lying.rows[0][3] == 1, "it is refused in words"
+
+
+@pytest.mark.parametrize(
+    ("ended", "problem"),
+    [
+        (Ended(0, ""), ""),
+        (Ended(2, "Error: no."), ""),
+        (Ended(None, ""), "hangs"),
+        (Ended(-11, ""), "ends with -11"),
+        (Ended(0, "Traceback"), "ends with 0"),
+        (Ended(2, "This is a bug in swashplate"), "ends with 2"),
+        (Ended(2, ""), "says"),
+    ],
+)
+def test_how_a_command_ends_on_a_small_machine_is_judged(ended: Ended, problem: str) -> None:
+    assert ended.wrong().startswith(problem)
+    assert bool(ended.wrong()) == bool(problem)
+
+
+def test_neighbours_in_short() -> None:
+    found = neighbours.besiege(commands=("simulate",))
+    assert found.bad == []
+    assert found.rows[0][1] > 0
+    assert found.rows[0][3] > 0, "it is seen that a library is loaded"
+
+
+@pytest.mark.parametrize(
+    ("event", "problem"),
+    [
+        (("open", "/t/fixed", False), "fixed in the folder for temporary files has the same name each time"),
+        (("open", "/t/another/fixed", False), ""),
+        (("os.mkdir", "/t/r4nd0m", 0o777), "others may look into"),
+        (("os.mkdir", "/t/r4nd0m", 0o700), ""),
+        (("open", "/etc/odd", False), "writes to /etc/odd"),
+        (("open", "/c/swashplate/c/a.so", True), ""),
+        (("socket.bind", "('127.0.0.1', 0)", "AF_INET"), "can be reached"),
+        (("socket.bind", "'\\x00swashplate-core-0'", "AF_UNIX"), ""),
+        (("socket.connect", "('1.2.3.4', 80)", "AF_INET"), "connects to"),
+        (("ctypes.dlopen", "/o/planted.so", ""), ""),
+        (("ctypes.dlopen", "/home/else/planted.so", ""), "loads /home/else/planted.so"),
+        (("subprocess.Popen", "cc", ""), "starts cc"),
+        (("subprocess.Popen", "/usr/bin/cc", ""), ""),
+    ],
+)
+def test_what_a_neighbour_could_use_is_told(event: neighbours.Event, problem: str) -> None:
+    places = {"temporary": Path("/t"), "cache": Path("/c"), "out": Path("/o")}
+    told = neighbours.wrong([event], [("open", "/t/fixed", False), ("os.mkdir", "/t/other", 0o700)], places)
+    assert [words.startswith(problem) for words in told] == ([True] if problem else [])

@@ -112,6 +112,8 @@ def _numbers(data: memoryview, at: int, order: str, shape: tuple[int, ...]) -> n
     count, held = math.prod(shape), len(element.data) // kind.itemsize
     if count > held:
         raise _DamagedError(f"a variable claims {count:,} numbers and holds {held:,}")
+    if not count:  # its other lengths may be more than NumPy's arrays can have
+        return np.zeros(0, dtype=kind)
     return np.frombuffer(element.data, dtype=kind, count=count).reshape(shape, order="F").squeeze()
 
 
@@ -148,7 +150,7 @@ def _variable(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
     if matlab_class == _CHAR:
         text = _element(data, at, order) if at < len(data) else _Element(1, data[:0], at)
         encoding = _TEXTS.get(text.kind, "latin-1")
-        ending = "" if encoding == "utf-8" else "-le" if order == "<" else "-be"
+        ending = "" if encoding in ("utf-8", "latin-1") else "-le" if order == "<" else "-be"
         return name, bytes(text.data).decode(encoding + ending, errors="replace")
     if matlab_class not in (_CELL, _STRUCT):
         return name, Unread(_OTHERS.get(matlab_class, f"a variable of MATLAB class {matlab_class}"))

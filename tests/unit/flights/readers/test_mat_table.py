@@ -87,6 +87,21 @@ def _element(kind: int, data: bytes) -> bytes:
     return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
 
 
+def _matrix(of_class: int, lengths: tuple[int, ...], data: bytes) -> bytes:
+    flags, shape = struct.pack("<II", of_class, 0), struct.pack(f"<{len(lengths)}i", *lengths)
+    return _element(14, _element(6, flags) + _element(5, shape) + _element(1, b"a") + data)
+
+
+def test_no_numbers_in_a_huge_shape_and_texts_of_bytes(tmp_path: Path) -> None:
+    """Found by the siege's forged files: NumPy has no such shape, and no encoding is called latin-1-le."""
+    content = _mat(tmp_path, time=np.arange(5.0), p=np.arange(5.0)).read_bytes()
+    huge = _matrix(6, (0, 2**31 - 1, 2**31 - 1, 2**31 - 1), _element(9, b""))
+    text = _matrix(4, (1, 3), _element(5, b"abcd"))
+    (tmp_path / "a.mat").write_bytes(content + huge + text)
+    with pytest.raises(UnitError):  # they are read as far as the numbers that have no unit
+        sp.read(tmp_path / "a.mat")
+
+
 def _object(name: str, of_class: str) -> bytes:
     """A variable of class 17, as MATLAB writes objects: flags, name, kind of class, class, and a matrix of its own."""
     flags = _element(6, struct.pack("<II", 17, 0))
