@@ -6,10 +6,8 @@ BIN := .venv/bin
 STAMP := .venv/.complete
 # One more than the two cores that are usual: while a test waits, another one runs.
 WORKERS ?= 3
-# Little compiling, and threads that do not fight for cores; compiled programs are shared.
-QUICK := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
-	XLA_FLAGS="$$XLA_FLAGS --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1 --xla_backend_optimization_level=1" \
-	JAX_COMPILATION_CACHE_DIR="$(CURDIR)/build/jax" JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3
+# Threads that do not fight for cores.
+QUICK := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # Three test processes and many started programs would each compile every module anew.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -65,8 +63,7 @@ proof: $(STAMP)
 
 # Sizes: make siege SIEGE="--minutes 10 --only files"; see python scripts/siege.py --help
 siege: $(STAMP)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 JAX_COMPILATION_CACHE_DIR="$(CURDIR)/build/jax" \
-	$(BIN)/python scripts/siege.py $(SIEGE)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python scripts/siege.py $(SIEGE)
 
 site: $(STAMP)
 	$(BIN)/python scripts/build_site.py

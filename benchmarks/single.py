@@ -82,7 +82,7 @@ def numpy_loop(*, steps: int, repeats: int) -> Result:
     def run() -> None:
         x = start
         for _ in range(steps):
-            x = rk4_step(rates, x, lambda _: row, DT, looped=False)
+            x = rk4_step(rates, x, lambda _: row, DT)
 
     return Result("plain NumPy loop", best_rate(run, steps, repeats=repeats))
 
@@ -101,7 +101,7 @@ def c_loop(*, steps: int, repeats: int) -> Result:
         u, parameters, environment = unpack_rows(equations, w, q)
         return casadi.vertcat(*vehicle.rates(x, u, parameters, environment, xp))
 
-    step = casadi.Function("coax_step", [x, w, q], [rk4_step(rates, x, lambda _: w, DT, looped=False)])
+    step = casadi.Function("coax_step", [x, w, q], [rk4_step(rates, x, lambda _: w, DT)])
     with tempfile.TemporaryDirectory() as folder:
         here = Path(folder)
         source = Path(step.generate("coax_step.c", {"main": False}))

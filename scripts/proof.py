@@ -33,7 +33,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "build" / "proof"
 PAGE = ROOT / "docs" / "proof.md"
-PACKAGES = ("swashplate", "jax", "numpy", "scipy")
+PACKAGES = ("swashplate", "casadi", "numpy", "scipy")
 
 
 def ran(command: Sequence[str]) -> dict[str, Any]:

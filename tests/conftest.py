@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import atexit
-import ctypes
 import gc
 import os
-import sys
-from collections.abc import Iterator
-from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -22,28 +17,10 @@ gc.set_threshold(200_000, 50, 1000)
 # The runner builds the whole command line anew at every call, a quarter of a second each; it does not change.
 typer.testing._get_command = lru_cache(typer.main.get_command)  # type: ignore[attr-defined]
 
-_PAGE = os.sysconf("SC_PAGE_SIZE")
-_MEMORY = max(2.5e9, os.sysconf("SC_PHYS_PAGES") * _PAGE / 6)
-"""Bytes of a test process above which compiled programs are given back: several such processes share a machine."""
-
 
 @pytest.fixture(autouse=True, scope="module")
-def _bounded_memory() -> Iterator[None]:
+def _garbage_left_alone() -> None:
     gc.freeze()  # clocks and Hypothesis collect for themselves, which would look through all modules and programs
-    yield
-    if "jax" in sys.modules and int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE > _MEMORY:
-        sys.modules["jax"].clear_caches()
-        gc.unfreeze()
-        gc.collect()
-        with suppress(OSError, AttributeError):  # another C library
-            ctypes.CDLL(None).malloc_trim(0)  # otherwise the process stays as large, and every module clears anew
-
-
-def pytest_unconfigure() -> None:
-    """The process ends: JAX's own handler would first take its programs apart one by one, which took 14 seconds."""
-    gc.freeze()  # pytest looks through everything several times
-    with suppress(KeyError, AttributeError):  # JAX was not needed, or has another name for it
-        atexit.unregister(sys.modules["jax"]._src.api.clean_up)
 
 
 ROOT = Path(__file__).resolve().parent.parent

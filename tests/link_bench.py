@@ -48,7 +48,7 @@ class PlainFloats:
             return np.array(self.moved.rates(x.tolist(), w, self.parameters, air, xp))
 
         for _ in range(steps):
-            self.row = rk4_step(rates, self.row, lambda _: inputs, step, looped=False)
+            self.row = rk4_step(rates, self.row, lambda _: inputs, step)
         slope = rates(self.row, inputs).tolist()
         return motion_row(self.row.tolist(), slope, float(air.gravity), xp)
 

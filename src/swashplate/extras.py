@@ -10,9 +10,7 @@ from typing import Any
 from swashplate.errors import MissingLibraryError
 
 EXTRA_OF: Mapping[str, str] = {
-    "jax": "model",
-    "jaxlib": "model",
-    "jaxtyping": "model",
+    "jax": "cuda",
     "control": "model",
     "matplotlib": "plot",
     "casadi": "model",

@@ -104,18 +104,6 @@ def test_a_bug_is_one_line_and_exit_code_1(simulated: Path, monkeypatch: pytest.
         assert part in outcome.err
 
 
-def test_a_device_that_jax_does_not_know_is_no_bug(simulated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(*_: Any, **__: Any) -> None:
-        raise RuntimeError("Unable to initialize backend 'foo': it is not known.\nMore.")
-
-    monkeypatch.setenv("JAX_PLATFORMS", "foo")
-    monkeypatch.setattr(inspect_module, "inspect", none)
-    result = CliRunner().invoke(app, ["inspect", str(simulated)])
-    assert result.exit_code == 2
-    assert "JAX_PLATFORMS=foo: Unable to initialize backend 'foo'" in result.stderr
-    assert "bug" not in result.stderr
-
-
 def test_debug_shows_the_traceback(simulated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(inspect_module, "inspect", _broken)
     assert "Traceback" in swash("--debug", "inspect", simulated).err

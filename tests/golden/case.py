@@ -28,7 +28,6 @@ Values = dict[str, Value]
 ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
-    "XLA_FLAGS": "--xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1",
 }
 """Of every run, as the Makefile's target `unit` has it: another order of summation is another last digit."""
 

@@ -101,8 +101,8 @@ class Machine:
             after: redirections.
         """
         around = {**os.environ, "HOME": str(self.home), "TMPDIR": str(self.temporary), "NO_COLOR": "1"}
-        around |= {"PYTHONDONTWRITEBYTECODE": "1", "XLA_FLAGS": "", "OMP_NUM_THREADS": "1"}
-        for name in ("XDG_CACHE_HOME", "JAX_COMPILATION_CACHE_DIR", "PYTHONPATH"):
+        around |= {"PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
+        for name in ("XDG_CACHE_HOME", "PYTHONPATH"):
             around.pop(name, None)
         for name, value in (environment or {}).items():
             around.pop(name, None)

@@ -157,7 +157,7 @@ def _ended(asked: dict[str, Any], told: int) -> None:
 
 
 def main() -> None:
-    usual = ("h5netcdf", "jax", "jax.numpy", "matplotlib.pyplot", "matplotlib.backends.backend_svg", "control")
+    usual = ("h5netcdf", "casadi", "matplotlib.pyplot", "matplotlib.backends.backend_svg", "control")
     for name in sys.argv[1:] or usual:
         importlib.import_module(name)
     for found in pkgutil.walk_packages(swashplate.__path__, "swashplate.") if not sys.argv[1:] else ():

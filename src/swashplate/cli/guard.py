@@ -94,9 +94,6 @@ class Guarded(TyperGroup):
                 _end(str(missing(library, what=f"swash {ctx.invoked_subcommand}")), Exit.INPUT, debug=debug)
             first = next(iter(str(error).splitlines()), "")[:_LONGEST]  # libraries put whole tracebacks into a message
             described = f"{type(error).__name__}: {first}" if first else type(error).__name__
-            if isinstance(error, RuntimeError) and first.startswith("Unable to initialize backend"):
-                asked = os.environ.get("JAX_PLATFORMS", "")
-                _end(f"JAX_PLATFORMS={asked}: {first} Leave it unset, or set it to 'cpu'.", Exit.INPUT, debug=debug)
             advice = "This is a bug in swashplate, not in your input. Please report it with the output of"
             command = shlex.join(["swash", "--debug", *sys.argv[1:]])
             _end(f"{described.rstrip('.')}. {advice} `{command}`.", Exit.OURS, debug=debug)

@@ -43,7 +43,7 @@ def steady_gains(plan: ObserverPlan, numbers: Numbers, model: LinearModel, perio
         maps.append((A * scale / scale[:, None], information, Q / np.outer(scale, scale)))
     whole = maps[0]
     for step in maps[1:]:
-        whole = followed(whole, step, np)
+        whole = followed(whole, step)
     try:
         P = settled_covariance(whole)
     except np.linalg.LinAlgError:
@@ -59,7 +59,7 @@ def steady_gains(plan: ObserverPlan, numbers: Numbers, model: LinearModel, perio
         heard = np.any(rows != 0.0, axis=1)
         H_now = rows[heard]
         if heard.any():
-            gain = gain_at(P, H_now, np.diag(noise[heard]), np)
+            gain = gain_at(P, H_now, np.diag(noise[heard]))
             keep = np.eye(N) - gain @ H_now
             P = keep @ P @ keep.T + gain @ np.diag(noise[heard]) @ gain.T
             gains[phase][:, heard] = gain

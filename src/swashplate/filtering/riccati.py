@@ -2,22 +2,19 @@
 
 How a covariance goes through some samples, P -> H + A P (I + G P)^-1 A', is a map of that form again when two follow
 each other (Anderson 1978, Int. J. Control 28, 295-306; Chu, Fan and Lin 2005). A map that follows itself doubles the
-horizon: with JAX a fixed number of times, so that the gain can be differentiated; with NumPy until it has settled.
+horizon, until it has settled.
 """
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.jax_on_demand import jax, jnp
-from swashplate.simulation.gathered_noise import summed
 
-Map = tuple[Any, Any, Any]
+Map = tuple[Array, Array, Array]
 """A, G and H of some samples."""
+Matrices = tuple[Array, Array, Array, Array]
+"""A, C, Q and R."""
 
 _DOUBLINGS = 16
 """Each doubles the horizon: 2^16 samples are eleven minutes at 100 Hz, longer than any flight of ours."""
@@ -26,22 +23,22 @@ _NOTHING = 1e-12
 """Of a power of the filter's loop: its square adds nothing to a sum."""
 
 
-def through(A: Any, C: Any, Q: Any, R: Any, xp: Any) -> Map:
-    """The map of one sample: a reading C x with noise R, then x+ = A x with noise Q; `xp` is `numpy` or `jax.numpy`."""
-    return A, C.T @ xp.linalg.solve(R, C), Q
+def through(A: Array, C: Array, Q: Array, R: Array) -> Map:
+    """The map of one sample: a reading C x with noise R, then x+ = A x with noise Q."""
+    return A, C.T @ np.linalg.solve(R, C), Q
 
 
-def followed(first: Map, second: Map, xp: Any) -> Map:
+def followed(first: Map, second: Map) -> Map:
     """The map of some samples and those after them."""
     (A1, G1, H1), (A2, G2, H2) = first, second
     n = A1.shape[0]
-    both = xp.linalg.solve(xp.eye(n) + G2 @ H1, xp.concatenate([A2.T, G2], axis=1))
+    both = np.linalg.solve(np.eye(n) + G2 @ H1, np.concatenate([A2.T, G2], axis=1))
     by_A, by_G = both[:, :n], both[:, n:]
     return (A1.T @ by_A).T, G1 + A1.T @ by_G @ A1, H2 + A2 @ H1 @ by_A
 
 
-def settled_covariance(whole: Map) -> Any:
-    """The covariance that a map leaves as it is, by NumPy.
+def settled_covariance(whole: Map) -> Array:
+    """The covariance that a map leaves as it is, by doubling.
 
     Raises:
         numpy.linalg.LinAlgError: where it does not settle (something that lasts is not seen).
@@ -52,11 +49,11 @@ def settled_covariance(whole: Map) -> Any:
     return P
 
 
-def _doubled(whole: Map, most: int) -> tuple[Any, float]:
+def _doubled(whole: Map, most: int) -> tuple[Array, float]:
     """The covariance after a map has doubled so many times or settled, and the share by which the last one moved it."""
     P, change = whole[2], np.inf
     for _ in range(most):
-        A, G, H = followed(whole, whole, np)
+        A, G, H = followed(whole, whole)
         whole = A, 0.5 * (G + G.T), 0.5 * (H + H.T)
         change = float(np.max(np.abs(whole[2] - P))) / max(float(np.max(np.abs(whole[2]))), 1e-300)
         P = whole[2]
@@ -65,16 +62,33 @@ def _doubled(whole: Map, most: int) -> tuple[Any, float]:
     return P, change
 
 
-def gain_at(P: Any, C: Any, R: Any, xp: Any) -> Any:
+def gain_at(P: Array, C: Array, R: Array) -> Array:
     """Kalman gain (n, m) of a reading C x with noise R where the state has the covariance P."""
-    return xp.linalg.solve(C @ P @ C.T + R, C @ P).T
+    return np.asarray(np.linalg.solve(C @ P @ C.T + R, C @ P).T, dtype=np.float64)
 
 
-def predicted_covariance(A: Any, C: Any, Q: Any, R: Any) -> Any:
-    """Steady covariance P of the one-step-ahead state error: P = A P A' - A P C'(C P C' + R)^-1 C P A' + Q.
+def _pushed(P: Array, here: Matrices, moved: Matrices) -> tuple[Array, Array]:
+    """F and W of the Lyapunov equation of a change; changes may come as stacks (..., n, n).
 
-    Slowly drifting states that the outputs see only weakly are given the covariance of a filter that has run for 2^16
-    samples.
+    With P+ = (P^-1 + C' R^-1 C)^-1, the covariance after a measurement, P = A P+ A' + Q. Hence dP = F dP F' + W with
+    F = A (I - K C), solved by doubling its sum (Smith 1968, SIAM J. Appl. Math. 16, 198-201). Exact for a filter that
+    has settled within 2^16 samples.
+    """
+    A, C, _, R = here
+    dA, dC, dQ, dR = moved
+    K = gain_at(P, C, R)
+    after = P - K @ C @ P
+    AK = A @ K
+    half = (dA - AK @ dC) @ after @ A.T
+    return A - AK @ C, half + np.swapaxes(half, -1, -2) + AK @ dR @ AK.T + dQ
+
+
+def steady_gain(A: Array, C: Array, Q: Array, R: Array) -> tuple[Array, Array, Array]:
+    """Gain K (n, m) of the measurement update x + K (y - C x), the innovations' covariance S (m, m), and the covariance
+    P (n, n) of the one-step-ahead state error; nan where a matrix is singular.
+
+    P = A P A' - A P C'(C P C' + R)^-1 C P A' + Q. Slowly drifting states that the outputs see only weakly are given
+    the covariance of a filter that has run for 2^16 samples.
 
     Args:
         A: state transition, shape (n, n).
@@ -82,60 +96,17 @@ def predicted_covariance(A: Any, C: Any, Q: Any, R: Any) -> Any:
         Q: process noise covariance per sample, shape (n, n).
         R: measurement noise covariance, shape (m, m).
     """
-    return _with_slopes()(A, C, Q, R)
-
-
-@cache
-def _with_slopes() -> Any:
-    made = jax.custom_jvp(_settled_covariance)
-    made.defjvp(_covariance_moved)
-    return made
-
-
-def _settled_covariance(A: Any, C: Any, Q: Any, R: Any) -> Any:
-    (_, _, P), _ = jax.lax.scan(
-        lambda whole, _: (followed(whole, whole, jnp), None), through(A, C, Q, R, jnp), None, length=_DOUBLINGS
-    )
-    return 0.5 * (P + P.T)
-
-
-def _covariance_moved(here: tuple[Any, Any, Any, Any], moved: tuple[Any, Any, Any, Any]) -> tuple[Any, Any]:
-    """The change of the covariance, from the equation that it solves rather than through every doubling.
-
-    With P+ = (P^-1 + C' R^-1 C)^-1, the covariance after a measurement, P = A P+ A' + Q. Hence dP = F dP F' + W with
-    F = A (I - K C): a Lyapunov equation, solved by doubling its sum (Smith 1968, SIAM J. Appl. Math. 16, 198-201).
-    Exact for a filter that has settled within 2^16 samples.
-    """
-    F, W, P = _pushed(predicted_covariance(*here), here, moved, jnp)
-    return P, summed(F, W, _DOUBLINGS)[1]
-
-
-def _pushed(P: Any, here: Any, moved: Any, xp: Any) -> tuple[Any, Any, Any]:
-    """F and W of the Lyapunov equation of a change, and P; changes may come as stacks (..., n, n)."""
-    A, C, _, R = here
-    dA, dC, dQ, dR = moved
-    K = gain_at(P, C, R, xp)
-    after = P - K @ C @ P
-    AK = A @ K
-    half = (dA - AK @ dC) @ after @ A.T
-    return A - AK @ C, half + xp.swapaxes(half, -1, -2) + AK @ dR @ AK.T + dQ, P
-
-
-def steady_gain(A: Array, C: Array, Q: Array, R: Array) -> tuple[Array, Array, Array]:
-    """`kalman_gain` by NumPy, which compiles nothing, and the covariance P (n, n); nan where a matrix is singular."""
     n, m = len(A), len(C)
     try:
-        P, _ = _doubled(through(A, C, Q, R, np), _DOUBLINGS)
+        P, _ = _doubled(through(A, C, Q, R), _DOUBLINGS)
         S = C @ P @ C.T + R
         S = 0.5 * (S + S.T)
-        return np.linalg.solve(S, C @ P).T, S, P
+        return np.asarray(np.linalg.solve(S, C @ P).T, dtype=np.float64), S, P
     except np.linalg.LinAlgError:
         return np.full((n, m), np.nan), np.full((m, m), np.nan), np.full((n, n), np.nan)
 
 
-def steady_gain_moved(
-    here: tuple[Array, Array, Array, Array], P: Array, moved: tuple[Array, Array, Array, Array]
-) -> tuple[Array, Array]:
+def steady_gain_moved(here: Matrices, P: Array, moved: Matrices) -> tuple[Array, Array]:
     """How `steady_gain` moves with its matrices: gains (k, n, m) and covariances of the innovations (k, m, m).
 
     Args:
@@ -143,7 +114,7 @@ def steady_gain_moved(
         moved: k changes of each, stacked.
     """
     (_, C, _, R), (_, dC, _, dR) = here, moved
-    F, W, _ = _pushed(P, here, moved, np)
+    F, W = _pushed(P, here, moved)
     dP = _sums(F, W)
     S = C @ P @ C.T + R
     turned = np.swapaxes(dC, -1, -2)
@@ -163,11 +134,3 @@ def _sums(F: Array, W: Array) -> Array:
         total = total + (left @ F.T).reshape(n, k, n)
         F = F @ F
     return total.transpose(1, 0, 2)
-
-
-def kalman_gain(A: Any, C: Any, Q: Any, R: Any) -> tuple[Any, Any]:
-    """Gain K (n, m) of the measurement update x + K (y - C x) and the innovations' covariance S (m, m)."""
-    P = predicted_covariance(A, C, Q, R)
-    S = C @ P @ C.T + R
-    S = 0.5 * (S + S.T)
-    return jnp.linalg.solve(S, C @ P).T, S

@@ -1,4 +1,4 @@
-"""The few operations that equations of motion may use, for plain floats, for JAX and for CasADi.
+"""The few operations that equations of motion may use, for plain floats, arrays and CasADi.
 
 An equation is written once, on named scalars, and takes one of these as `xp`. What is not here (data-dependent loops,
 in-place changes, Python branches on values) cannot be traced by all three and does not belong in an equation.
@@ -12,17 +12,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from swashplate.jax_on_demand import jax, jnp
-
 Scalar = Any
-"""A number: `float`, a JAX tracer or array, or a CasADi expression."""
+"""A number: `float`, an array, or a CasADi expression."""
 
 
 class Backend(Protocol):
     """The operations of an equation.
 
     Attributes:
-        arrays: functions of arrays (NumPy's or jax.numpy's) for what is integrated numerically; None where a number is
+        arrays: NumPy for what is integrated numerically; None where a number is
             an expression, and such equations cannot be traced.
     """
 
@@ -63,26 +61,14 @@ class FloatBackend:
 
 
 class ArrayBackend:
-    """Arrays: a whole record at once by NumPy, or simulation, fitting and batches by JAX (`JaxBackend`).
+    """Arrays: a whole record at once by NumPy, or by other functions of the same names."""
 
-    Args:
-        arrays: `numpy` or `jax.numpy`.
-        detached: hides a value's origin from differentiation, where there is one.
-    """
-
-    def __init__(self, arrays: Any = np, detached: Callable[[Scalar], Scalar] | None = None) -> None:
+    def __init__(self, arrays: Any = np) -> None:
         self.arrays = arrays
         self.sin, self.cos, self.tan, self.sqrt = arrays.sin, arrays.cos, arrays.tan, arrays.sqrt
         self.atan2, self.abs, self.where = arrays.arctan2, arrays.abs, arrays.where
         self.minimum, self.maximum = arrays.minimum, arrays.maximum
-        self.detached = detached or _same
-
-
-class JaxBackend(ArrayBackend):
-    """JAX arrays and tracers."""
-
-    def __init__(self) -> None:
-        super().__init__(jnp, jax.lax.stop_gradient)
+        self.detached: Callable[[Scalar], Scalar] = _same
 
 
 class CasadiBackend:

@@ -10,11 +10,9 @@ import numpy as np
 from swashplate.arrays import IMAGINARY, Array
 from swashplate.engine.equations import Equations
 from swashplate.engine.slopes import Slopes, rates_and_slopes
-from swashplate.jax_on_demand import jax, jnp
 from swashplate.physics.backend import ArrayBackend, Backend
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.dynamics import jax_backend, row_rates
 
 BODY = len(RigidBody._fields)
 ACCELERATIONS = slice(3, 6)
@@ -23,17 +21,15 @@ ANGULAR_ACCELERATIONS = slice(9, 12)
 _XP = ArrayBackend()
 
 
-def assemble(
-    equations: Equations, z: Array | jax.Array, course: Array | jax.Array, xp: Backend | None = None
-) -> tuple[Any, Any]:
-    """State and input rows of a steady flight from the unknowns (traceable).
+def assemble(equations: Equations, z: Array, course: Array, xp: Backend) -> tuple[Any, Any]:
+    """State and input rows of a steady flight from the unknowns.
 
     Args:
         z: roll and pitch, the inputs that are solved for, inner states.
         course: velocity ahead, right and down, heading, rate of turn, place down.
-        xp: the operations; JAX's by default.
+        xp: the operations.
     """
-    vehicle, xp = equations.vehicle, xp or jax_backend()
+    vehicle = equations.vehicle
     held = dict(vehicle.trim_held)
     n_inputs = len(vehicle.input_names) - len(held)
     attitude = Euler(z[0], z[1], course[3])
@@ -50,30 +46,6 @@ def assemble(
     return state, xp.arrays.stack(
         [xp.arrays.asarray(held[name]) if name in held else z[next(free)] for name in vehicle.input_names]
     )
-
-
-def unrest(
-    equations: Equations,
-    z: jax.Array,
-    course: jax.Array,
-    row: jax.Array,
-    p: jax.Array,
-) -> tuple[Any, Any]:
-    """What should vanish in the steady flight that `assemble` makes, and its derivatives by the unknowns (traceable).
-
-    Args:
-        z, course: as in `assemble`.
-        row, p: `SURROUNDINGS`, and parameters with `CONSTANTS`.
-    """
-
-    def rest(z: jax.Array) -> tuple[Any, Any]:
-        state, inputs = assemble(equations, z, course)
-        rates = row_rates(equations, padded=False)(state, jnp.concatenate([inputs, row]), p)
-        value = jnp.concatenate([rates[ACCELERATIONS], rates[ANGULAR_ACCELERATIONS], rates[BODY:]])
-        return value, value
-
-    slope, value = jax.jacfwd(rest, has_aux=True)(z)
-    return value, slope
 
 
 def unrest_at(

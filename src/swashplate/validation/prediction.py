@@ -192,4 +192,4 @@ def uncertainty(
     rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (vehicle.values(), noise, nuisance, [0.0])))
     A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, record)))
     predicted = steady_gain(A, C, Q, R)[2]
-    return A, C, Q, R, predicted - gain_at(predicted, C, R, np) @ C @ predicted
+    return A, C, Q, R, predicted - gain_at(predicted, C, R) @ C @ predicted

@@ -25,8 +25,6 @@ from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.card import packaged_cards
 from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.record import monitored
 from swashplate.validation import innovations
 from swashplate.validation.bands import FEWEST_DRAWS, BandedRecord, bands, check_draws, widening
@@ -98,8 +96,6 @@ def validate(
             that are too few or of another model.
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
-    enable_double_precision()
-    enable_compilation_cache()
     if isinstance(model, Result):
         vehicle, published = model.model, published or model.start
     else:

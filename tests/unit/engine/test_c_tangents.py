@@ -15,7 +15,6 @@ from swashplate.compiled import NATIVE, loaded
 from swashplate.compiler import compiler
 from swashplate.engine.c_expression import Statement
 from swashplate.engine.c_tangents import VECTORS, Tangents
-from swashplate.simulation.dynamics import enable_double_precision
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
 
@@ -46,7 +45,7 @@ _PLACES = np.array([[0.7, 1.3], [1.3, 0.7], [0.8, 0.8], [2.0, 0.4]])
 
 
 def test_every_operation_moves_as_jax_has_it() -> None:
-    enable_double_precision()
+    jax.config.update("jax_enable_x64", True)
     body, stores = [], []
     for number, name in enumerate(_OPERATIONS):
         reads = ("x[0]",) if name in _OF_ONE else ("x[0]", "x[1]")

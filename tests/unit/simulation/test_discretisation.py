@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.integrate import quad_vec
-from scipy.linalg import expm
 
 from swashplate.simulation.discretisation import (
     first_order_hold,
@@ -12,8 +10,6 @@ from swashplate.simulation.discretisation import (
     with_late_inputs,
     zero_order_hold,
 )
-from swashplate.simulation.dynamics import enable_double_precision
-from swashplate.simulation.gathered_noise import gathered_noise
 
 A = np.array([[0.0, 1.0, 0.0], [-40.0, -1.2, 3.0], [0.0, 0.0, -8.0]])
 B = np.array([[0.0, 0.1], [2.0, 0.0], [0.0, 8.0]])
@@ -55,15 +51,6 @@ def test_the_series_is_the_exponential_to_its_order() -> None:
     transition, held = held_series(A, DT, np.eye(3), terms=12)
     np.testing.assert_allclose(transition, F, atol=1e-14)
     np.testing.assert_allclose(DT * held @ B, G, atol=1e-15)
-
-
-def test_gathered_noise_is_the_integral() -> None:
-    enable_double_precision()
-    W = np.diag([0.0, 2.0, 0.5])
-    transition, gathered = gathered_noise(A, W, DT)
-    np.testing.assert_allclose(transition, expm(A * DT), atol=1e-14)
-    expected, _ = quad_vec(lambda s: expm(A * s) @ W @ expm(A * s).T, 0.0, DT, epsabs=1e-16)
-    np.testing.assert_allclose(gathered, expected, atol=1e-14)
 
 
 def test_a_late_input_waits_in_states_of_its_own() -> None:

@@ -226,7 +226,7 @@ def _known(model: SampledObserverModel, scale: Array, *, samples: int, count: in
     P = blind = np.eye(count)
     for _ in range(samples):
         P, blind = F @ P @ F.T + Q, F @ blind @ F.T + Q
-        P = P - gain_at(P, H, np.eye(len(H)), np) @ H @ P
+        P = P - gain_at(P, H, np.eye(len(H))) @ H @ P
         P = 0.5 * (P + P.T)
     sigma, before = (np.sqrt(np.maximum(np.diag(part), 0.0)) * scale for part in (P, blind))
     return tuple(Known(n, float(s), float(b)) for n, s, b in zip(model.names, sigma, before, strict=True))

@@ -173,12 +173,11 @@ def steady_filter(
                 H * scale[None, :] / sigma[:, None],
                 Q / np.outer(scale, scale),
                 R / np.outer(sigma, sigma),
-                np,
             )
         ) * np.outer(scale, scale)
     except (np.linalg.LinAlgError, ValueError):
         raise ControllerError("no steady Kalman filter exists for these sensors.", where=where) from None
-    L = gain_at(P, H, R, np)
+    L = gain_at(P, H, R)
     return np.asarray(L, dtype=np.float64), np.asarray(P, dtype=np.float64)
 
 

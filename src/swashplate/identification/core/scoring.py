@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -39,21 +39,6 @@ class Likelihood(Protocol):
     def refresh(self, row: Array) -> None:
         """Take an accepted row for the weights that are held during an iteration."""
         ...
-
-
-@dataclass(frozen=True)
-class TracedCost:
-    """A likelihood's cost as JAX differentiates and compiles it.
-
-    Attributes:
-        function: (plan, data, scaled row) to the cost, priors not included; one object for all rows and data.
-        plan: all but numbers, hashable.
-        data: arrays by name.
-    """
-
-    function: Callable[[Any, Any, Any], Any]
-    plan: Any
-    data: Any
 
 
 @dataclass(frozen=True)

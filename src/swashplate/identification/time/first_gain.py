@@ -35,10 +35,10 @@ def kalman_gains(phi: Array, c: Array, gusts: Iterable[Array], sensors: Array) -
     gains = []
     for gust in gusts:
         try:
-            settled = settled_covariance(through(phi, c, gust, sensors, np))
+            settled = settled_covariance(through(phi, c, gust, sensors))
         except np.linalg.LinAlgError:
             continue  # something that lasts is not seen: no filter of this noise settles
-        gains.append(np.asarray(phi @ gain_at(settled, c, sensors, np)))
+        gains.append(np.asarray(phi @ gain_at(settled, c, sensors)))
     return gains
 
 

@@ -45,8 +45,6 @@ from swashplate.identification.time.residual_joint import begun, begun_where_it_
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.residual import PREFIX
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.record import monitored
 
 ITERATIONS = 60
@@ -79,8 +77,6 @@ def identify_flight(
     horizon = _horizon(question)
     free = "full" if question.free is None else question.free
     flights = [monitored(flight, vehicle) for flight in flights]
-    enable_double_precision()
-    enable_compilation_cache()
     started = time.perf_counter()
     refuse_lowpassed(flights)
     table = parameterize(

@@ -20,7 +20,6 @@ from swashplate.identification.time.vehicle_likelihood import VehicleErrors
 from swashplate.identification.time.vehicle_time_fit import fit_vehicle
 from swashplate.models.linear.state_space_file import parse
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import enable_double_precision
 
 OUTPUTS = ("p", "pdot", "ay")
 AHEAD, FURTHER = (0.02, 0.1), (0.1, 0.4)
@@ -38,7 +37,6 @@ def test_a_horizon_is_two_times_or_one() -> None:
 
 @lru_cache(maxsize=1)
 def _filter_error() -> TimeErrors:
-    enable_double_precision()
     table = parameterize(rolling(), list(TRUTH))
     pieces = records([gusty()], rolling(), outputs=OUTPUTS)
     how = {"environment": Environment(), "shifts": True, "biases": ("ay",)}

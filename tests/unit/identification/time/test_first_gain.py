@@ -43,7 +43,7 @@ def _run(gain: Array) -> tuple[float, Sequence[Array]]:
 
 
 def test_it_ends_at_the_filter_of_the_noise_that_was_there() -> None:
-    best = PHI @ gain_at(settled_covariance(through(PHI, C, GUSTS, SENSORS, np)), C, SENSORS, np)
+    best = PHI @ gain_at(settled_covariance(through(PHI, C, GUSTS, SENSORS)), C, SENSORS)
     begun = kalman_gains(PHI, C, [100.0 * GUSTS], SENSORS)
     cost, found = first_gain(PHI, C, [0.9 * np.eye(2), *begun], _run)
     assert _run(begun[0])[0] > _run(best)[0] + 50.0
