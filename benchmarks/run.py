@@ -32,7 +32,6 @@ from benchmarks import (
 )
 from benchmarks.rotor_options import rotor_options
 from benchmarks.timing import Result, Span
-from swashplate.simulation.compilation import enable_compilation_cache
 
 JSBSIM_RATIO = 2.0
 """How many times faster than JSBSim's helicopter one CoaX has to be."""
@@ -72,7 +71,7 @@ def measure(*, short: bool) -> list[Result]:
 
 def machine() -> dict[str, object]:
     """What the numbers were measured on."""
-    packages = {name: metadata.version(name) for name in ("swashplate", "jax", "jaxlib", "numpy", "casadi", "jsbsim")}
+    packages = {name: metadata.version(name) for name in ("swashplate", "numpy", "casadi", "jsbsim")}
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
@@ -111,7 +110,6 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, help="also write the results as JSON")
     options = parser.parse_args()
-    enable_compilation_cache()
     found: dict[str, object] = {"machine": machine()}
 
     def keep(part: str, measured: Sequence[Result | Span | live.Punctual]) -> None:

@@ -32,8 +32,6 @@ from swashplate.identification.time.identify import ITERATIONS, PREDICTION_ERROR
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.prediction_error import SETTLING, PredictionError
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation.prediction import predict
 
 
@@ -108,8 +106,6 @@ def errors(vehicle: Vehicle, record: Record, noise: Noise, nuisance: Nuisance) -
 
 
 def main(flight: str, *names: str) -> int:
-    enable_double_precision()
-    enable_compilation_cache()
     coax = sp.vehicle("coax")
     pieces = records(sp.read(FLIGHTS[flight]).condition(rate=100.0, cutoff=0.0), coax)
     whole = max(pieces, key=lambda piece: piece.time.size)

@@ -19,7 +19,7 @@ import numpy as np
 from real_flights import CHOICE, CLOSED, FLIGHTS, HORIZON
 
 import swashplate as sp
-from swashplate.arrays import Array
+from swashplate.arrays import Array, lengthened
 from swashplate.filtering.arriving_commands import commands_moved
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.multi_step import Ahead, MultiStepErrors, Places
@@ -28,7 +28,6 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.time import identify
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
-from swashplate.simulation.compilation import lengthened
 from swashplate.validation.closed_loop import closed_ahead
 from swashplate.validation.controller_law import Law, learnt
 

@@ -30,8 +30,6 @@ from swashplate.identification.time.residual_ahead import FlightAhead
 from swashplate.identification.time.residual_strength import chosen_strength, shrunk
 from swashplate.models.residual import coefficients
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision
 
 Sizes = list[list[Array]]
 
@@ -74,8 +72,6 @@ def left_out(flights: Sequence[FlightAhead], factors: Array, size: Array) -> tup
 
 
 def main(fits: Sequence[str], flights: Sequence[str]) -> None:
-    enable_double_precision()
-    enable_compilation_cache()
     sizes: Sizes | None = None
     first: dict[str, Array] = {}
     for name in fits:

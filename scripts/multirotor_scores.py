@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import swashplate as sp
-from swashplate.arrays import Array
+from swashplate.arrays import Array, lengthened
 from swashplate.filtering.arriving_commands import commands
 from swashplate.filtering.disturbed_model import Nuisance, stochastic_model
 from swashplate.filtering.nuisance import PUSHES
@@ -42,8 +42,7 @@ from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import enable_compilation_cache, lengthened
-from swashplate.simulation.dynamics import enable_double_precision, jax_backend
+from swashplate.simulation.dynamics import jax_backend
 from swashplate.validation.metrics import fit_percent
 from swashplate.validation.prediction import naive, observed, predict
 from swashplate.validation.validate import observer_of, started_from
@@ -264,8 +263,6 @@ def main(
     new: Sequence[str],
     page: Path | None,
 ) -> None:
-    enable_double_precision()
-    enable_compilation_cache()
     training = [seen(record) for record, _ in of_files(fitted, next(iter(models.values())))] if models else []
     rivals: dict[str, Rival] = {}
     for label, make in RIVALS.items() if models else ():

@@ -32,8 +32,6 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.time.calibration import CALIBRATION, calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import enable_compilation_cache
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation.black_box import ceiling
 from swashplate.validation.flight_floors import motion_of
 from swashplate.validation.metrics import fit_percent
@@ -179,8 +177,6 @@ def told(vehicle: Vehicle, record: Record, nuisance: Nuisance, wanted: Array) ->
 
 
 def main(vehicle: Vehicle, path: str) -> None:
-    enable_double_precision()
-    enable_compilation_cache()
     (record, _), *_ = of_files([path], vehicle)
     noise, prior = observer_of(vehicle)
     nuisance = calibrate(vehicle, record, noise=noise, prior=prior)

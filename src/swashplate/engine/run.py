@@ -22,10 +22,10 @@ def runnable(function: Any) -> Callable[..., list[Array]]:
         return lambda *given: [np.asarray(part.full()) for part in function.call(list(given))]
     run = getattr(loaded(print_function(function, "double")[0], options=_OPTIONS), function.name())
     sizes = [function.size_in(i) for i in range(function.n_in())]
-    work = np.empty(max(1, int(function.sz_w())))
-    whole = np.empty(max(1, int(function.sz_iw())), dtype=np.intc)
 
     def called(*given: Array) -> list[Array]:
+        work = np.empty(max(1, int(function.sz_w())))  # each call its own: several threads may run it
+        whole = np.empty(max(1, int(function.sz_iw())), dtype=np.intc)
         rows = [
             np.asfortranarray(np.reshape(part, size, order="F"), float) for part, size in zip(given, sizes, strict=True)
         ]
