@@ -2,8 +2,8 @@
 
 Every statement is printed once as a number and, where something that it reads moves, once more as a `vec`: its slopes
 along as many directions as the processor's vectors hold (Griewank and Walther 2008, ch. 3: vector forward mode). Roots
-are found as numbers; how they move follows from the residual there (implicit function theorem). Rules at kinks are
-those of JAX.
+are found as numbers; how they move follows from the residual there (implicit function theorem). Where two numbers are
+equal, the slope of the larger or smaller one is the mean of both.
 """
 
 from __future__ import annotations

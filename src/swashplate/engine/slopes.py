@@ -10,9 +10,9 @@ import numpy as np
 
 from swashplate.arrays import IMAGINARY, Array
 from swashplate.engine.equations import Equations, unpack_rows
-from swashplate.engine.roots import require_casadi
+from swashplate.engine.roots import Looping, require_casadi
 from swashplate.errors import ExportError
-from swashplate.physics.backend import ArrayBackend, Backend, CasadiBackend
+from swashplate.physics.backend import ArrayBackend, Backend, CasadiBackend, newton
 
 Scalars = Callable[[Sequence[Any], Sequence[Any], Sequence[Any], Backend], Sequence[Any]]
 """`f(x, w, p, xp)`: a row of scalars of a state row, a driving row and a row of numbers."""
@@ -45,14 +45,12 @@ def slopes_of(f: Scalars, sizes: tuple[int, int, int], *, where: str) -> Slopes:
         ExportError: where CasADi cannot trace it; when it is called, where it takes no complex numbers either.
     """
     casadi = require_casadi()
-    x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
+    given = [casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True)]
     try:
-        rows = [[column[i] for i in range(column.shape[0])] for column in (x, w, p)]
-        values = casadi.cse(casadi.vertcat(*f(rows[0], rows[1], rows[2], CasadiBackend())))
+        values, slopes = with_slopes(f, *given)
     except Exception as error:  # whatever a model of another package does with numbers that are none
         return _by_imaginary_steps(f, ExportError(f"CasADi cannot trace the equations: {error}", where=where))
-    slopes = casadi.densify(casadi.jacobian(values, casadi.vertcat(x, w)))
-    graph = casadi.Function("slopes", [x, w, p], [casadi.densify(values), slopes], {"cse": True})
+    graph = casadi.Function("slopes", given, [casadi.densify(values), casadi.densify(slopes)], {"cse": True})
 
     def at(x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
         values, slopes = (np.asarray(part.full(), dtype=np.float64) for part in graph(x, w, p))
@@ -61,15 +59,61 @@ def slopes_of(f: Scalars, sizes: tuple[int, int, int], *, where: str) -> Slopes:
     return at
 
 
+def with_slopes(f: Scalars, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
+    """Values (m, 1) and slopes by x and w side by side (m, n + driving), as CasADi's expressions of columns.
+
+    Slopes of a root are those of its residual there (implicit function theorem), not of the search that finds it.
+    """
+    casadi, found, left = require_casadi(), _Recording(), Looping(require_casadi())
+    rows = [[column[i] for i in range(column.shape[0])] for column in (x, w, p)]
+    values = casadi.vertcat(*f(rows[0], rows[1], rows[2], found))
+    if not found.roots:
+        return values, casadi.jacobian(values, casadi.vertcat(x, w))
+    moving = casadi.vertcat(x, w)
+    open_values = casadi.vertcat(*f(rows[0], rows[1], rows[2], left))
+    roots, guesses = (casadi.vertcat(*(getattr(root, name) for root in left.roots)) for name in ("root", "guess"))
+    residuals = casadi.substitute(casadi.vertcat(*(root.value for root in left.roots)), guesses, roots)
+    by_moving, by_root = casadi.jacobian(residuals, moving), casadi.jacobian(residuals, roots)
+    moved = casadi.SX(0, moving.shape[0])
+    for i in range(roots.shape[0]):  # a root depends on earlier ones
+        moved = casadi.vertcat(moved, -(by_moving[i, :] + by_root[i, :i] @ moved) / by_root[i, i])
+    slopes = casadi.jacobian(open_values, moving) + casadi.jacobian(open_values, roots) @ moved
+    at_roots = casadi.Function("at_roots", [x, w, p, roots], [open_values, slopes], {"cse": True})
+    return tuple(at_roots(x, w, p, casadi.vertcat(*found.roots)))
+
+
+class _Recording(CasadiBackend):
+    """Seeks roots in a fixed number of steps, and keeps what it finds."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.roots: list[Any] = []
+        self._plain = CasadiBackend()
+
+    def newton(self, residual: Any, start: Any, *, steps: int) -> Any:
+        self.roots.append(newton(residual, start, steps=steps, xp=self._plain))
+        return self.roots[-1]
+
+
 @lru_cache(maxsize=64)
 def _of_rates(equations: Equations) -> Slopes:
+    return slopes_of(_rates(equations), _sizes(equations), where=equations.vehicle.name)
+
+
+def rates_at(equations: Equations) -> Any:
+    """The rates and their slopes by state and driving row side by side, as a CasADi function of (x, w, p)."""
+    casadi = require_casadi()
+    given = [casadi.SX.sym(name, size) for name, size in zip("xwp", _sizes(equations), strict=True)]
+    return casadi.Function("rates_at", given, with_slopes(_rates(equations), *given), {"cse": True})
+
+
+def _sizes(equations: Equations) -> tuple[int, int, int]:
     vehicle = equations.vehicle
-    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
+    return len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2
 
-    def rates(x: Any, w: Any, p: Any, xp: Backend) -> Sequence[Any]:
-        return vehicle.rates(x, *unpack_rows(equations, w, p), xp)
 
-    return slopes_of(rates, sizes, where=vehicle.name)
+def _rates(equations: Equations) -> Scalars:
+    return lambda x, w, p, xp: equations.vehicle.rates(x, *unpack_rows(equations, w, p), xp)
 
 
 class _ComplexArrays:

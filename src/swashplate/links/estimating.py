@@ -118,7 +118,7 @@ class Estimating:
             card = model.card.parameters
             known += [KnownNow(name, card[name].unit, card[name].value) for name in names]
             inputs = np.append(plan_of.trim.inputs, plan_of.trim.environment.voltage)
-            for _ in range(2):  # compiled before the flight
+            for _ in range(2):  # traced before the flight
                 self._filter.step(self.dt, inputs, np.zeros(len(self._read)))
             self._filter = SlowParameters(plan_of)
         if not known:

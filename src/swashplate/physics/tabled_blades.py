@@ -152,7 +152,7 @@ def section(table: AerofoilTable, angle: Any, mach: Any, reynolds: Any, xp: Any)
     i, above = _between(mach, table.mach, xp)
     j, right = _between(xp.log(reynolds + _TINY), table.log_reynolds, xp)
     nodes, stall, columns = xp.asarray(table.nodes), xp.asarray(table.stall), len(table.log_reynolds)
-    # One gather for all corners: compiled loops are quick while they touch little (`simulation.compilation`).
+    # One gather for all corners.
     blocks = [(i + k) * columns + j + n for k in (0, 1) for n in (0, 1)]
     shares = [(1.0 - above, above)[k] * (1.0 - right, right)[n] for k in (0, 1) for n in (0, 1)]
     places = xp.stack([block * (table.intervals + 1) + interval + end for end in (0, 1) for block in blocks])

@@ -13,16 +13,19 @@ All have the eight states of Bhandari et al. (2005), eq. 13, with flapping that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import lru_cache
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swashplate.arrays import Array
-from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row
-from swashplate.engine.slopes import rates_and_slopes
+from swashplate.arrays import Array, lengthened
+from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, Equations, equations_of, parameter_row
+from swashplate.engine.roots import require_casadi
+from swashplate.engine.run import runnable
+from swashplate.engine.slopes import rates_at
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
@@ -142,7 +145,7 @@ def simulate_lpv(
     return Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate_lpv", scheme=scheme, rate=rate)
 
 
-def _linear_step(A: Array, c: Array, x: Array, dt: float) -> Array:
+def _linear_step(A: Any, c: Any, x: Any, dt: Any) -> Any:
     """One Runge-Kutta step of dx/dt = A x + c: the Taylor series to fourth order."""
     term = A @ x + c
     total = x + dt * term
@@ -161,26 +164,41 @@ def _printed(
     p: Array,
     dt: float,
 ) -> Array:
-    vehicle = equations.vehicle
-    x0, u0 = trimmed
-    ten = [vehicle.index(name) for name in (*PAPER_STATES, "a1", "b1")]
+    block, now, states = _printed_block(equations), np.concatenate(begin), []
+    numbers = np.tile(np.concatenate([*trimmed, row, p, [dt]])[:, None], _BLOCK)
+    for first in range(0, len(u), _BLOCK):
+        (after,) = block(now, lengthened(u[first : first + _BLOCK], _BLOCK).T, numbers)
+        states += [now[None], after.T[:-1]]
+        now = after[:, -1]
+    return np.concatenate(states)[: len(u), : len(PAPER_STATES)]
+
+
+_BLOCK = 64
+"""Steps that one call of the graph takes."""
+
+
+@lru_cache(maxsize=4)
+def _printed_block(equations: Equations) -> Callable[..., list[Array]]:
+    """Paper's states and disc, commands and what never changes, a column a step, to states and disc after each step."""
+    casadi, vehicle = require_casadi(), equations.vehicle
+    places = [vehicle.index(name) for name in (*PAPER_STATES, "a1", "b1")]
     order = [PAPER_INPUTS.index(name) for name in vehicle.input_names]
     back = [vehicle.input_names.index(name) for name in PAPER_INPUTS]
-    x, disc = (np.array(part, dtype=np.float64) for part in begin)
-    states = []
-    for command in u:
-        states.append(x)
-        state = np.zeros(len(vehicle.state_names))
-        state[ten] = np.concatenate([x, disc])
-        rates, by_x, by_w = rates_and_slopes(equations, state, np.concatenate([command[order], row]), p)
-        value, J = rates[ten], np.concatenate([by_x[np.ix_(ten, ten)], by_w[ten][:, back]], axis=1)
-        # The disc's equations are linear in the disc: one Newton step is its steady tilt at this state.
-        inverse = np.linalg.inv(J[8:, 8:10])
-        follow = -inverse @ np.concatenate([J[8:, :8], J[8:, 10:]], axis=1)
-        A = J[:8, :8] + J[:8, 8:10] @ follow[:, :8]
-        B = J[:8, 10:] + J[:8, 8:10] @ follow[:, 8:]
-        x, disc = _linear_step(A, B @ (command - u0) - A @ x0, x, dt), disc - inverse @ value[8:]
-    return np.array(states)
+    n, m = len(vehicle.state_names), len(PAPER_INPUTS)
+    sizes = (8, m, len(SURROUNDINGS), len(vehicle.parameter_names) + len(CONSTANTS), 1)
+    ten, command, fixed = (casadi.SX.sym(*size) for size in (("ten", 10), ("command", m), ("fixed", sum(sizes))))
+    x0, u0, row, p, dt = casadi.vertsplit(fixed, np.cumsum([0, *sizes]).tolist())
+    state = casadi.SX(n, 1)
+    state[places] = ten
+    values, slopes = rates_at(equations)(state, casadi.vertcat(command[order], row), p)
+    value, J = values[places], slopes[places, [*places, *(n + column for column in back)]]
+    # The disc's equations are linear in the disc: one Newton step is its steady tilt at this state.
+    inverse = casadi.inv_minor(J[8:, 8:10])
+    follow = -inverse @ casadi.horzcat(J[8:, :8], J[8:, 10:])
+    A, B = J[:8, :8] + J[:8, 8:10] @ follow[:, :8], J[:8, 10:] + J[:8, 8:10] @ follow[:, 8:]
+    after = _linear_step(A, B @ (command - u0) - A @ x0, ten[:8], dt)
+    told = casadi.densify(casadi.vertcat(after, ten[8:] - inverse @ value[8:]))
+    return runnable(casadi.Function("printed", [ten, command, fixed], [told], {"cse": True}).mapaccum("lpv", _BLOCK))
 
 
 def _stitched(over: Schedule) -> Vehicle:
