@@ -29,8 +29,10 @@ import proof
 ROOT = proof.ROOT
 FOLDER = ROOT / "build" / "siege"
 _SHARES = {"files": 0.35, "forged": 0.15, "kills": 0.3, "disks": 0.05, "places": 0.04, "packets": 0.07, "pages": 0.02}
-SHARES = _SHARES | {"neighbours": 0.01, "small": 0.01}
-"""Of the minutes; disks, places, pages, neighbours and small machines take what they take."""
+SHARES = _SHARES | {"neighbours": 0.01, "small": 0.1}
+"""Of the minutes; disks, places, pages and neighbours take what they take."""
+_LEAST = 120.0
+"""s that small machines have at least: what a command needs on one is not much less."""
 
 
 def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[dict[str, object]]]]:
@@ -82,7 +84,7 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
         return [neighbours.besiege().as_dict()]
 
     def besiege_small(seconds: float) -> list[dict[str, object]]:
-        return [small.besiege().as_dict()]
+        return [small.besiege(seconds=max(seconds, _LEAST)).as_dict()]
 
     return {
         "files": besiege_files,

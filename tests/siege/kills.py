@@ -89,10 +89,10 @@ SLOW: Mapping[str, Command] = {
 def _inputs(folder: Path) -> None:
     """What the commands read."""
     t = np.arange(0.0, 40.0, 0.02)
-    sweep = 0.1 * np.sin(2 * np.pi * (0.5 * t + 0.1 * t**2))
-    p = np.convolve(sweep, 5.0 * np.exp(-5.0 * np.arange(0, 2, 0.02)) * 0.02)[: t.size]
-    noise = np.random.default_rng(0).standard_normal((2, t.size))
-    measured = {"p": p + 0.002 * noise[0], "phi": np.cumsum(p) * 0.02 + 0.001 * noise[1], "servo_roll": sweep}
+    noise = np.random.default_rng(0).standard_normal((3, t.size))
+    moved = 0.1 * noise[2]  # nothing before explains it: it is no controller's answer
+    p = np.convolve(moved, 5.0 * np.exp(-5.0 * np.arange(0, 2, 0.02)) * 0.02)[: t.size]
+    measured = {"p": p + 0.002 * noise[0], "phi": np.cumsum(p) * 0.02 + 0.001 * noise[1], "servo_roll": moved}
     flight = Flight({"log": stream(t, measured)}, Provenance(source="a test", reader="tests", reader_version="1"))
     write_csv(flight, folder / "log.csv")
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -60,26 +61,30 @@ def _tried(on: Machine, words: str, around: Around, tools: Path) -> list[str]:
 
 
 def besiege(
-    *, commands: Sequence[str] = tuple(COMMANDS), machines: Sequence[str] = tuple(MACHINES), tried: Callable = _tried
+    *, commands: Sequence[str] = tuple(COMMANDS), machines: Sequence[str] = tuple(MACHINES), seconds: float = 3600.0
 ) -> Found:
-    """Each command on each machine."""
+    """Each command on each machine; no further command after `seconds`."""
     bad: list[str] = []
     counts = {name: Counter[str]() for name in machines}
     with machine(commands) as on:
         tools = on.home.with_name("tools")
         tools.mkdir()
-        for name in machines:
-            for command in commands:
-                wrong = tried(on, COMMANDS[command], MACHINES[name], tools)
+        until, used = time.monotonic() + seconds, 0
+        for command in commands:
+            if time.monotonic() > until:
+                break
+            used += 1
+            for name in machines:
+                wrong = _tried(on, COMMANDS[command], MACHINES[name], tools)
                 counts[name].update(["runs", *(["done"] if "done" in wrong else [])])
                 problems = [words for words in wrong if words != "done"]
                 counts[name]["wrong"] += bool(problems)
                 bad += [f"{command}, {name}: {words}" for words in problems]
-                progress(f"{name}: {sum(count['runs'] for count in counts.values())} runs, {len(bad)} bad")
+                progress(f"{command}: {sum(count['runs'] for count in counts.values())} runs, {len(bad)} bad")
     rows = [[name, c["runs"], c["done"], c["runs"] - c["done"] - c["wrong"], c["wrong"]] for name, c in counts.items()]
     text = (
-        f"{len(commands)} commands, each a process of its own. Wanted is the result, or a message and exit code 2, "
-        "within two minutes; never a traceback, a process that dies, or a file that nobody asked for."
+        f"{used} of {len(commands)} commands, each a process of its own. Wanted is the result, or a message and exit "
+        "code 2, within two minutes; never a traceback, a process that dies, or a file that nobody asked for."
     )
     return Found(
         "Siege: small and odd machines", text, ["machine", "runs", "done", "refused in words", "wrong"], rows, bad

@@ -11,9 +11,8 @@ import hashlib
 import io
 import json
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,21 +72,21 @@ def unpacked(content: bytes, *, ending: str, task: str = "") -> Columns:
     """The table of a file; `packed` is the way back, with the arguments.
 
     Raises:
-        ValueError: a file that is packed or claims more than `LARGEST`; one that is not, or no longer, the result of
-            `task`; and whatever the libraries raise on damaged bytes.
+        ValueError: a file that claims more than `LARGEST`, a packed archive; one that is not, or no longer, the result
+            of `task`; and whatever the libraries raise on damaged bytes.
         MissingLibraryError: for Parquet without the extra `scale`.
     """
     if ending == NUMPY:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             _check(sum(entry.file_size for entry in archive.infolist()))
-            _refuse_packed(any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()))
+            if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
+                raise ValueError("it is packed, and no result is")  # it can hold a thousand times of what it weighs
             comment = archive.comment
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return _checked({key: arrays[key] for key in arrays.files}, json.loads(comment or b"{}"), task)
     parquet = library("pyarrow.parquet", what="a table in Parquet")
     with parquet.ParquetFile(io.BytesIO(content), page_checksum_verification=True) as file:
         _check(8 * file.metadata.num_rows * file.metadata.num_columns)
-        _refuse_packed(any(map(_is_packed, _pieces(file.metadata))))
         table = file.read(use_threads=False)
     columns: Columns = {}
     for name, values in zip(table.column_names, table.columns, strict=True):
@@ -127,19 +126,3 @@ def _characters(texts: NDArray[np.str_]) -> NDArray[np.str_]:
 def _check(size: int) -> None:
     if size > LARGEST:
         raise ValueError("it claims more than it can hold")
-
-
-def _pieces(metadata: Any) -> Iterator[Any]:
-    """What a Parquet file says of each column in each group of rows."""
-    for group in range(metadata.num_row_groups):
-        yield from (metadata.row_group(group).column(k) for k in range(metadata.num_columns))
-
-
-def _is_packed(piece: Any) -> bool:
-    return piece.compression != "UNCOMPRESSED" or any("DICTIONARY" in encoding for encoding in piece.encodings)
-
-
-def _refuse_packed(packed: bool) -> None:
-    """A packed file can hold a thousand times of what it weighs; none of ours is packed."""
-    if packed:
-        raise ValueError("it is packed, and no result is")
