@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import gusty_sweeps
+import r50
 from coupled_helicopter import LAG, PITCH, ROLL, THRUST_BY_W, matrices, measured
 from proof_page import leave
 from swashplate.arrays import Array
@@ -15,9 +17,17 @@ from swashplate.identification.frequency.state_space_fit import STARTED, fit_sta
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.structure_search import search_structures
 from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure
 
+SMALL = {
+    "Xu": -0.04, "Yv": -0.12, "Yped": 1.5, "Zw": -0.8, "Zcol": -32.0, "Lu": -0.05, "Lv": -0.12, "Lped": -3.0,
+    "Lb": 310.0, "Mu": 0.05, "Mv": -0.02, "Ma": 185.0, "Nv": 0.4, "Nr": -1.9, "Nped": 28.0, "Ncol": -6.0,
+    "tau_f": 0.1, "Ab": -0.12, "Alat": 0.02, "Alon": -0.22, "Ba": 0.15, "Blat": 0.22, "Blon": 0.02,
+    "tau_lat": 0.03, "tau_lon": 0.03, "tau_ped": 0.03, "tau_col": 0.03,
+}  # fmt: skip
+"""A helicopter of 8 kg in hover, of the size of published ones."""
 RIGHT = "compose:body+flap+inflow+torque"
 TOLD = 0.05
 """Relative error of a mode that the responses tell; one that they tell less has three of its own bounds."""
@@ -54,6 +64,25 @@ def test_a_structure_without_the_engine_is_told_to_lack_something(responses: Fre
     fit = fit_state_space(structure("compose:body+flap+inflow"), responses, starts=2)
     (words,) = (text for text in fit.warnings if "not all of the aircraft" in text)
     assert "r / collective" in words
+
+
+@pytest.mark.proof
+def test_a_rotor_is_found_in_clean_sweeps_of_a_small_helicopter() -> None:
+    """Four sweeps without gusts of one like an X-Cell: the search ended at 321.9 with the rotor and picked the body."""
+    truth = r50.without_angles(structure("compose:body+flap")).with_values(SMALL)
+    flights = gusty_sweeps.fly(
+        truth, [gusty_sweeps.Question(axis, "automatic", 0.0, 100 + k) for k, axis in enumerate(truth.inputs)]
+    )
+    responses = respond(flights, inputs=truth.inputs, outputs=truth.outputs, band=(0.05, 6.0), bystanders=())
+    own = fit_state_space(structure("compose:body+flap"), responses, starts=1)
+    assert own.cost < 5.0
+    for name in ("Lb", "Ma", "tau_f", "Zw", "Zcol", "Nped", "Alon", "Blat"):
+        assert own[name].value == pytest.approx(SMALL[name], rel=0.05), name
+    found = search_structures(responses)
+    assert found.pick.name == "body+flap", found
+    assert found.pick.cost < 1.05 * own.cost
+    assert next(c.cost for c in found.tried if c.name == "body") > 20.0 * own.cost
+    assert not any(c.failed for c in found.tried)
 
 
 @pytest.mark.proof

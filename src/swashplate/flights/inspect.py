@@ -14,6 +14,7 @@ from swashplate.arrays import Array
 from swashplate.flights.consistency import consistency
 from swashplate.flights.epoch import note
 from swashplate.flights.flight import Flight
+from swashplate.flights.input_signs import input_signs, sign_problem, sign_words
 from swashplate.flights.jumps import OUTLIER, attitudes, jumps
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
 from swashplate.flights.schema import channel, is_known
@@ -96,6 +97,7 @@ class Inspection(Shown):
 
     Attributes:
         sweeps: frequency sweeps in the flight.
+        signs: which way each command moves the aircraft, in words, or why that is not told.
         damage: what is broken in the file itself; it stands among the problems too.
         vehicle: as the log names it.
     """
@@ -110,6 +112,7 @@ class Inspection(Shown):
     sweeps: tuple[Sweep, ...] = ()
     damage: tuple[str, ...] = ()
     vehicle: str = ""
+    signs: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain JSON types (NaN becomes None)."""
@@ -152,7 +155,8 @@ class Inspection(Shown):
         return f"{self.source or '(unnamed)'}: {self.duration:.1f} s{whose}{', simulated' if self.simulated else ''}"
 
     def _lists(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
-        return (("sweeps", tuple(map(str, self.sweeps))), ("problems", self.problems), ("notes", self.notes))
+        signs = (("signs from commands to motion", self.signs),) if self.signs else ()
+        return (("sweeps", tuple(map(str, self.sweeps))), *signs, ("problems", self.problems), ("notes", self.notes))
 
     def _tables(self) -> Iterator[TextTable]:
         for heading, *rows in (self.stream_rows(), self.channel_rows()):
@@ -381,6 +385,9 @@ def inspect(flight: Flight) -> Inspection:
     possible, _ = _without_impossible(flight)
     damage = flight.provenance.damage
     contradictions = (str(finding) for finding in consistency(possible))
+    swept = sweeps(possible)
+    signs = input_signs(possible, swept)
+    turned = (sign_problem(possible, sign) for sign, _ in signs if sign.wrong)
     return Inspection(
         source=flight.provenance.source,
         simulated=flight.provenance.simulated,
@@ -392,8 +399,9 @@ def inspect(flight: Flight) -> Inspection:
             *([note(flight.epoch)] if flight.epoch else ()),
             *(text for stream in streams for text in _stream_notes(stream)),
         ),
-        problems=(*damage, *contradictions, *_told(flight, streams, channels)),
-        sweeps=sweeps(possible),
+        problems=(*damage, *contradictions, *turned, *_told(flight, streams, channels)),
+        sweeps=swept,
         damage=damage,
         vehicle=flight.provenance.vehicle,
+        signs=tuple(sign_words(sign, why) for sign, why in signs),
     )

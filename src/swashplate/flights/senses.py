@@ -46,6 +46,11 @@ def plain(name: str) -> str:
     return base if variant in VARIANTS and variant != "demand" else name
 
 
+def has_sense(input: str) -> bool:
+    """Whether a command's name promises a motion."""
+    return input in _COMMANDS
+
+
 def expected_sense(output: str, input: str) -> int:
     """The sign of a motion that a positive command makes, 1 or -1; 0 where the names promise none."""
     promised = {

@@ -18,17 +18,17 @@ from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.rate_gain_names import gain_text, untuned
 from swashplate.errors import ControllerError
 from swashplate.flights.excitation import FLY, OUTSIDE
+from swashplate.flights.motion_signs import SIGNED, sign_of
 from swashplate.identification.frequency.handling import ResponseMargins
 from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.identification.frequency.response_cost import ACCEPTABLE
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.identification.responses.signs import response_sign, sign_of
+from swashplate.identification.responses.signs import response_sign
 from swashplate.identification.time.feedback import UNMOVED
 from swashplate.models.card import Card
 
 _SEEN = (12.0, 120.0)
 """rad/s: where the sense of a vehicle's answer is read off."""
-_SIGNED = {1: "positive", -1: "negative"}
 
 
 def refused_by_data(fit: Fitted, responses: FrequencyResponse, rate: str, command: str) -> str:
@@ -142,7 +142,7 @@ def refuse_turned_commands(
         told, _, misfit = sign_of(omega[seen], h, integrations=1)
         if told == -sense:
             raise ControllerError(
-                f"a positive {command} command makes {output} {_SIGNED[told]}, expected {_SIGNED[sense]} (with the "
+                f"a positive {command} command makes {output} {SIGNED[told]}, expected {SIGNED[sense]} (with the "
                 f"sign turned it is {misfit[0]:.2f} rad off, as it is {misfit[1]:.2f}): no gains are given.",
                 where=where,
                 channel=command,

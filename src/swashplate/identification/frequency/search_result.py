@@ -97,6 +97,7 @@ class StructureSearch:
             vague = "" if c.abandoned else f"{percent(bound).strip()} ({name})"
             seen = f"{c.held_out:.2f}" if np.isfinite(c.held_out) else ""
             modes = "abandoned after the first look" if c.abandoned else c.modes
+            modes = f"its fit failed: {c.failed}, which it contains, fits better" if c.failed else modes
             table.append((c.name, f"{c.cost:.1f}", f"{max(c.fit.costs):.0f}", str(c.parameters), vague, seen, modes))
         return table if self.judged else [(*row[:5], *row[6:]) for row in table]
 
@@ -117,6 +118,7 @@ class StructureSearch:
                     "held_out_J_rms": c.held_out,
                     "misfit": c.misfit,
                     "abandoned": c.abandoned,
+                    "failed": c.failed,
                     "modes": [mode.as_dict() for mode in c.fit.details.modes],
                 }
                 for c in self.tried

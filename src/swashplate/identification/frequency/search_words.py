@@ -30,10 +30,16 @@ def reasons(pick: Contender, others: Sequence[Contender], leaner: Mapping[str, C
         name, before, after = _worst_loss(pick, one)
         lines.append(f"  {one.name}: J_ave {one.cost:.1f}; {name} {after:.0f} instead of {before:.0f}.")
     own = set(pick.name.split("+"))
-    vain = [(c, set(c.name.split("+")) - own) for c in others if own < set(c.name.split("+"))]
+    failed = [c for c in (pick, *others) if c.failed]
+    vain = [(c, set(c.name.split("+")) - own) for c in others if own < set(c.name.split("+")) and not c.failed]
     added = list(dict.fromkeys(name for _, more in vain for name in sorted(more) if len(more) == 1))
     if added:
         lines.append(f"  nothing gained that is worth the parameters: {', '.join(added)}.")
+    lines += [
+        f"! {c.name}: J_ave {c.cost:.1f} although it contains {c.failed}, which fits better. Its fit failed: that says "
+        f"nothing against its parts. Fit it alone (compose:{c.name})."
+        for c in failed
+    ]
     alike = [
         c.name
         for c in others

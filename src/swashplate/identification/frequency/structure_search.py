@@ -203,7 +203,9 @@ def search_structures(
     if structures:
         prepared = [search.prepare(one) for one in _by_name(structures)]
         search.choice, apart = _in_common(search.choice, prepared, responses)
-        best = search.best(search.round(prepared))
+        ended = search.round(prepared)
+        search.audit()
+        best = search.best([search.tried[one.name] for one in ended])
     else:
         best, leaner = _grown(search)
     pick, words = _judged(search, best, judge)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import swashplate as sp
 from coupled_helicopter import INPUTS, STATES, matrices, measured
 from swashplate.errors import CardError, IdentificationError, SwashError
+from swashplate.identification.frequency import structure_search
 from swashplate.identification.frequency.search_candidates import cores, exchanges, offered
 from swashplate.identification.frequency.search_result import StructureSearch
 from swashplate.identification.frequency.structure_score import squared_misfit
@@ -60,6 +62,28 @@ def test_what_is_hopeless_is_dropped_after_a_first_look() -> None:
     assert "heave+yaw" in dropped
     assert all(len(c.fit.history) <= 2 * LOOK + 2 for c in dropped.values())
     assert all("abandoned after the first look" in row[-1] for row in found.rows()[-len(dropped) :])
+
+
+def test_a_structure_that_ends_above_what_it_contains_is_a_failed_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its iterations and its starts from relatives are taken away: it was called not worth its parameters."""
+    own = structure_search.fit_targets
+
+    def stuck(model: StateSpaceModel, targets: Any, **how: Any) -> Any:
+        if model.name == "heave+yaw+inflow+torque":
+            model, how = model.with_values({"Nr": -20.0, "Zw": -9.0}), how | {"others": {}, "iterations": 1}
+        return own(model, targets, **how)
+
+    monkeypatch.setattr(structure_search, "fit_targets", stuck)
+    named = [structure(f"compose:heave+yaw{more}") for more in ("", "+torque", "+inflow+torque")]
+    found = search_structures(heave_and_yaw(inflow=False), structures=named)
+    assert found.pick.name == "heave+yaw+torque"
+    (one,) = (c for c in found.tried if c.name == "heave+yaw+inflow+torque")
+    assert one.failed
+    assert one.cost > found.pick.cost
+    (row,) = (row for row in found.rows() if row[0] == one.name)
+    assert row[-1] == f"its fit failed: {one.failed}, which it contains, fits better"
+    assert any("heave+yaw+inflow+torque" in text and "Its fit failed" in text for text in found.reasons)
+    assert not any("nothing gained" in text and "inflow" in text for text in found.reasons)
 
 
 def test_a_hold_out_decides_where_the_responses_do_not() -> None:

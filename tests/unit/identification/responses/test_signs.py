@@ -10,9 +10,10 @@ import pytest
 from proof_page import leave
 from swashplate.arrays import Array, Complex
 from swashplate.flights.flight import Flight, stream
+from swashplate.flights.motion_signs import sign_of
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.responses.respond import respond
-from swashplate.identification.responses.signs import response_sign, response_signs, sign_of
+from swashplate.identification.responses.signs import response_sign, response_signs
 from swashplate.models.linear.state_space_file import structure
 
 OMEGA = 2.0 * np.pi * np.geomspace(0.4, 10.0, 60)
