@@ -50,7 +50,8 @@ class Layout:
     def moved(self, card: Array, row: Array) -> Array:
         """Slopes of `values` by each free parameter (free, parameters), by complex steps (Squire and Trapp 1998)."""
         step = 1j * IMAGINARY * np.eye(len(self.free))
-        return np.array([np.imag(np.array(self.values(card, row + one))) / IMAGINARY for one in step])
+        moved = [np.imag(np.array(self.values(card, row + one))) / IMAGINARY for one in step]
+        return np.array(moved).reshape(len(step), len(card))
 
 
 @dataclass(frozen=True)

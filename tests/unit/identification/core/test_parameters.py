@@ -7,7 +7,7 @@ import pytest
 
 from swashplate.errors import ExpressionError, IdentificationError
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.parameters import Free, parameterize
+from swashplate.identification.core.parameters import Free, Parameterization, parameterize
 from swashplate.identification.time.prediction_error import parameter_entries
 from swashplate.models.catalogue import vehicle
 from swashplate.models.coax_choices import CHOICES
@@ -159,3 +159,8 @@ def test_a_free_parameter_may_be_described(coax: Vehicle) -> None:
     (entry, other) = parameter_entries(table)
     assert (entry.start, entry.scale, entry.mean, entry.sigma) == (0.31, 0.05, 0.33, 0.01)
     assert other.sigma == np.inf
+
+
+def test_slopes_of_no_free_parameter_are_an_empty_table(coax: Vehicle) -> None:
+    table = Parameterization(coax, ())
+    assert table.layout.moved(np.asarray(table.card_row), np.zeros(0)).shape == (0, len(coax.parameter_names))
