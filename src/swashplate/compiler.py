@@ -28,8 +28,8 @@ LIMIT = 300.0
 def compiler() -> tuple[str, ...] | None:
     """The words that start a C compiler: `cc`, `gcc` or `clang` by its absolute path, else that of the package ziglang
     (extra `compiler`); None where there is none. What lies in the folder one works in is none of them."""
-    found = (shutil.which(name) for name in ("cc", "gcc", "clang"))
-    if path := next((path for path in found if path is not None and os.path.isabs(path)), None):
+    paths = (shutil.which(name) for name in ("cc", "gcc", "clang"))
+    if path := next((path for path in paths if path is not None and os.path.isabs(path)), None):
         return (path,)
     return (sys.executable, "-I", "-m", "ziglang", "cc") if find_spec("ziglang") is not None else None
 

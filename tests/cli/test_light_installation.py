@@ -158,7 +158,7 @@ def test_the_extras_that_messages_name_are_the_projects() -> None:
     assert set(EXTRA_OF) - set(brought) == {"jax"}, "of the extra for a card"
     assert not set(_plain(project["dependencies"])) & set(EXTRA_OF)
     (every,) = extras["all"]
-    assert sorted(every[len("swashplate[") : -1].split(",")) == sorted(set(extras) - {"all", "cuda"})
+    assert sorted(every[len("swashplate[") : -1].split(",")) == sorted(set(extras) - {"all", "compiler", "cuda"})
 
 
 def _brought_by(requirements: list[str]) -> set[str]:

@@ -20,7 +20,7 @@ from swashplate.export.formats import Export
 from swashplate.export.regression_c import RegressionCode, regression_code
 from swashplate.export.slow_parameters_c import SlowCode, slow_parameters_code
 from swashplate.filtering.sensor_suite import KINDS, suite
-from swashplate.flights.conditioning.uniform_records import with_names
+from swashplate.flights.channel_names import with_names
 from swashplate.flights.flight import Flight
 from swashplate.identification.recursive.equation import RegressionEquation, regression_equation
 from swashplate.identification.recursive.fourier_regression import RecursiveRegression, RegressionPlan, regression_plan

@@ -64,10 +64,10 @@ def with_slopes(f: Scalars, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
 
     Slopes of a root are those of its residual there (implicit function theorem), not of the search that finds it.
     """
-    casadi, found, left = require_casadi(), _Recording(), Looping(require_casadi())
+    casadi, recording, left = require_casadi(), _Recording(), Looping(require_casadi())
     rows = [[column[i] for i in range(column.shape[0])] for column in (x, w, p)]
-    values = casadi.vertcat(*f(rows[0], rows[1], rows[2], found))
-    if not found.roots:
+    values = casadi.vertcat(*f(rows[0], rows[1], rows[2], recording))
+    if not recording.roots:
         return values, casadi.jacobian(values, casadi.vertcat(x, w))
     moving = casadi.vertcat(x, w)
     open_values = casadi.vertcat(*f(rows[0], rows[1], rows[2], left))
@@ -79,7 +79,7 @@ def with_slopes(f: Scalars, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
         moved = casadi.vertcat(moved, -(by_moving[i, :] + by_root[i, :i] @ moved) / by_root[i, i])
     slopes = casadi.jacobian(open_values, moving) + casadi.jacobian(open_values, roots) @ moved
     at_roots = casadi.Function("at_roots", [x, w, p, roots], [open_values, slopes], {"cse": True})
-    return tuple(at_roots(x, w, p, casadi.vertcat(*found.roots)))
+    return tuple(at_roots(x, w, p, casadi.vertcat(*recording.roots)))
 
 
 class _Recording(CasadiBackend):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 
 
-class Series(NamedTuple):
+class RecordSeries(NamedTuple):
     """Of a record by sample: readings (n, outputs), commands as they arrive (n, inputs) and voltage (n,)."""
 
     readings: Array
@@ -43,7 +43,7 @@ class FilterCode(Protocol):
 
     compiled_by: str
 
-    def along(self, dt: float, fixed: Fixed, series: Series) -> tuple[Array, Array, Array]:
+    def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
         """Innovations (n, outputs), states after each reading (n, joined), and what `moved` asks for."""
         ...
 
@@ -51,7 +51,7 @@ class FilterCode(Protocol):
         self,
         dt: float,
         fixed: Fixed,
-        series: Series,
+        series: RecordSeries,
         went: Array,
         directions: Fixed,
         late: tuple[int, Array],

@@ -16,7 +16,7 @@ from swashplate.compiled import NATIVE, can_compile, loaded
 from swashplate.errors import ExportError
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_c import filter_source
-from swashplate.filtering.filter_code import FilterCode, Fixed, Pushed, Series
+from swashplate.filtering.filter_code import FilterCode, Fixed, Pushed, RecordSeries
 from swashplate.filtering.filter_virtual import VirtualFilter
 
 _OPTIONS = ("-O2", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
@@ -64,7 +64,7 @@ class FilterLibrary:
         self._directions, self._roots = int(self._c.directions()), int(self._c.roots())
         self._outputs = model.n_outputs
 
-    def along(self, dt: float, fixed: Fixed, series: Series) -> tuple[Array, Array, Array]:
+    def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
         n = len(series.readings)
         told = np.empty((n, self._outputs)), np.empty((n, fixed.start.size)), np.empty((n, 4, self._roots))
         self._c.run_along(n, dt, *map(flat, fixed), *map(flat, series), *told)
@@ -74,7 +74,7 @@ class FilterLibrary:
         self,
         dt: float,
         fixed: Fixed,
-        series: Series,
+        series: RecordSeries,
         went: Array,
         directions: Fixed,
         late: tuple[int, Array],

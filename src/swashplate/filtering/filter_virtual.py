@@ -18,7 +18,7 @@ from swashplate.engine.roots import require_casadi
 from swashplate.engine.trace import unrolled_rates
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel
 from swashplate.filtering.filter_c import correction
-from swashplate.filtering.filter_code import Fixed, Pushed, Series
+from swashplate.filtering.filter_code import Fixed, Pushed, RecordSeries
 
 _FRACTIONS, _WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 _STRETCH = 512
@@ -45,7 +45,7 @@ class VirtualFilter:
         self._pushed = np.eye(self._n)[:, model.disturbed]
 
     # ---- along a record ----------------------------------------------------------------------------------------
-    def along(self, dt: float, fixed: Fixed, series: Series) -> tuple[Array, Array, Array]:
+    def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
         casadi, n = require_casadi(), len(series.readings)
         rows = (*(np.atleast_2d(part.T) for part in series), np.tile(fixed.given[:, None], n))
         told = self._sample.mapaccum(n)(fixed.start, *rows, np.tile(fixed.numbers[:, None], n))
@@ -75,7 +75,7 @@ class VirtualFilter:
         self,
         dt: float,
         fixed: Fixed,
-        series: Series,
+        series: RecordSeries,
         went: Array,
         directions: Fixed,
         late: tuple[int, Array],

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.flights.conditioning.uniform_records import MOTION, SET_POINT, STICK, renamed_channels, slowest_of
+from swashplate.flights.channel_names import MOTION, SET_POINT, STICK, renamed_channels, slowest_of
 from swashplate.flights.feedback import NOTHING, AnswerShares, share_of, told_by_motion
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event

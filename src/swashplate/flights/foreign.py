@@ -33,7 +33,7 @@ _BASE, _MOST = 256 << 20, 6 << 30  # bytes of memory: of the libraries themselve
 
 
 @dataclass(frozen=True)
-class Limits:
+class ProcessLimits:
     """What the process may take for one file.
 
     Attributes:
@@ -60,14 +60,14 @@ BYTES_A_SECOND: Final[dict[Job, int]] = {"hdf5": 20 << 20, "rosbag": 512 << 10}
 """Of a file, that its library reads at least: a fifth of what it does on a slow processor."""
 
 
-def limits(job: Job, size: int) -> Limits:
+def limits(job: Job, size: int) -> ProcessLimits:
     """What a file of so many bytes may take. Systems without `resource` (Windows) limit neither processor nor memory.
 
     The memory is three times the largest content that a file of this size can have: in the library, as an array, and
     on its way here.
     """
     processor, content = 3 + size // BYTES_A_SECOND[job], largest_content(size)
-    return Limits(processor, 10.0 + 4.0 * processor, min(_BASE + 3 * content, _MOST), content, 2 * content)
+    return ProcessLimits(processor, 10.0 + 4.0 * processor, min(_BASE + 3 * content, _MOST), content, 2 * content)
 
 
 def frames(
@@ -107,7 +107,7 @@ _MET = {
 }
 
 
-def _stopped(path: Path, met: str, may: Limits) -> FlightError:
+def _stopped(path: Path, met: str, may: ProcessLimits) -> FlightError:
     return FlightError(
         f"was given up: reading it {met}. It is damaged or forged; a file of its size may take {may}.",
         where=path,
@@ -128,7 +128,7 @@ class _Process:
         self._one = threading.Lock()
         atexit.register(self._close)
 
-    def ask(self, path: Path, question: Told, may: Limits) -> Iterator[tuple[Told, bytearray]]:
+    def ask(self, path: Path, question: Told, may: ProcessLimits) -> Iterator[tuple[Told, bytearray]]:
         """The frames that answer a question; the last one is empty, or says what was wrong."""
         with self._one:
             process = self._started(path)
@@ -191,7 +191,7 @@ class _Process:
         return left - count, content
 
     @staticmethod
-    def _end(process: subprocess.Popen[bytes], may: Limits) -> str:
+    def _end(process: subprocess.Popen[bytes], may: ProcessLimits) -> str:
         code = process.wait()
         if OUT_OF_TIME is not None and code == -OUT_OF_TIME:
             return f"took more than {may.processor} s of the processor"

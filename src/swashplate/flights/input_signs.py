@@ -35,7 +35,7 @@ def input_signs(flight: Flight, sweeps: Sequence[Sweep]) -> tuple[tuple[Response
     Args:
         flight: as logged. sweeps: that were told or seen in it.
     """
-    found = []
+    signs = []
     for name in flight.channels:
         if has_sense(name) and _moves(flight.values(name)):
             outputs = [next((n for n in kind if n in flight and expected_sense(n, name)), "") for kind in _MOTIONS]
@@ -43,8 +43,8 @@ def input_signs(flight: Flight, sweeps: Sequence[Sweep]) -> tuple[tuple[Response
             part, why = _moved(flight, name, sweeps, asked) if asked else (None, "")
             for output in asked:
                 sign = ResponseSign(output, name, expected_sense(output, name), 0, 0.0, 0.0, (np.nan, np.nan), 0.0)
-                found.append((sign, why) if part is None else _judged(part, sign))
-    return tuple(found)
+                signs.append((sign, why) if part is None else _judged(part, sign))
+    return tuple(signs)
 
 
 def sign_words(sign: ResponseSign, why: str) -> str:
@@ -63,7 +63,7 @@ def sign_problem(flight: Flight, sign: ResponseSign) -> str:
 def _moved(flight: Flight, name: str, sweeps: Sequence[Sweep], outputs: Sequence[str]) -> tuple[Flight | None, str]:
     """The part of a flight in which something from outside moved a command; or why there is none."""
     # They condition, which inspects.
-    from swashplate.flights.conditioning.uniform_records import SET_POINT, STICK
+    from swashplate.flights.channel_names import SET_POINT, STICK
     from swashplate.flights.excitation import OUTSIDE, excitations, of_inputs
 
     own = [s for s in sweeps if s.channel == name or (axis_of(name) and axis_of(name) in s.axis.split())]

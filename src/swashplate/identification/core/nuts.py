@@ -33,7 +33,7 @@ _RAN_AWAY = 1000.0
 _STATS = ("lp", "diverging", "energy", "tree_depth", "n_steps", "acceptance_rate")
 
 
-class Point(NamedTuple):
+class PhasePoint(NamedTuple):
     """A place in whitened numbers, the density's logarithm there and its gradient, and the scaled row."""
 
     z: Array
@@ -42,7 +42,7 @@ class Point(NamedTuple):
     row: Array
 
 
-Density = Callable[[Array], Point]
+Density = Callable[[Array], PhasePoint]
 
 
 def sample(
@@ -96,10 +96,10 @@ def density_of(slope: Slope, row: Row, data: dict[str, Any]) -> Density:
     """The density in whitened numbers; nothing lies beyond the bounds and where the model diverges."""
     low, high = row.bounds()
 
-    def density(z: Array) -> Point:
+    def density(z: Array) -> PhasePoint:
         with np.errstate(all="ignore"):  # a sampler looks far out too
             place = unbent(data, z)
-            lost = Point(z, -np.inf, np.zeros_like(z), place.row)
+            lost = PhasePoint(z, -np.inf, np.zeros_like(z), place.row)
             if not np.all((place.row >= low) & (place.row <= high)):
                 return lost
             try:
@@ -109,7 +109,9 @@ def density_of(slope: Slope, row: Row, data: dict[str, Any]) -> Density:
             prior, by_prior, _ = row.prior(place.row)
             total = place.stretch - cost - prior
             pull = (place.bend - place.slope * (gradient + by_prior)) @ data["root"]
-        return Point(z, float(total), pull, place.row) if np.isfinite(total) and np.all(np.isfinite(pull)) else lost
+        return (
+            PhasePoint(z, float(total), pull, place.row) if np.isfinite(total) and np.all(np.isfinite(pull)) else lost
+        )
 
     return density
 
@@ -151,9 +153,9 @@ class _Chain:
 class _Path(NamedTuple):
     """A piece of a trajectory: its ends in time (point, momentum), the draw from it, and sums over it."""
 
-    first: tuple[Point, Array]
-    last: tuple[Point, Array]
-    chosen: Point
+    first: tuple[PhasePoint, Array]
+    last: tuple[PhasePoint, Array]
+    chosen: PhasePoint
     weight: float
     momentum: Array
     ends: bool
@@ -162,7 +164,9 @@ class _Path(NamedTuple):
     steps: int
 
 
-def drawn(density: Density, at: Point, step: float, random: np.random.Generator) -> tuple[Point, tuple[float, ...]]:
+def drawn(
+    density: Density, at: PhasePoint, step: float, random: np.random.Generator
+) -> tuple[PhasePoint, tuple[float, ...]]:
     """The next draw, and `_STATS` of how it was made."""
     momentum = random.standard_normal(at.z.size)
     energy = 0.5 * float(momentum @ momentum) - at.density
@@ -176,7 +180,7 @@ def drawn(density: Density, at: Point, step: float, random: np.random.Generator)
 
 
 def _grown(
-    density: Density, end: tuple[Point, Array], step: float, depth: int, energy: float, random: np.random.Generator
+    density: Density, end: tuple[PhasePoint, Array], step: float, depth: int, energy: float, random: np.random.Generator
 ) -> _Path:
     """2^depth leapfrog steps from an end on; fewer where they turn or run away."""
     if depth:

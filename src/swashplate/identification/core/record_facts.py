@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.flights.conditioning.uniform_records import STICK
+from swashplate.flights.channel_names import STICK
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import QUATERNION, channel
 

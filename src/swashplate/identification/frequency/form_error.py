@@ -122,7 +122,7 @@ def _likely(whole: Array, beside: Array, own: Array, left: Array, trend: Array, 
 def _process(omega: Array, left: Array, explained: Array) -> Process:
     """The likeliest process behind the residuals of one response, beside a covariance that explains them without it."""
     sizes = float(np.mean(left**2)) * _SIZES
-    best, found = -np.inf, Process(0.0, float(_LENGTHS[0]))
+    best, process = -np.inf, Process(0.0, float(_LENGTHS[0]))
     for length in _LENGTHS:
         tried = explained + sizes[:, None, None] * _twice(_shape(omega, omega, length))
         root = np.linalg.cholesky(tried)
@@ -130,8 +130,8 @@ def _process(omega: Array, left: Array, explained: Array) -> Process:
         likely = -np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1) - 0.5 * (white**2).sum(axis=1)
         k = int(np.argmax(likely))
         if likely[k] > best:
-            best, found = float(likely[k]), Process(float(sizes[k]), float(length))
-    return found
+            best, process = float(likely[k]), Process(float(sizes[k]), float(length))
+    return process
 
 
 def _noise(targets: Sequence[Target], residuals: Sequence[Array], *, free: int) -> tuple[Array, list[Array]]:

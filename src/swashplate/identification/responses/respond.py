@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.errors import FlightError
+from swashplate.flights.channel_names import renamed_channels, slowest_of
 from swashplate.flights.checked import checked
-from swashplate.flights.conditioning.uniform_records import renamed_channels, slowest_of
 from swashplate.flights.excitation import excitations, of_inputs
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.record_facts import (

@@ -12,7 +12,7 @@ from swashplate.arrays import IMAGINARY, Array
 from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel
-from swashplate.filtering.filter_code import Series
+from swashplate.filtering.filter_code import RecordSeries
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.beginning import (
@@ -147,8 +147,8 @@ class RecordRun:
         seen = self.plan.model.measure(np.moveaxis(states, -1, 0), nuisance, COMPLEX_ARRAYS)
         return np.moveaxis(seen, 0, -1)
 
-    def _series(self, commands: Array) -> Series:
-        return Series(self.readings, commands, self.voltage)
+    def _series(self, commands: Array) -> RecordSeries:
+        return RecordSeries(self.readings, commands, self.voltage)
 
     @property
     def _filter(self) -> RecordFilter:

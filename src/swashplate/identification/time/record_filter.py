@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import IMAGINARY, Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
-from swashplate.filtering.filter_code import Fixed, Pushed, Series
+from swashplate.filtering.filter_code import Fixed, Pushed, RecordSeries
 from swashplate.filtering.filter_library import filter_code
 from swashplate.identification.time.beginning import (
     Begun,
@@ -63,7 +63,7 @@ class RecordFilter:
         """What runs it: "C" or "NumPy"."""
         return self._code.compiled_by
 
-    def along(self, begin: Begun, numbers: FilterNumbers, series: Series) -> FilterRun:
+    def along(self, begin: Begun, numbers: FilterNumbers, series: RecordSeries) -> FilterRun:
         """Innovations and the states after each reading."""
         innovations, states, went = self._code.along(self.model.dt, self._fixed(begin, numbers), series)
         return FilterRun(innovations, self._state(states), went)
@@ -72,7 +72,7 @@ class RecordFilter:
         self,
         begin: Begun,
         numbers: FilterNumbers,
-        series: Series,
+        series: RecordSeries,
         run: FilterRun,
         moves: Moves,
         marks: Sequence[int] = (),
@@ -134,7 +134,7 @@ class RecordFilter:
         states: FilterState,
         slopes: FilterState,
         numbers: FilterNumbers,
-        series: Series,
+        series: RecordSeries,
         moves: Moves,
         starts: NDArray[np.intp],
         steps: Sequence[int],

@@ -123,8 +123,8 @@ class VehicleErrors(TimeErrors):
         every = np.concatenate([plain[None], directions])
 
         def at(names: Sequence[str]) -> Array:
-            found = [self._place.get(name) for name in names]
-            return np.stack([np.zeros(len(every)) if i is None else every[:, i] for i in found], axis=1)
+            places = [self._place.get(name) for name in names]
+            return np.stack([np.zeros(len(every)) if i is None else every[:, i] for i in places], axis=1)
 
         states, layout, card = self.table.vehicle.state_names, self.table.layout, self.table.card_row
         free = len(layout.free)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swashplate.errors import FlightError
-from swashplate.flights.conditioning.uniform_records import with_names
+from swashplate.flights.channel_names import with_names
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.maneuvers.ardupilot_chirp import MOVED, Chirp
 from swashplate.flights.provenance import Event, Provenance
