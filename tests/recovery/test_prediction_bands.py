@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import proof_page
 import swashplate as sp
+from swashplate.arrays import Array
 from swashplate.control.laws.hold import hold_step
+from swashplate.engine.equations import parameter_row
+from swashplate.engine.trace import unrolled_rates
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.records import POSE
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.validation.bands import Band
 
 RATE, SECONDS, HOLDOUTS, DRAWS = 100.0, 30.0, 16, 39
@@ -29,24 +30,21 @@ CHANNELS = ("u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 HORIZONS = (0.5, 1.0, 2.0)
 
 
-@partial(jax.jit, static_argnums=0)
-def _flown(model: StochasticModel, x: Any, parameters: Any, gains: Any, wanted: Any, told: Any) -> Any:
+def _flown(
+    vehicle: Vehicle, model: StochasticModel, x: Array, gains: Array, wanted: Array, told: tuple[Array, ...]
+) -> tuple[Array, Array]:
     """States and commands along a flight in the filter's own disturbances, under the hover's hold."""
-    fade = model.fade(NOISE)
-
-    numbers = model.vehicle.parameters(*parameters)
-
-    def sample(now: Any, at: Any) -> Any:
-        x, gust, drift, memory = now
-        added, white, kick, walk = at
-        voltage = jnp.asarray(12.0)
-        memory, u = hold_step(memory, jnp.append(x, voltage), wanted, gains, jnp)
-        u = u + added
-        after = model.step(x, gust + drift + white, u, numbers, voltage)
-        return (after, fade * gust + kick, drift + walk, memory), (x, u)
-
-    start = (x, jnp.zeros(6), jnp.zeros(6), jnp.array([0.0, 0.0, 1.0 / RATE]))
-    return jax.lax.scan(sample, start, told)[1]
+    rates, p, fade = unrolled_rates(model.equations), parameter_row(vehicle, None), model.fade(NOISE, np)
+    gust, drift, memory, push, flown = np.zeros(6), np.zeros(6), np.array([0.0, 0.0, 1.0 / RATE]), np.zeros(x.size), []
+    for added, white, kick, walk in zip(*told, strict=True):
+        memory, command = hold_step(memory, np.append(x, 12.0), wanted, gains, np)
+        u, push[list(model.disturbed)] = command + added, gust + drift + white
+        flown.append((x, u))
+        w = np.array([*u, 0.0, 0.0, 0.0, 12.0])
+        x = rk4_step(lambda x, w: np.asarray(rates(x, w, p)).ravel() + push, x, lambda _, w=w: w, 1.0 / RATE)
+        gust, drift = fade * gust + kick, drift + walk
+    states, commands = zip(*flown, strict=True)
+    return np.array(states), np.array(commands)
 
 
 def explained(vehicle: Vehicle, seed: int) -> Flight:
@@ -71,18 +69,11 @@ def explained(vehicle: Vehicle, seed: int) -> Flight:
         steps = np.repeat(size * random.choice([-1.0, 0.0, 1.0], n // 40 + 1), 40)[:n]
         added[:, column] = np.convolve(steps, np.ones(10) / 10.0, mode="same")
     wanted = np.array([*trim.state[:3], trim.state[8], 0.0, 0.0, 0.0, 0.0])
-    x, u = _flown(
-        model,
-        jnp.asarray(trim.state),
-        jnp.asarray(vehicle.values()),
-        jnp.asarray(hold.gains),
-        jnp.asarray(wanted),
-        tuple(map(jnp.asarray, (added, white, kick, drift))),
-    )
-    columns = {name: np.asarray(u)[:, i] for i, name in enumerate(vehicle.input_names)}
+    x, u = _flown(vehicle, model, trim.state, np.asarray(hold.gains), wanted, (added, white, kick, drift))
+    columns = {name: u[:, i] for i, name in enumerate(vehicle.input_names)}
     sigma = np.sqrt(model.sensor_variances(NOISE, np))
     for i, name in enumerate(POSE):
-        columns[name] = np.asarray(x)[:, vehicle.index(name)] + sigma[i] * random.standard_normal(n)
+        columns[name] = x[:, vehicle.index(name)] + sigma[i] * random.standard_normal(n)
     columns["voltage"] = np.full(n, 12.0)
     units = dict(zip(vehicle.input_names, vehicle.input_units, strict=True))
     return Flight({"uniform": stream(time, columns, units)}, Provenance(source=f"explained {seed}", simulated=True))
