@@ -35,10 +35,8 @@ class RateLeastSquares:
         size = np.concatenate(slopes).std(axis=0) + 1e-9
 
         def errors(row):
-            numbers = table.layout.values(table.card_row, row)
-            told = [
-                np.stack(model.rates(x.T, u.T, numbers, air, xp), axis=1) for x, u in zip(states, inputs, strict=True)
-            ]
+            par = table.layout.values(table.card_row, row)
+            told = [np.stack(model.rates(x.T, u.T, par, air, xp), axis=1) for x, u in zip(states, inputs, strict=True)]
             return np.concatenate([((a - b) / size).ravel() for a, b in zip(told, slopes, strict=True)])
 
         best = least_squares(errors, table.starts(), bounds=table.bounds(), x_scale="jac")

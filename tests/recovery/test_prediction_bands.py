@@ -12,14 +12,15 @@ import proof_page
 import swashplate as sp
 from swashplate.arrays import Array
 from swashplate.control.laws.hold import hold_step
+from swashplate.engine.equations import parameter_row
+from swashplate.engine.trace import unrolled_rates
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.records import POSE
-from swashplate.identification.time.beginning import numbers_and_constants
-from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.validation.bands import Band
 
 RATE, SECONDS, HOLDOUTS, DRAWS = 100.0, 30.0, 16, 39
@@ -30,19 +31,19 @@ HORIZONS = (0.5, 1.0, 2.0)
 
 
 def _flown(
-    model: StochasticModel, x: Array, vehicle: Vehicle, gains: Array, wanted: Array, told: tuple[Array, ...]
+    vehicle: Vehicle, model: StochasticModel, x: Array, gains: Array, wanted: Array, told: tuple[Array, ...]
 ) -> tuple[Array, Array]:
     """States and commands along a flight in the filter's own disturbances, under the hover's hold."""
-    fade, step = model.fade(NOISE), record_filter(model).step
-    numbers = numbers_and_constants(vehicle, np.array(vehicle.values(), dtype=np.float64))
-    gust, drift, memory, volts = np.zeros(6), np.zeros(6), np.array([0.0, 0.0, 1.0 / RATE]), np.array([12.0])
-    states, commands = [], []
+    rates, p, fade = unrolled_rates(model.equations), parameter_row(vehicle, None), model.fade(NOISE)
+    gust, drift, memory, push, flown = np.zeros(6), np.zeros(6), np.array([0.0, 0.0, 1.0 / RATE]), np.zeros(x.size), []
     for added, white, kick, walk in zip(*told, strict=True):
-        memory, u = hold_step(memory, np.append(x, 12.0), wanted, gains, np)
-        states.append(x)
-        commands.append(u + added)
-        x = step(x[None], (gust + white)[None], drift[None], commands[-1][None], volts, numbers)[0]
+        memory, command = hold_step(memory, np.append(x, 12.0), wanted, gains, np)
+        u, push[list(model.disturbed)] = command + added, gust + drift + white
+        flown.append((x, u))
+        w = np.array([*u, 0.0, 0.0, 0.0, 12.0])
+        x = rk4_step(lambda x, w: np.asarray(rates(x, w, p)).ravel() + push, x, lambda _, w=w: w, 1.0 / RATE)
         gust, drift = fade * gust + kick, drift + walk
+    states, commands = zip(*flown, strict=True)
     return np.array(states), np.array(commands)
 
 
@@ -68,7 +69,7 @@ def explained(vehicle: Vehicle, seed: int) -> Flight:
         steps = np.repeat(size * random.choice([-1.0, 0.0, 1.0], n // 40 + 1), 40)[:n]
         added[:, column] = np.convolve(steps, np.ones(10) / 10.0, mode="same")
     wanted = np.array([*trim.state[:3], trim.state[8], 0.0, 0.0, 0.0, 0.0])
-    x, u = _flown(model, np.array(trim.state), vehicle, np.asarray(hold.gains), wanted, (added, white, kick, drift))
+    x, u = _flown(vehicle, model, trim.state, np.asarray(hold.gains), wanted, (added, white, kick, drift))
     columns = {name: u[:, i] for i, name in enumerate(vehicle.input_names)}
     sigma = np.sqrt(model.sensor_variances(NOISE))
     for i, name in enumerate(POSE):
