@@ -26,9 +26,9 @@ from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.scoring import minimise
 from swashplate.identification.estimators import Question
 from swashplate.identification.time.estimates import LAGS, found_at
-from swashplate.identification.time.feedback import excitation
+from swashplate.identification.time.feedback import excitation, hold_unexcited
 from swashplate.identification.time.flight_details import AxisExcitation
-from swashplate.identification.time.identify import ITERATIONS, PREDICTION_ERROR, hold_unexcited
+from swashplate.identification.time.identify import ITERATIONS, PREDICTION_ERROR
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.prediction_error import SETTLING, PredictionError
 from swashplate.models.vehicle import Vehicle

@@ -63,7 +63,9 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
         every = {**kills.QUICK, **kills.SLOW}
         counts = {"kills": chosen.kills, "failures": chosen.failures}
         results = kills.besiege(every, **counts, seconds=seconds, seed=chosen.seed, kept=FOLDER / "kills.kept")
-        return [one.as_dict() for one in results]
+        for one in (one for one in results if not one.rows[-1][2]):
+            print(f"No time was left to strike ({one.title}): its section stays as it is.", file=sys.stderr)
+        return [one.as_dict() for one in results if one.rows[-1][2]]
 
     def besiege_disks(seconds: float) -> list[dict[str, object]]:
         outcome = disks.besiege()

@@ -120,6 +120,7 @@ def identify(
     import swashplate as sp
     from swashplate.api.nested import NestedComparison
     from swashplate.cli.reading import asked, conditioned
+    from swashplate.engine.roots import require_casadi
     from swashplate.identification.core.stopping import stoppable
 
     card, texts = options.prior_card_name(prior)
@@ -148,6 +149,7 @@ def identify(
             raise SwashError("does not go with --nested.", channel=", ".join(untold), hint="Leave it out.")
 
     def make(say: Callable[..., None]) -> Identification | NestedComparison:
+        require_casadi()
         say("reading flights")
         read = conditioned(called, rate=rate, cutoff=cutoff, how=how)
         asked_for: dict[str, Any] = {

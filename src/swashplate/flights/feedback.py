@@ -147,8 +147,6 @@ class _Table:
     @classmethod
     def of(cls, commands: Array, motion: Array, dt: float, at_once: Sequence[bool]) -> _Table | None:
         """None where the record is too short for its channels, or nothing moves."""
-        from scipy.signal import lfilter
-
         every, m = max(1, round(_STEP / dt)), commands.shape[1]
         n, step = len(commands) // every, every * dt
         slow = np.column_stack([commands, motion])[: n * every].reshape(n, every, -1).mean(axis=1)
@@ -175,7 +173,7 @@ class _Table:
             return np.hstack([y[at + sign * lag] for lag in lags])
 
         def far(sign: int) -> Array:
-            return np.hstack([lfilter([1.0 - k], [1.0, -k], y[::-sign], axis=0)[::-sign][at] for k in keep])
+            return np.hstack([_fading(y[::-sign], k)[::-sign][at] for k in keep])
 
         parts = {
             "now": y[at][:, ~forces],
@@ -212,3 +210,11 @@ def _normal(values: Array) -> Array:
     """Columns about their means, of unit size."""
     moved = values - values.mean(axis=0)
     return np.asarray(moved / np.maximum(moved.std(axis=0), 1e-300))
+
+
+def _fading(values: Array, keep: float) -> Array:
+    """Averages of what came before, of which a row is worth `keep` of the one after it."""
+    fading, state = np.empty_like(values), np.zeros(values.shape[1])
+    for i, row in enumerate(values):
+        fading[i] = state = keep * state + (1.0 - keep) * row
+    return fading

@@ -22,7 +22,7 @@ from typing import Any, Final, Literal
 from swashplate.errors import FlightError
 from swashplate.flights.readers.source import largest_content
 from swashplate.own_python import own_python
-from swashplate.systems import OUT_OF_TIME
+from swashplate.systems import OUT_OF_TIME, resource
 from swashplate.threads import ONE_THREAD
 
 Job = Literal["hdf5", "rosbag"]
@@ -61,13 +61,15 @@ BYTES_A_SECOND: Final[dict[Job, int]] = {"hdf5": 20 << 20, "rosbag": 512 << 10}
 
 
 def limits(job: Job, size: int) -> ProcessLimits:
-    """What a file of so many bytes may take. Systems without `resource` (Windows) limit neither processor nor memory.
+    """What a file of so many bytes may take.
 
+    Systems without `resource` (Windows) limit neither processor nor memory; there the clock is the tighter one.
     The memory is three times the largest content that a file of this size can have: in the library, as an array, and
     on its way here.
     """
     processor, content = 3 + size // BYTES_A_SECOND[job], largest_content(size)
-    return ProcessLimits(processor, 10.0 + 4.0 * processor, min(_BASE + 3 * content, _MOST), content, 2 * content)
+    clock = 10.0 + 4.0 * processor if resource is None else 60.0 + 20.0 * processor  # others may keep the machine busy
+    return ProcessLimits(processor, clock, min(_BASE + 3 * content, _MOST), content, 2 * content)
 
 
 def frames(

@@ -12,6 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.arrays import Array, Complex
+from swashplate.flights.channel_names import SET_POINT, STICK
+from swashplate.flights.excitation import OUTSIDE, excitations, of_inputs
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import Sweep
 from swashplate.flights.motion_signs import FEWEST, LINES, LOWEST, SIGNED, ResponseSign, sign_of
@@ -62,10 +64,6 @@ def sign_problem(flight: Flight, sign: ResponseSign) -> str:
 
 def _moved(flight: Flight, name: str, sweeps: Sequence[Sweep], outputs: Sequence[str]) -> tuple[Flight | None, str]:
     """The part of a flight in which something from outside moved a command; or why there is none."""
-    # They condition, which inspects.
-    from swashplate.flights.channel_names import SET_POINT, STICK
-    from swashplate.flights.excitation import OUTSIDE, excitations, of_inputs
-
     own = [s for s in sweeps if s.channel == name or (axis_of(name) and axis_of(name) in s.axis.split())]
     if own:
         longest = max(own, key=lambda s: s.stop - s.start)
@@ -97,8 +95,6 @@ def _judged(flight: Flight, sign: ResponseSign) -> tuple[ResponseSign, str]:
 
 def _coherent_response(flight: Flight, inputs: Sequence[str], output: str) -> tuple[Array, Complex]:
     """Response of an output to the first of the inputs, the others held still, where it is coherent: [rad/s], H."""
-    from scipy.signal import csd
-
     signals = [(flight.time(n), flight.values(n)) for n in (*inputs, output)]
     signals = [(time[np.isfinite(values)], values[np.isfinite(values)]) for time, values in signals]
     nothing = np.zeros(0), np.zeros(0, dtype=np.complex128)
@@ -111,8 +107,7 @@ def _coherent_response(flight: Flight, inputs: Sequence[str], output: str) -> tu
         return nothing
     table = np.stack([np.interp(grid, time, values) for time, values in signals])
     length = int(min(grid.size / 2, max(_WINDOW / dt, 8 * FEWEST)))
-    frequency, power = csd(table[:, None], table[None, :], 1.0 / dt, nperseg=length, detrend="linear", axis=-1)
-    spectra = np.moveaxis(power, -1, 0)  # conj(a) b
+    frequency, spectra = np.fft.rfftfreq(length, dt), _cross_spectra(table, length, dt)
     lines = np.flatnonzero((2.0 * np.pi * frequency >= LOWEST) & (frequency <= min(_SHARE / dt, _HIGHEST)))
     if lines.size < FEWEST:
         return nothing
@@ -129,3 +124,17 @@ def _coherent_response(flight: Flight, inputs: Sequence[str], output: str) -> tu
         known &= np.abs(cross) ** 2 / (own * whole) >= _COHERENT
         h = cross / own
     return 2.0 * np.pi * frequency[lines][known], h[known]
+
+
+def _cross_spectra(table: Array, length: int, dt: float) -> Complex:
+    """Densities of conj(a) b of signals (k, n) by Welch's method, (lines, k, k): Hann windows that overlap by half, each
+    without its straight line. Not SciPy's, whose import would take as long as all else of an inspection.
+    """
+    pieces = np.lib.stride_tricks.sliding_window_view(table, length, axis=1)[:, :: length - length // 2]
+    time = np.arange(length) - 0.5 * (length - 1)
+    slope = pieces @ time / (time @ time)
+    level = pieces - pieces.mean(axis=2, keepdims=True) - slope[..., None] * time
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+    lines = np.fft.rfft(level * window, axis=2)
+    power = np.einsum("anl,bnl->lab", lines.conj(), lines, optimize=True)
+    return np.asarray(power * 2.0 * dt / (lines.shape[1] * np.sum(window**2)))

@@ -10,7 +10,6 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.engine.roots import require_casadi
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
@@ -75,7 +74,6 @@ def identify_flight(
     Raises:
         IdentificationError, FlightError: see `identify`.
     """
-    require_casadi()
     horizon = _horizon(question)
     free = "full" if question.free is None else question.free
     flights = [monitored(flight, vehicle) for flight in flights]
