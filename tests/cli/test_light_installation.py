@@ -86,13 +86,13 @@ def test_the_light_verbs_do_without_what_the_others_name(tmp_path: Path) -> None
         ["fit-tf", answers, "--input", "mixer_roll", "--outputs", "p", "--form", "1/2", "-o", tmp_path / "tf"],
         ["fit-ss", "rotor_body", answers, "--starts", "1", "--gains", "-o", model],
         ["fit-ss", "rotor_body,rotor_body", answers, "--search", "-o", tmp_path / "search"],
+        ["fit-time", "rotor_body", flown, "-o", tmp_path / "in time"],
         ["validate", "--model", model / "model.toml", "--flight", unseen, "-o", tmp_path / "validation"],
         ["plot", flown, "-o", tmp_path / "flown.html"],
     ]
     heavy: list[list[object]] = [
         ["trim", "coax"],
         ["identify", "--vehicle", "coax", "--flight", flown],
-        ["fit-time", "rotor_body", flown],
         ["demo"],
         ["live", "coax"],
         ["export", "coax", "--format", "control"],

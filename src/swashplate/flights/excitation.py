@@ -22,6 +22,7 @@ from swashplate.arrays import Array
 from swashplate.flights.channel_names import MOTION, SET_POINT, STICK, renamed_channels, slowest_of
 from swashplate.flights.feedback import NOTHING, AnswerShares, share_of, told_by_motion
 from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.sweeps import rising
 from swashplate.flights.provenance import Event
 from swashplate.flights.schema import POSITION, RATES, VELOCITY, axis_of
 
@@ -42,6 +43,10 @@ _HEARD = 0.1
 _HELD = 0.5
 """Share of a rate's set-point from which an outer loop gives it. Simulated: at least 0.74 where one does and attitude
 and speed are logged, at most 0.35 where sticks or a program move it (`docs/decisions/0156-moved-from-outside.md`)."""
+
+_PURE = 0.8
+"""Share of the local power that a program's sweep holds: 0.89 to 0.93 of sweeps of 0.5 to 8.5 Hz, while of 60 commands
+that a loop makes in gusts none is a sweep at all."""
 
 _MOVED = 0.02  # of a stick's travel
 _TURNED = 0.01  # rad/s: a set-point below is no maneuver
@@ -168,6 +173,11 @@ class _Record:
         """Share of an input that other channels explain."""
         return share_of(self.at([name])[:, 0], self.at(causes), self.dt)
 
+    def pure(self, name: str) -> bool:
+        """Whether an input is hardly more than one tone of rising frequency: no loop that answers gusts makes that."""
+        ridge = rising(self.time, self.at([name])[:, 0])
+        return ridge is not None and ridge.share >= _PURE
+
     @cached_property
     def sweeps(self) -> list[Event]:
         """The sweeps that the log tells of in this record."""
@@ -267,7 +277,7 @@ class _Record:
     def _by_motion(self, name: str, *, stick: bool, swept: bool) -> Excitation:
         told = self.told[name]
         share = f"the motion until then explains {100.0 * told.past:.1f} % of it"
-        if told.answer and not (swept and told.foretold):
+        if told.answer and not (swept and self.pure(name)):
             words = f"a controller's answer: {share}, and the motion that follows tells it no better."
             return Excitation(self.name, name, CONTROLLER, words, told)
         if swept or stick:

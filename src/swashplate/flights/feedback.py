@@ -76,11 +76,6 @@ class AnswerShares:
         return self.known and (self.past < OWN or self.follows or surprising)
 
     @property
-    def foretold(self) -> bool:
-        """Whether the command's own past tells it to rounding and noise, as it does a program's smooth sweep."""
-        return self.known and self.fresh < FRESH
-
-    @property
     def answer(self) -> bool:
         """Whether the command is an answer to past motion; neither this nor `own` where it cannot be told."""
         return self.known and not self.own and self.past >= ANSWER and self.news >= NEWS

@@ -107,7 +107,8 @@ def _coherent_response(flight: Flight, inputs: Sequence[str], output: str) -> tu
         return nothing
     table = np.stack([np.interp(grid, time, values) for time, values in signals])
     length = int(min(grid.size / 2, max(_WINDOW / dt, 8 * FEWEST)))
-    frequency, spectra = np.fft.rfftfreq(length, dt), _cross_spectra(table, length, dt)
+    frequency = np.asarray(np.fft.rfftfreq(length, dt), dtype=np.float64)
+    spectra = _cross_spectra(table, length, dt)
     lines = np.flatnonzero((2.0 * np.pi * frequency >= LOWEST) & (frequency <= min(_SHARE / dt, _HIGHEST)))
     if lines.size < FEWEST:
         return nothing
@@ -127,8 +128,9 @@ def _coherent_response(flight: Flight, inputs: Sequence[str], output: str) -> tu
 
 
 def _cross_spectra(table: Array, length: int, dt: float) -> Complex:
-    """Densities of conj(a) b of signals (k, n) by Welch's method, (lines, k, k): Hann windows that overlap by half, each
-    without its straight line. Not SciPy's, whose import would take as long as all else of an inspection.
+    """Densities of conj(a) b of signals (k, n) by Welch's method, (lines, k, k): Hann windows that overlap by half.
+
+    Each is taken without its straight line. Not SciPy's, whose import takes as long as all else of an inspection.
     """
     pieces = np.lib.stride_tricks.sliding_window_view(table, length, axis=1)[:, :: length - length // 2]
     time = np.arange(length) - 0.5 * (length - 1)

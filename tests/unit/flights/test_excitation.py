@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import chirp
 
 from simulated_loops import Case, fly
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.excitation import Excitation, excitations, of_inputs
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.provenance import Event
+from swashplate.flights.provenance import Event, Provenance
 
 HOVER = Case(11, gains=(0.15, 0.1, 0.0, 1.2, 0.0), log=50.0, autopilot=True, seconds=30.0)
 RATE_STEPS = replace(HOVER, shape="steps", place="rate", size=1.0)
@@ -168,3 +169,15 @@ def test_what_moved_an_input_stays_beside_the_channels_that_are_asked_for(flown:
     (record,) = uniform_records(apart, ["mixer_roll", "p"], rate=50.0)
     assert record.stream_of("stick_roll") != record.stream_of("p")
     assert judged(record).kind == "sticks"
+
+
+@pytest.mark.parametrize(("high", "noise"), [(3.0, 0.0), (3.0, 0.3), (8.5, 0.0), (8.5, 0.3)])
+def test_a_programs_sweep_in_calm_air_is_a_sweep(high: float, noise: float) -> None:
+    """Past motion tells a smooth sweep through a lag of the first order; so it is asked whether it is one tone."""
+    time, random = np.arange(0.0, 40.0, 0.02), np.random.default_rng(6)
+    stick = chirp(time, 0.3, 40.0, high, phi=-90)
+    rate = np.convolve(stick, np.exp(-5.0 * time[:100]) * 0.1, "full")[: time.size]
+    seen = rate + noise * np.std(rate) * random.standard_normal(time.size)
+    columns = {"command": stick, "p": seen, "phi": np.cumsum(rate) * 0.02}
+    flight = Flight({"uniform": stream(time, columns, {"command": "1"})}, Provenance("chirp"))
+    assert judged(flight, "command", swept=["command"]).kind == "sweep"

@@ -140,7 +140,7 @@ import sys
 from swashplate.flights import foreign
 from swashplate.flights.readers.read import read
 usual = foreign.limits
-foreign.limits = lambda job, size: foreign.Limits(1000, 600.0, 1 << 30, 1 << 30, 1 << 20)
+foreign.limits = lambda job, size: foreign.ProcessLimits(1000, 600.0, 1 << 30, 1 << 30, 1 << 20)
 bytes_of = foreign._Process._bytes
 def told(process, count, left):
     print(process.pid, flush=True)
