@@ -88,6 +88,34 @@ def test_every_layout_is_in_the_table(field: Path) -> None:
     assert {path.name for path in (field / "csv_layouts").iterdir()} == {*LAYOUTS, "19_time_restarts.csv"}
 
 
+NUMBERED = {
+    "09-wrap-csv/wrap.csv": Right(noted="turned over once"),
+    "11-decimal-comma/05_decimal_comma.csv": Right(channels=(), noted="decimals are written with commas"),
+    "11-decimal-comma/05b_utf16_tab_comma.csv": Right(channels=(), noted="decimals are written with commas"),
+    "12-blackbox-csv/decode.csv": Right(samples=899, channels=("mixer_roll", "p_demand"), median=6.0),
+    "12-blackbox-csv/02_explorer_export.csv": Right(channels=("mixer_roll", "p_demand"), median=1.0),
+    "12-blackbox-csv/03_vehicle_angular_velocity_0.csv": Right(p="xyz[0]", channels=("xyz[1]", "xyz[2]")),
+    "16-euroc-header/09_euroc_imu.csv": Right(p="w_RS_S_x", channels=("a_RS_S_z",)),
+    "16-euroc-header/10_tum_gt.txt": Right(p="qx", scale=RAW, channels=("tx", "qw"), median=0.09226),
+    "18-units-row/12_units_row.csv": Right(),
+}
+
+
+@pytest.mark.parametrize("name", NUMBERED)
+def test_the_tables_of_the_numbered_cases(field: Path, name: str) -> None:
+    """Nothing is lost in them, no name stands twice, and the header of EuRoC's form gives units."""
+    right, flight = NUMBERED[name], sp.read(field / name)
+    assert {right.p, *right.channels} <= set(flight.channels)
+    assert flight.rate(right.p) == pytest.approx(right.rate, rel=1e-6)
+    assert flight.time(right.p).size == right.samples
+    assert np.median(flight.values(right.p)) == pytest.approx(right.median * right.scale, rel=2e-3)
+    assert flight.provenance.damage == ()
+    assert not any("twice" in text for text in flight.provenance.notes)
+    assert any(right.noted in text for text in (*flight.provenance.notes, ""))
+    if "euroc_imu" in name:
+        assert (flight["w_RS_S_x"].attrs["units"], flight["a_RS_S_z"].attrs["units"]) == ("rad/s", "m/s^2")
+
+
 def test_two_streams_of_their_own_rates(field: Path) -> None:
     flight = sp.read(field / "17-blanks" / "04b_blanks_own_names.csv")
     assert flight.rate("mixer_roll") == pytest.approx(62.5)

@@ -68,6 +68,8 @@ def _moved(flight: Flight, name: str, sweeps: Sequence[Sweep], outputs: Sequence
     if own:
         longest = max(own, key=lambda s: s.stop - s.start)
         return flight.between(longest.start - _AROUND, longest.stop + _AROUND), ""
+    if min(flight.time(n).size for n in (name, *outputs)) < 4 * FEWEST or flight.stop <= flight.start:
+        return None, "the record is too short"
     if not name.startswith(STICK) and any(n.endswith(SET_POINT) for n in flight.channels):
         return None, _LOOPS
     moved = of_inputs(excitations(flight, (name,), outputs=outputs)).get(name)

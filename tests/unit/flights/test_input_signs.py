@@ -93,6 +93,12 @@ def test_a_controllers_answer_has_none() -> None:
     assert not any("sign" in text for text in look.problems)
 
 
+@pytest.mark.parametrize("n", [2, 3, 8, 31])
+def test_a_record_of_a_few_samples_tells_none(n: int) -> None:
+    flight = Flight({"log": stream(TIME[:n], {"mixer_roll": sweep()[:n], "p": sweep(3)[:n]})})
+    assert sp.inspect(flight).signs == ("mixer_roll to p: not told, the record is too short",)
+
+
 def test_a_log_without_commands_shows_nothing_of_it() -> None:
     assert "signs from commands" not in str(sp.inspect(flown(p=sweep())))
 

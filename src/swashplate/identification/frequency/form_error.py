@@ -35,6 +35,9 @@ _SIZES = np.array([0.0, *np.geomspace(0.1, 100.0, 13)])
 _FREE = 9.0
 """By which the variances of the fit's numbers are loosened while one response alone tells its process."""
 
+_MOST, _EVEN = 10.0, 1e-12
+"""Of a logarithm, by which one of them then moves a response at most; and what keeps the sum of all positive."""
+
 _UNKNOWN = 0.25
 """Of the mean square of the residuals: taken for the responses' errors where these are not known."""
 
@@ -71,9 +74,8 @@ def error_of(fit: Fitted, output: str, input: str, omega: Array) -> tuple[Comple
     residuals = [_parts(log_error(c.model, c.target.measured)) for c in fitted]
     slopes = [_slopes(fit, t.output, t.input, t.omega) for t in targets]
     noise, rows = _noise(targets, residuals, free=len(fit.names))
-    loose = _loosened(fit)
     processes = [
-        _process(t.omega, r, noise[np.ix_(k, k)] + s @ loose @ s.T)
+        _process(t.omega, r, noise[np.ix_(k, k)] + _loosened(fit, s))
         for t, r, s, k in zip(targets, residuals, slopes, rows, strict=True)
     ]
     whole = noise.copy()
@@ -155,10 +157,14 @@ def _noise(targets: Sequence[Target], residuals: Sequence[Array], *, free: int) 
     return np.diag(square), rows
 
 
-def _loosened(fit: Fitted) -> Array:
-    """Covariance of the free numbers, loosened; what leaves no trace does not move."""
+def _loosened(fit: Fitted, slopes: Array) -> Array:
+    """What the free numbers, loosened, make of one response: a covariance; what leaves no trace does not move."""
     seen = np.isfinite(np.diag(fit.covariance))
-    return np.where(np.outer(seen, seen), _FREE * fit.covariance, 0.0)
+    covariance = np.where(np.outer(seen, seen), _FREE * fit.covariance, 0.0)
+    reach = np.abs(slopes).max(axis=0) * np.sqrt(np.diag(covariance))
+    moved = slopes * np.minimum(1.0, _MOST / np.maximum(reach, 1e-300))
+    made = moved @ covariance @ moved.T
+    return np.asarray(made + _EVEN * np.max(np.diag(made), initial=0.0) * np.eye(made.shape[0]))
 
 
 def _slopes(fit: Fitted, output: str, input: str, omega: Array) -> Array:

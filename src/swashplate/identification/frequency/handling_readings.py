@@ -10,6 +10,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
+from swashplate.flights.senses import expected_sense
 from swashplate.identification.frequency.handling import (
     Handling,
     ReadNumber,
@@ -170,4 +171,5 @@ def _turned(sign: float, input: str, angle: str) -> str:
     """That a response was read with its sign turned, in words."""
     if sign > 0.0:
         return ""
-    return f"read with its sign turned: a positive {input} makes {angle} negative, look at the units of both"
+    told = f"read with its sign turned: a positive {input} makes {angle} negative"
+    return f"{told}, {'as its name says' if expected_sense(angle, input) < 0 else 'look at the units of both'}"

@@ -62,6 +62,18 @@ def test_bounds_of_margins_are_those_of_drawn_models(lag: tuple[FrequencyRespons
     assert band.phase == pytest.approx(10.0 * logs.imag.std(axis=0), rel=0.15)
 
 
+def test_numbers_that_are_hardly_seen_do_not_break_the_errors(
+    lag: tuple[FrequencyResponse, TransferFunctionFit],
+) -> None:
+    """A bound beyond all size left no positive covariance, and the fit ended in an error of linear algebra."""
+    found, fit = lag
+    vague = replace(fit, covariance=1e24 * fit.covariance)
+    (_, line), (_, usual) = (margin_lines(found, one, fit.targets) for one in (vague, fit))
+    assert isinstance(line.read, ResponseMargins)
+    assert isinstance(usual.read, ResponseMargins)
+    assert line.read.crossover.sigma == pytest.approx(usual.read.crossover.sigma, rel=0.5)
+
+
 def test_errors_of_margins_are_those_of_drawn_responses() -> None:
     omega = np.geomspace(0.5, 50.0, 2000)
     loop = 40.0 / (1j * omega * ((1j * omega) ** 2 + 6j * omega + 10.0))

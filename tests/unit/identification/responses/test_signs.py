@@ -166,6 +166,10 @@ def test_no_sign_is_wrong_and_most_are_told(seeds: int) -> None:
             "response-signs",
             {
                 "title": "Signs from inputs to motions",
+                "text": "Random aircraft over bands of 2 to 6 octaves, and controllers' answers. No sign may be wrong, "
+                "no answer may be taken for an aircraft, and 90 % must be told.",
+                "passed": counts["wrong"] == counts["answers taken for an aircraft"] == 0
+                and counts["right"] >= 0.9 * seeds,
                 "columns": ["case", "of", "count"],
                 "rows": [[name, str(seeds), str(count)] for name, count in counts.items()],
             },
