@@ -63,5 +63,5 @@ def load(
 def _holds_flight(path: Path) -> bool:
     try:
         return hdf5.read(path, wanted="swashplate_response") is None
-    except (FlightError, ValueError):
+    except (FlightError, OSError, ValueError):
         return True  # missing or damaged: the reader of flights says how

@@ -384,10 +384,12 @@ def inspect(flight: Flight) -> Inspection:
     streams, channels = _looked(flight)
     possible, _ = _without_impossible(flight)
     damage = flight.provenance.damage
-    contradictions = (str(finding) for finding in consistency(possible))
+    contradictions = tuple(str(finding) for finding in consistency(possible))
     swept = sweeps(possible)
     signs = input_signs(possible, swept)
-    turned = (sign_problem(possible, sign) for sign, _ in signs if sign.wrong)
+    # A motion that contradicts itself is told as that: its commands may well be right.
+    doubted = tuple(text.partition(":")[0] for text in contradictions if "has the other sign" in text)
+    turned = (sign_problem(possible, sign) for sign, _ in signs if sign.wrong and sign.output not in doubted)
     return Inspection(
         source=flight.provenance.source,
         simulated=flight.provenance.simulated,
