@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from commands import swash
+from test_frequency_verbs import log as swept_log
 
 import swashplate as sp
 from field_cases import loiter_log
@@ -23,3 +24,13 @@ def test_it_is_said_with_what_to_fly_and_kept_with_the_responses(shared_data: Pa
     outcome = swash(*asked, "--references", "p_demand")
     assert outcome.code == 2
     assert "'mixer_roll' is a controller's answer" in outcome.err
+
+
+def test_a_line_without_a_number_is_a_warning_and_the_others_stand(tmp_path: Path) -> None:
+    """Without --band the slowest lines are asked too, where a sweep is weak."""
+    flown = swept_log(tmp_path / "flown.csv", seed=1, swept=True, seconds=120.0)
+    told = swash("respond", flown, "--inputs", "mixer_roll,mixer_pitch", "--outputs", "p,q")
+    assert told.code == 0
+    assert "no number is given there" in told.out
+    for pair in ("p / mixer_roll", "p / mixer_pitch", "q / mixer_roll", "q / mixer_pitch"):
+        assert pair in told.out

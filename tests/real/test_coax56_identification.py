@@ -68,3 +68,23 @@ def test_what_a_controller_answered_cannot_be_judged(validation: sp.Validation) 
     levels = {verdict.axis: verdict.level for verdict in validation.verdict}
     assert levels["yaw"] == levels["heave"] == "cannot be judged"
     assert levels["roll"] in ("good", "usable")
+
+
+@pytest.mark.proof
+def test_bands_of_a_model_with_a_residual_are_judged_on_another_flight(
+    flight_august: Path, flight_july: Path, tmp_path: Path
+) -> None:
+    """The program's own `--residual` model with draws of its own fit."""
+    fit = sp.identify(
+        sp.vehicle("coax"),
+        [sp.read(flight_august).condition(rate=100.0)],
+        free="balanced",
+        horizon=(0.25, 1.0),
+        residual=True,
+        keep_unexcited=True,
+    )
+    fit.save(tmp_path / "fit.json")
+    again = sp.load(tmp_path / "fit.json")
+    found = sp.validate(again, [sp.read(flight_july).condition(rate=100.0)], draws=again.draw(39, seed=1))
+    assert {band.channel for band in found.bands} >= {"u", "phi", "p", "r"}
+    assert "do not trust it" in str(found), "learnt in one flight, too narrow in the other"
