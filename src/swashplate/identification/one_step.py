@@ -68,7 +68,7 @@ def in_words(tests: Sequence[EffectTest]) -> str:
                 f"{word} {test.effect.name} ({far}; freeing {numbers} moves {', '.join(moved) or 'nothing else'})"
             )
     idle = [test.effect.name for test in told if test.verdict != "needed"]
-    line = "; ".join(parts) or "no part of the physics is asked for"
+    line = "; ".join(parts) or "asks for no part of the physics"
     rest = f"; not asked for: {', '.join(idle)}" if idle else ""
     return f"{line}{rest}. By one step from this fit."
 

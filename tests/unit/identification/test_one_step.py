@@ -79,7 +79,7 @@ def test_a_part_that_is_held_out_is_judged_as_the_fit_with_it_judges(spin: float
     assert test.verdict == ("needed" if spin else "not needed")
     by = (numbers[1] - line.solved()[1][1]) / fit["o_zeta_lower"].best_sigma
     assert test.moved["o_zeta_lower"] == pytest.approx(by, rel=1e-6)
-    assert in_words([test]).startswith("lacks spin (" if spin else "no part of the physics is asked for; not asked")
+    assert in_words([test]).startswith("lacks spin (" if spin else "asks for no part of the physics; not asked")
 
 
 def test_a_part_that_is_free_is_judged_as_the_fit_without_it_judges() -> None:
@@ -100,7 +100,7 @@ def test_a_flight_asks_for_a_part_only_where_it_is_there(offset: float) -> None:
     fit = identify(biased(), gusty(offset=offset), free=free, outputs=list(OUTPUTS_OF_ROLL), method="filter-error")
     (test,) = one_step_effects(fit, [OFF_CENTRE])
     assert test.verdict == ("needed" if offset else "not needed")
-    told = "needs stick that stands off centre (" if offset else "no part of the physics is asked for; not asked for:"
+    told = "needs stick that stands off centre (" if offset else "asks for no part of the physics; not asked for:"
     assert in_words([test]).startswith(told)
 
 
