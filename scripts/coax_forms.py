@@ -10,10 +10,10 @@ from __future__ import annotations
 import sys
 import time
 
+import held_out
 from real_flights import FLIGHTS
 
 import swashplate as sp
-from swashplate.validation import held_out
 
 FORMS = {"paper": {}, "blades": {"rotor": "inflow", "flapping": "blades"}}
 """The form that the flights are to beat, and the one that is to beat it."""

@@ -11,7 +11,6 @@ import numpy as np
 from swashplate.flights.flight import Flight, stream
 from swashplate.models.card import Card, Parameter
 from swashplate.models.choices import PhysicalEffect
-from swashplate.models.traits import Traits
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
@@ -119,11 +118,6 @@ def biased() -> Vehicle:
 
 
 OFF_CENTRE = PhysicalEffect("stick that stands off centre", {"offset": 0.0})
-
-
-def biased_of(card: Card) -> Vehicle:
-    """`biased` with a card's numbers, and the effect that nested structures try: an entry of the registry of models."""
-    return replace(biased(), card=card, traits=Traits(effects=lambda card: (OFF_CENTRE,)))
 
 
 @lru_cache(maxsize=16)

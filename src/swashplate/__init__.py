@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from swashplate.api.load import load
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.needed_excitation import needed_excitation
-    from swashplate.api.nested import identify_nested
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
     from swashplate.api.plot_logs import plot_logs
@@ -179,7 +178,6 @@ __all__ = [
     "hover_trim",
     "identify",
     "identify_and_validate",
-    "identify_nested",
     "in_form",
     "inspect",
     "linearize",

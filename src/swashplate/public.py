@@ -110,7 +110,6 @@ _VERBS: Mapping[str, str] = {
     "hover_trim": "swashplate.control.laws.hover_trim:hover_trim",
     "identify": "swashplate.identification.identify:identify",
     "identify_and_validate": "swashplate.api.identification:identify_and_validate",
-    "identify_nested": "swashplate.api.nested:identify_nested",
     "in_form": "swashplate.simulation.reduction:in_form",
     "linearize": "swashplate.simulation.linearize:linearize",
     "link_ardupilot": "swashplate.api.link:link_ardupilot",

@@ -151,7 +151,6 @@ def test_a_posterior_that_did_not_converge_ends_with_code_two_and_keeps_the_fit(
     [
         (("--posterior", "gibbs"), "'gibbs' is no posterior; there are laplace, nuts"),
         (("--posterior", "nuts", "--horizon", "0.5,1"), "errors ahead are no likelihood"),
-        (("--posterior", "nuts", "--nested"), "does not go with --nested"),
     ],
 )
 def test_a_posterior_that_cannot_be_is_refused_before_the_fit(

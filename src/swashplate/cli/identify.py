@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swashplate.cli import flying, options
 from swashplate.cli.guard import Exit
-from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from swashplate.api.identification import Identification
-    from swashplate.api.nested import NestedComparison
-
-
-Made = TypeVar("Made", "Identification", "NestedComparison", "Identification | NestedComparison")
 
 
 def identify(
@@ -75,14 +70,6 @@ def identify(
             help="Learn nothing from this stretch [s], e.g. where the aircraft was touched; repeatable.",
         ),
     ] = None,
-    nested: Annotated[
-        bool,
-        typer.Option(
-            "--nested",
-            help="Fit the model with and without each part of its physics, and say which parts the flights "
-            "need; one fit per part.",
-        ),
-    ] = False,
     horizon: options.HorizonAhead = None,
     residual: Annotated[
         bool,
@@ -118,7 +105,6 @@ def identify(
     converge is not written: exit code 2, its diagnostics, and the fit.
     """
     import swashplate as sp
-    from swashplate.api.nested import NestedComparison
     from swashplate.cli.reading import asked, conditioned
     from swashplate.engine.roots import require_casadi
     from swashplate.identification.core.stopping import stoppable
@@ -129,47 +115,22 @@ def identify(
     prior_card, aircraft = None if card is None else sp.vehicle(card).card, sp.vehicle(vehicle)
     called, how = [*flight, *(hold_out or [])], asked(mapping, unit, drop_bad_stamps, as_logged)
 
-    if nested:
-        untold = [
-            name
-            for name, given in (
-                ("--prior CARD", prior_card is not None),
-                ("--horizon", horizon is not None),
-                ("--residual", residual),
-                ("--posterior", posterior is not None),
-                ("--wind", wind),
-                ("--rotor-line", rotor_line is not None),
-                ("--leave-out", bool(leave_out)),
-                ("--keep-unexcited", keep_unexcited),
-                ("--close-loop", bool(close_loop)),
-            )
-            if given
-        ]
-        if untold:
-            raise SwashError("does not go with --nested.", channel=", ".join(untold), hint="Leave it out.")
-
-    def make(say: Callable[..., None]) -> Identification | NestedComparison:
+    def make(say: Callable[..., None]) -> Identification:
         require_casadi()
         say("reading flights")
         read = conditioned(called, rate=rate, cutoff=cutoff, how=how)
-        asked_for: dict[str, Any] = {
-            "hold_out": read[len(flight) :],
-            "free": names[0] if len(names) == 1 else names,
-            "method": method,
-            "outputs": None if outputs is None else options.names(outputs),
-            "ties": tuple(tie or ()),
-            "fixed": held or None,
-            "priors": priors or None,
-            "iterations": iterations,
-            "names": called,
-            "say": say,
-        }
-        if nested:
-            return sp.identify_nested(aircraft, read[: len(flight)], **asked_for)
         return sp.identify_and_validate(
             aircraft,
             read[: len(flight)],
+            hold_out=read[len(flight) :],
+            free=names[0] if len(names) == 1 else names,
+            method=method,
+            outputs=None if outputs is None else options.names(outputs),
+            ties=tuple(tie or ()),
+            fixed=held or None,
+            priors=priors or None,
             prior_card=prior_card,
+            iterations=iterations,
             keep_unexcited=keep_unexcited,
             wind=wind,
             rotor_line=rotor_line,
@@ -178,7 +139,8 @@ def identify(
             residual=residual,
             close_loop=options.names(close_loop),
             posterior=posterior,
-            **asked_for,
+            names=called,
+            say=say,
         )
 
     with stoppable() as stop:
@@ -186,8 +148,6 @@ def identify(
     show(made, out=out, json=json, quiet=quiet)
     if stop.code:
         flying.end_with([stop.words], code=stop.code)
-    if isinstance(made, NestedComparison):
-        return
     if made.fit.failed:
         typer.echo(f"The fit failed: {' '.join(made.fit.problems) or 'see the report.'}", err=True)
         raise typer.Exit(Exit.INPUT)
@@ -195,15 +155,15 @@ def identify(
         flying.end_with([f"The fit is written, its posterior is not: {made.refused}"], code=Exit.INPUT)
 
 
-def carried_out(make: Callable[[Callable[..., None]], Made], *, out: Path | None, quiet: bool) -> Made:
+def carried_out(
+    make: Callable[[Callable[..., None]], Identification], *, out: Path | None, quiet: bool
+) -> Identification:
     """What was asked, with its files, which appear in `out` together when all are complete."""
     from swashplate.api.identification import Identification
-    from swashplate.api.nested import NestedComparison
     from swashplate.cli.console import progress
     from swashplate.cli.outputs import folder_when_complete
 
-    ours = (*Identification.files, *NestedComparison.files)
-    with progress(quiet=quiet) as line, folder_when_complete(out, ours=ours) as folder:
+    with progress(quiet=quiet) as line, folder_when_complete(out, ours=Identification.files) as folder:
         made = make(line.say)
         if folder is not None:
             line.say("writing the report")
@@ -211,9 +171,8 @@ def carried_out(make: Callable[[Callable[..., None]], Made], *, out: Path | None
     return made
 
 
-def show(made: Identification | NestedComparison, *, out: Path | None, json: bool, quiet: bool) -> None:
+def show(made: Identification, *, out: Path | None, json: bool, quiet: bool) -> None:
     """The result on standard output: JSON, or a table, the report's own five lines and where the report is."""
-    from swashplate.api.nested import NestedComparison
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import fit_table
 
@@ -222,7 +181,7 @@ def show(made: Identification | NestedComparison, *, out: Path | None, json: boo
     elif not quiet:
         from swashplate.cli.outputs import place_of
 
-        fit = made.fits.fit if isinstance(made, NestedComparison) else made.fit
+        fit = made.fit
         console().print(fit_table(fit) if hasattr(fit.solution, "card") else repr(fit))
         if fit.posterior is not None:
             typer.echo(f"\n{fit.posterior!r}")

@@ -1,8 +1,9 @@
 """What one step from a fit says of the parts of the physics that it has and of those that it lacks.
 
 Nothing is fitted again. Where the numbers of a part are free their covariance says how far they are from none of it
-(Wald 1943); for one that is held out the slope of the likelihood by its numbers says it (Rao 1948). Both are the first
-step of the fits that `nested` makes in full, with the same allowance for coloured residuals and bounds.
+(Wald 1943); for one that is held out the slope of the likelihood by its numbers says it (Rao 1948). Both allow for
+coloured residuals, which exaggerate what a flight says (Rotnitzky and Jewell 1990; Satorra and Bentler 1994), and for
+bounds (`effect_test`).
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.identification.core import accuracy
-from swashplate.identification.core.nested import MOVED, EffectTest, chance_of, holm
 from swashplate.identification.core.result import Result, bounds_of
 from swashplate.identification.core.time_fit import LAGS
+from swashplate.identification.effect_test import MOVED, EffectTest, chance_of, holm
 from swashplate.models.choices import PhysicalEffect
 
 _SINGULAR = 1e14
@@ -62,12 +63,14 @@ def in_words(tests: Sequence[EffectTest]) -> str:
         if test.verdict == "needed":
             far = f"{np.sqrt(2.0 * test.gain):.0f} sigma"
             moved = [f"{name} by {by:+.0f} sigma" for name, by in test.moved.items() if abs(by) > MOVED]
-            word = "needs" if test.asked else "lacks"
-            parts.append(f"{word} {test.effect.name} ({far}; freeing it moves {', '.join(moved) or 'nothing else'})")
+            word, numbers = "needs" if test.asked else "lacks", ", ".join(test.effect.without)
+            parts.append(
+                f"{word} {test.effect.name} ({far}; freeing {numbers} moves {', '.join(moved) or 'nothing else'})"
+            )
     idle = [test.effect.name for test in told if test.verdict != "needed"]
-    line = "; ".join(parts) or "no part of the physics is asked for"
+    line = "; ".join(parts) or "asks for no part of the physics"
     rest = f"; not asked for: {', '.join(idle)}" if idle else ""
-    return f"{line}{rest}. By one step from this fit; --nested fits them."
+    return f"{line}{rest}. By one step from this fit."
 
 
 def not_judged(fit: Result[Any, Any], effects: Sequence[PhysicalEffect] | None = None) -> str:
@@ -80,7 +83,7 @@ def not_judged(fit: Result[Any, Any], effects: Sequence[PhysicalEffect] | None =
     held = [effect.name for effect in effects if not any(name in fit.names for name in effect.without)]
     if not held:
         return ""
-    return f"Held and not judged here: {', '.join(held)}; --nested fits them (only a prediction-error fit judges them)."
+    return f"Held and not judged here: {', '.join(held)} (only a prediction-error fit judges them)."
 
 
 @dataclass(frozen=True)
@@ -177,17 +180,15 @@ def _test(
     names = list(values)
     low, high = bounds_of(fit.model, names)
     without = np.array([effect.without[name] for name in names])
-    bounded = tuple(n for n, at in zip(names, (without <= low) | (without >= high), strict=True) if at)
+    bounded = int(np.count_nonzero((without <= low) | (without >= high)))
     outside = [n for n, lo, hi in zip(names, low, high, strict=True) if not lo <= values[n][0] <= hi]
     if outside and not asked and len(names) == 1:
         statistic = 0.0
-    chance = chance_of(statistic, len(names), len(bounded))
+    chance = chance_of(statistic, len(names), bounded)
     return EffectTest(
         effect,
         asked,
         gain=0.5 * statistic,
-        scale=1.0,
-        bounded=bounded,
         chance=chance,
         adjusted=chance,
         values=values,

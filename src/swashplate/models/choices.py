@@ -49,7 +49,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class PhysicalEffect:
-    """A part of a model's physics that its numbers can leave out: what nested structures differ by.
+    """A part of a model's physics that its numbers can leave out: what a report asks the flights about.
 
     Attributes:
         name: in words.

@@ -133,7 +133,7 @@ _SHARED_EFFECTS = (
     ),
 )
 EFFECTS = (*_SHARED_EFFECTS, PhysicalEffect("damping of heave", {"damping_w": 0.0}))
-"""What nested structures of the paper's rotors may leave out."""
+"""Parts of the paper's rotors that numbers can leave out."""
 INFLOW_EFFECTS = _SHARED_EFFECTS
 """The same for rotors with inflow, whose heave damping follows from their equations."""
 BLADE_EFFECTS = tuple(effect for effect in _SHARED_EFFECTS if not any(name in _FLAPPED for name in effect.without))

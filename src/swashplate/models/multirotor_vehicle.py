@@ -69,7 +69,7 @@ EFFECTS = (
     PhysicalEffect("drag of the body", {"drag_x": 0.0, "drag_y": 0.0, "drag_z": 0.0}),
     PhysicalEffect("damping of yaw", {"damping_r": 0.0}),
 )
-"""What nested structures may leave out."""
+"""Parts of the physics that numbers can leave out."""
 
 WARMING = PhysicalEffect("motors that lose speed as they warm", {"o_cold": 0.0})
 """The same, where the card has it."""

@@ -81,7 +81,7 @@ class Traits:
             one throttle), "two motors" (and two cyclic servos), or "" where no autopilot can be linked.
         no_link: why no autopilot can be linked, where there is something to say; "" where nothing is.
         choices: a card's ready choices of what a fit may free.
-        effects: parts of a card's physics that numbers can leave out: what a comparison of nested structures tries.
+        effects: parts of a card's physics that numbers can leave out: a report says which of them the flights ask for.
         recording: how the live page fits it to a recording; None where only frequency responses are made.
         switches: options of the card that may be changed in flight on the live page.
         picture: shapes in body axes (forward, right, down) [m] that the live page draws; None for a plain one.

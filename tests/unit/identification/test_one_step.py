@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from made_results import result
+from rolling import OFF_CENTRE, OUTPUTS_OF_ROLL, biased, gusty
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.result import Fitted
+from swashplate.identification.identify import identify
 from swashplate.identification.one_step import in_words, not_judged, one_step_effects
 from swashplate.models.catalogue import vehicle
 from swashplate.models.choices import PhysicalEffect
@@ -77,7 +79,7 @@ def test_a_part_that_is_held_out_is_judged_as_the_fit_with_it_judges(spin: float
     assert test.verdict == ("needed" if spin else "not needed")
     by = (numbers[1] - line.solved()[1][1]) / fit["o_zeta_lower"].best_sigma
     assert test.moved["o_zeta_lower"] == pytest.approx(by, rel=1e-6)
-    assert in_words([test]).startswith("lacks spin (" if spin else "no part of the physics is asked for; not asked")
+    assert in_words([test]).startswith("lacks spin (" if spin else "asks for no part of the physics; not asked")
 
 
 def test_a_part_that_is_free_is_judged_as_the_fit_without_it_judges() -> None:
@@ -89,7 +91,17 @@ def test_a_part_that_is_free_is_judged_as_the_fit_without_it_judges() -> None:
     by = (line.solved()[1][0] - numbers[0]) / np.sqrt(covariance[0, 0])
     assert test.moved["linkage_lower"] == pytest.approx(by, rel=1e-6)
     assert "needs flap-back" in in_words([test])
-    assert "linkage_lower by" in in_words([test])
+    assert "freeing a_alpha_u_linear moves linkage_lower by" in in_words([test])
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.05])
+def test_a_flight_asks_for_a_part_only_where_it_is_there(offset: float) -> None:
+    free = ["Lb", "tau", "A", "offset"]
+    fit = identify(biased(), gusty(offset=offset), free=free, outputs=list(OUTPUTS_OF_ROLL), method="filter-error")
+    (test,) = one_step_effects(fit, [OFF_CENTRE])
+    assert test.verdict == ("needed" if offset else "not needed")
+    told = "needs stick that stands off centre (" if offset else "asks for no part of the physics; not asked for:"
+    assert in_words([test]).startswith(told)
 
 
 def test_what_no_step_can_judge_is_named() -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from held_out import CHANNELS, Gain, PredictionErrors, gains
 
 from swashplate.arrays import Array
-from swashplate.validation.held_out import CHANNELS, Gain, PredictionErrors, gains
 
 
 def made(size: float, *, seconds: float = 60.0, seed: int = 1) -> PredictionErrors:

@@ -46,7 +46,7 @@ def helicopter_choices(card: Card) -> Mapping[str, Choice]:
 
 
 def helicopter_effects(card: Card) -> Sequence[PhysicalEffect]:
-    """What nested structures may leave out: the hub's spring, the distorted wake, drag, and what options add."""
+    """What numbers can leave out: the hub's spring, the distorted wake, drag, and what options add."""
     drag = {f"fuselage_area_{axis}": 0.0 for axis in "xyz"}
     bar = (PhysicalEffect("stabilizer bar", {"bar_gain": 0.0}),) if card.options.get("bar", False) else ()
     by_thrust = PhysicalEffect("profile drag that grows with thrust", {"rotor_drag_thrust": 0.0})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,8 +97,3 @@ def gains(narrow: PredictionErrors, wide: PredictionErrors) -> tuple[Gain, ...]:
 def _lead(sums: Any) -> Array:
     """Points of fit from sums of (narrow error, moved, wide error, moved) along the last axis."""
     return np.asarray(100.0 * (np.sqrt(sums[..., 0] / sums[..., 1]) - np.sqrt(sums[..., 2] / sums[..., 3])))
-
-
-def as_document(by_effect: Mapping[str, Sequence[Gain]]) -> dict[str, Any]:
-    """Gains by effect as JSON types."""
-    return {name: [vars(one) for one in rows] for name, rows in by_effect.items()}
