@@ -130,12 +130,3 @@ def steep(states: Array) -> bool:
 def steep_at(pitch: Array) -> Any:
     """The same of series of pitch [rad], shape (n, ...), one by one of what comes behind; not finite: not."""
     return np.any(np.where(np.isfinite(pitch), np.abs(pitch), 0.0) > _STEEP, axis=0)
-
-
-def euler_rows(rows: Array, before: Array) -> Array:
-    """Rows of `tumbling`, shape (n, n_states + 1), as rows of the vehicle, turns counted on from the row `before`."""
-    made = []
-    for row in rows:
-        before = to_euler(row, before)
-        made.append(before)
-    return np.array(made)

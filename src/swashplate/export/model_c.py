@@ -73,17 +73,6 @@ def frame_code(model: Traced, told: object) -> str:
     return _filled(_ALONE + _RATES + _STEP + _FRAME, blanks)
 
 
-def flying_code(model: Traced) -> str:
-    """C of NAME_step and of a static `readings`, in double precision, without any header.
-
-    Args:
-        model: what to print; its Jacobians are not needed.
-    """
-    text = body(model.readings, real=f"{model.name}_real", precision="double", inputs=_GIVEN, outputs=["outputs"])
-    blanks = {**_blanks(model, "double"), **_equations(model, "double"), "OUTPUTS": _used(text, _GIVEN)}
-    return _filled(_ALONE + _RATES + _STEP + _FELT, blanks)
-
-
 def _blanks(model: Traced, precision: Precision) -> dict[str, str]:
     return {
         "NAME": model.name,
