@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from swashplate.api.saying import announce
@@ -76,8 +77,9 @@ def live(
         )
         session.clock.start()
         try:
-            announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
-            serving.serve(server.live_app(session, remote=allow_remote), listening, frame=server.FRAME)
+            with suppress(KeyboardInterrupt):  # from when the address is told, an interrupt is the ordinary end
+                announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
+                serving.serve(server.live_app(session, remote=allow_remote), listening, frame=server.FRAME)
         finally:
             session.close()
 
@@ -108,5 +110,6 @@ def show_replay(
     with serving.listen(host, port, allow_remote=allow_remote) as listening:
         made = shown if isinstance(shown, Replay) else shown()
         check_page()
-        announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
-        serving.serve(server.replay_app(as_json(made), remote=allow_remote), listening)
+        with suppress(KeyboardInterrupt):
+            announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
+            serving.serve(server.replay_app(as_json(made), remote=allow_remote), listening)

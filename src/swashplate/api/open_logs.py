@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from swashplate.api.saying import announce
@@ -64,7 +65,8 @@ def open_logs(
         desk = Desk(given)
         threading.Thread(target=desk.read_given, daemon=True).start()
         try:
-            announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
-            serving.serve(logs_app(desk, remote=allow_remote), listening, first=False)
+            with suppress(KeyboardInterrupt):  # from when the address is told, an interrupt is the ordinary end
+                announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
+                serving.serve(logs_app(desk, remote=allow_remote), listening, first=False)
         finally:
             desk.close()
