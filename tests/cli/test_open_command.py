@@ -52,11 +52,11 @@ def test_the_page_is_served_with_the_options_of_the_reading(monkeypatch: pytest.
 
 
 NEVER_READ = """
-import threading
+import os, threading
 from swashplate.links.logs import opened
 from swashplate.links.web import libraries
 def load(self, read):
-    print("reading", flush=True)
+    os.write(1, b"reading\\n")  # in one piece, whatever another thread prints
     threading.Event().wait()
 opened.Opened.load, libraries.LIBRARIES = load, {}
 from swashplate.__main__ import main
