@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from swashplate.engine.roots import require_casadi
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
@@ -112,8 +111,6 @@ def identify(
         residual=residual,
         progress=progress,
     )
-    if not isinstance(model, StateSpaceModel):
-        require_casadi()
     name, estimator = _suited(model, data, method)
     unheard = sorted(set(question.asked) - estimator.takes)
     if unheard:

@@ -97,7 +97,7 @@ class FollowingError(PredictionError):
         return tuple(_off(self.table.vehicle, *each) for each in zip(self.pieces, self._runs, went, strict=True))
 
     def slope(self, row: Array) -> tuple[float, Array]:
-        """None: samplers draw from a constant gain, which is another likelihood.
+        """Refused: samplers draw from a constant gain, which is another likelihood.
 
         Raises:
             IdentificationError: always.
