@@ -4,6 +4,7 @@
 
 The same locks in the same environment give the same bytes: no time, no random number. Every library has its version,
 its package URL and the hashes of its archives as the lock has them; a licence where it is installed and names one.
+Then it prints how many packages and megabytes the README's installation is.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import uuid
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "build" / "swashplate.cdx.json"
@@ -117,11 +120,37 @@ def bill(root: Path = ROOT) -> dict[str, Any]:
     }
 
 
+def installation(extras: frozenset[str]) -> dict[str, float]:
+    """The distributions that pip installs for this package with some extras, and their files' size [MB], as here."""
+    sizes: dict[str, float] = {}
+    done: set[tuple[str, frozenset[str]]] = set()
+    waiting = [("swashplate", extras)]
+    while waiting:
+        name, wanted = waiting.pop()
+        key = re.sub(r"[-_.]+", "-", name).lower()
+        if (key, wanted) not in done:
+            done.add((key, wanted))
+            found = metadata.distribution(name)
+            sizes[key] = sum(file.size or 0 for file in found.files or ()) / 1e6
+            for needed in map(Requirement, found.requires or ()):
+                if needed.marker is None or any(needed.marker.evaluate({"extra": extra}) for extra in (*wanted, "")):
+                    waiting.append((needed.name, frozenset(needed.extras)))
+    return sizes
+
+
+def readme_extras(root: Path = ROOT) -> frozenset[str]:
+    """The extras of the README's first command."""
+    named = re.search(r"\$ pip install '\.\[([\w,]+)\]'", (root / "README.md").read_text(encoding="utf-8"))
+    return frozenset(named[1].split(",")) if named else frozenset()
+
+
 def main() -> int:
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(bill(), indent=2, sort_keys=True) + "\n", encoding="utf-8")
     print(f"Written: {out}")
+    sizes = installation(readme_extras())
+    print(f"The README's installation: {len(sizes)} packages, {sum(sizes.values()):.0f} MB without compiled Python")
     return 0
 
 

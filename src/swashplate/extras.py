@@ -11,7 +11,7 @@ from swashplate.errors import MissingLibraryError
 
 EXTRA_OF: Mapping[str, str] = {
     "jax": "cuda",
-    "control": "model",
+    "control": "control",
     "matplotlib": "plot",
     "casadi": "model",
     "ziglang": "compiler",

@@ -41,3 +41,10 @@ def test_it_is_the_same_twice_and_another_for_another_lock(tmp_path: Path) -> No
 def test_a_line_that_is_no_pin_is_refused() -> None:
     with pytest.raises(ValueError, match="neither a pinned package nor a hash"):
         bill_of_materials.locked("numpy>=2\n")
+
+
+def test_the_readme_s_installation_is_counted() -> None:
+    plain, readme = (bill_of_materials.installation(e) for e in (frozenset(), bill_of_materials.readme_extras()))
+    assert set(readme) - set(plain) == {"casadi"}
+    assert len(readme) <= 45
+    assert 400.0 < sum(readme.values()) < 650.0  # 400 MB are asked: CasADi alone is 281 MB

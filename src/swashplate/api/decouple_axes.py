@@ -6,8 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from swashplate.control.laws.linear_decoupling import Decoupling, coupling, dynamic_decoupling, static_decoupling
+from swashplate.control.laws.linear_decoupling import (
+    Decoupling,
+    HasMatrices,
+    LinearSystem,
+    coupling,
+    dynamic_decoupling,
+    static_decoupling,
+)
 from swashplate.errors import SwashError
+from swashplate.models.linear import late_entries
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.linear_decoupling import compose_linear_decoupling
 from swashplate.reporting.structure import Report
@@ -31,7 +39,7 @@ class AxesDecoupling(Shown):
 
     Attributes:
         model: its name.
-        system: `control.StateSpace` that it is judged on.
+        system: that it is judged on, without delays.
         inputs, outputs: paired in order.
         made: "bare" (None), "matrix" and, where there is one, "filter".
         keep: states of the filter's copy.
@@ -41,7 +49,7 @@ class AxesDecoupling(Shown):
     """
 
     model: str
-    system: Any
+    system: HasMatrices
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     made: Mapping[str, Decoupling | None]
@@ -142,7 +150,7 @@ def decouple_axes(
     doubled = sorted({o for o in axes["outputs"] if axes["outputs"].count(o) > 1})
     if doubled:
         raise SwashError(f"gives {', '.join(doubled)} to two inputs.", channel="--pair", hint="Give each output once.")
-    kept = list(keep or [n for n in system.state_labels if n not in _SLOW or n in axes["outputs"]])
+    kept = list(keep or [n for n in system.states if n not in _SLOW or n in axes["outputs"]])
     matrix = static_decoupling(system, frequency=frequency, **axes)
     made: dict[str, Decoupling | None] = {"bare": None, "matrix": matrix}
     problem = None
@@ -163,17 +171,21 @@ def decouple_axes(
     )
 
 
-def _usual(system: Any) -> tuple[tuple[str, str], ...]:
+def _usual(system: HasMatrices) -> tuple[tuple[str, str], ...]:
     """Roll and pitch rate by the inputs that this kind of model has for them."""
-    return next((pairs for pairs in _USUAL if all(i in system.input_labels for i, _ in pairs)), _USUAL[0])
+    return next((pairs for pairs in _USUAL if all(i in system.inputs for i, _ in pairs)), _USUAL[0])
 
 
-def _system(model: Vehicle, speed: float) -> Any:
-    if model.structure is not None:
-        return model.structure.to_control(pade=0)
-    nominal = model.card.values().get("voltage_nominal")
-    return linearize(model, trim(model, speed=speed, voltage=nominal)).to_control(pade=0)
+def _system(model: Vehicle, speed: float) -> HasMatrices:
+    structure = model.structure
+    if structure is None:
+        nominal = model.card.values().get("voltage_nominal")
+        return linearize(model, trim(model, speed=speed, voltage=nominal))
+    wide, owner = structure.wide  # an entry with its own delay is an input of its own there
+    A, B, C, D = wide.explicit()
+    shares = late_entries.shares(owner)
+    return LinearSystem(A, B @ shares, C, D @ shares, structure.states, structure.inputs, structure.outputs)
 
 
-def _matrices(system: Any, states: Sequence[str]) -> dict[str, Any]:
+def _matrices(system: LinearSystem, states: Sequence[str]) -> dict[str, Any]:
     return {"states": list(states), **{name: getattr(system, name) for name in "ABCD"}}

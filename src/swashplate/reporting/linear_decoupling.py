@@ -7,7 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.control.laws.linear_decoupling import Decoupling, coupling
+from swashplate.control.laws.linear_decoupling import (
+    Decoupling,
+    HasMatrices,
+    coupling,
+    in_series,
+    step_answers,
+    unmixed,
+)
 from swashplate.reporting.figures_control import style
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text
 from swashplate.reporting.theme import line, over_frequency, stacked
@@ -21,7 +28,7 @@ _STEP = 2.0
 
 
 def compose_linear_decoupling(
-    model: Any,
+    model: HasMatrices,
     made: Mapping[str, Decoupling | None],
     *,
     name: str,
@@ -34,7 +41,7 @@ def compose_linear_decoupling(
     """The report's structure.
 
     Args:
-        model: `control.StateSpace` that it is judged on.
+        model: that it is judged on.
         made: "bare" (None), "matrix" and, where there is one, "filter".
         name: of the model.
         inputs, outputs: paired in order.
@@ -91,25 +98,19 @@ def _ratio_figure(
     )
 
 
-def _steps(model: Any, made: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[str]]) -> Section:
+def _steps(model: HasMatrices, made: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[str]]) -> Section:
     """Both outputs on a step of each axis, scaled so that the on-axis answer's largest is one."""
-    import control
-
     outputs = axes["outputs"]
-    plant = model[list(outputs), list(axes["inputs"])]
     time = np.linspace(0.0, _STEP, 201)
     titles = [f"{o} on {axis}'s axis [-]" for axis in outputs for o in outputs]
     layout, traces = stacked(titles, height=95), []
     for number, by in enumerate(made.values()):
         color, dash = style(number)
-        system = plant if by is None else plant * by.system
+        system = in_series(by or unmixed(**axes), model)
         for k in range(len(outputs)):
-            push = np.zeros((len(outputs), time.size))
-            push[k] = 1.0
-            answer = np.atleast_2d(control.forced_response(system, time, push).outputs)
-            answer = (
-                answer / max(float(np.max(np.abs(answer[k]))), 1e-12) * np.sign(answer[k, np.argmax(np.abs(answer[k]))])
-            )
+            answer = step_answers(system, k, time)
+            largest = answer[k, np.argmax(np.abs(answer[k]))]
+            answer = answer / max(abs(float(largest)), 1e-12) * np.sign(largest)
             for i in range(len(outputs)):
                 panel = k * len(outputs) + i
                 axis = "" if panel == 0 else str(panel + 1)
@@ -136,7 +137,7 @@ def _numbers(made: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[
         title = f"The matrix, made at {frequency:g} rad/s"
         blocks.append(Table(title, ("input", *(f"{o}'s axis" for o in axes["outputs"])), rows))
     if filtered is not None:
-        modes = np.asarray(filtered.system.poles())
+        modes = np.linalg.eigvals(filtered.system.A)
         modes = modes[np.argsort(-modes.real)]
         rows = tuple(
             (Cell(f"{m.real:+.3f}", number=True), Cell(f"±{m.imag:.3f}" if m.imag > 0.0 else "0", number=True))

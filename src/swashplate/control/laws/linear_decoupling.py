@@ -9,20 +9,52 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol
 
-import control
 import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from swashplate.arrays import Array, largest_first
+from swashplate.arrays import Array, Complex, largest_first
 from swashplate.errors import SwashError
+from swashplate.simulation.discretisation import zero_order_hold
 
 _SINGULAR = 1e-8
 """Condition (inverse) below which a control matrix has a direction that moves nothing."""
 _STABLE = -1e-6
 """1/s; a filter whose slowest mode lies above this does not come to rest."""
+
+
+class HasMatrices(Protocol):
+    """dx/dt = A x + B u, y = C x + D u with named signals: `linearize(...)`, or `LinearSystem`."""
+
+    @property
+    def A(self) -> Array: ...
+    @property
+    def B(self) -> Array: ...
+    @property
+    def C(self) -> Array: ...
+    @property
+    def D(self) -> Array: ...
+    @property
+    def states(self) -> tuple[str, ...]: ...
+    @property
+    def inputs(self) -> tuple[str, ...]: ...
+    @property
+    def outputs(self) -> tuple[str, ...]: ...
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """dx/dt = A x + B u, y = C x + D u, with named signals and no delays."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -34,43 +66,73 @@ class Decoupling:
         inputs, outputs: names, paired in order.
     """
 
-    system: Any
+    system: LinearSystem
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
 
     @property
     def matrix(self) -> Array:
         """Its direct gain, shape (n_inputs, n_outputs): all there is of a static one."""
-        return np.asarray(self.system.D, dtype=np.float64)
+        return self.system.D
 
 
-def chosen(model: control.StateSpace, names: Sequence[str], kind: str) -> list[int]:
-    """Places of named signals in a `control.StateSpace`.
+def response_at(system: HasMatrices, frequency: float) -> Complex:
+    """C (jw - A)^-1 B + D at one frequency [rad/s], shape (n_outputs, n_inputs)."""
+    x = np.linalg.solve(1j * frequency * np.eye(len(system.states)) - system.A, system.B.astype(np.complex128))
+    return np.asarray(system.C @ x + system.D, dtype=np.complex128)
+
+
+def in_series(decoupling: Decoupling, model: HasMatrices) -> LinearSystem:
+    """The model behind its decoupling: from the wanted axes to the paired outputs."""
+    first, (A, B, C) = decoupling.system, _square(model, decoupling.inputs, decoupling.outputs)
+    return LinearSystem(
+        np.block([[A, B @ first.C], [np.zeros((len(first.states), len(A))), first.A]]),
+        np.vstack([B @ first.D, first.B]),
+        np.hstack([C, np.zeros((len(C), len(first.states)))]),
+        np.zeros((len(C), len(C))),
+        (*model.states, *(f"filter {name}" for name in first.states)),
+        decoupling.outputs,
+        decoupling.outputs,
+    )
+
+
+def step_answers(system: HasMatrices, axis: int, time: Array) -> Array:
+    """All outputs on a unit step of one input at time zero, shape (n_outputs, n); `time` [s]: even, from 0."""
+    F, G = zero_order_hold(system.A, system.B[:, [axis]], float(time[1] - time[0]))
+    x, states = np.zeros(len(F)), []
+    for _ in time:
+        states.append(x)
+        x = F @ x + G[:, 0]
+    return np.asarray(system.C @ np.array(states).T + system.D[:, [axis]])
+
+
+def chosen(names_there: Sequence[str], names: Sequence[str], kind: str) -> list[int]:
+    """Places of named signals of a model.
 
     Raises:
         SwashError: naming what the model does not have.
     """
-    labels = list(getattr(model, f"{kind}_labels"))
+    labels = list(names_there)
     unknown = [name for name in names if name not in labels]
     if unknown or not names:
         raise SwashError(f"has no {kind} {', '.join(unknown) or 'chosen'}; it has {', '.join(labels)}.", where="model")
     return [labels.index(name) for name in names]
 
 
-def _square(model: control.StateSpace, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[Array, Array, Array]:
+def _square(model: HasMatrices, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[Array, Array, Array]:
     if len(inputs) != len(outputs):
         raise SwashError(
             f"{len(inputs)} inputs cannot decouple {len(outputs)} outputs; expected one input for each output.",
             where="model",
         )
-    ins, outs = chosen(model, inputs, "input"), chosen(model, outputs, "output")
-    if np.any(np.asarray(model.D)[np.ix_(outs, ins)]):
+    ins, outs = chosen(model.inputs, inputs, "input"), chosen(model.outputs, outputs, "output")
+    if np.any(model.D[np.ix_(outs, ins)]):
         raise SwashError("has a direct path from an input to an output.", where="model", hint="Choose states.")
-    return np.asarray(model.A), np.asarray(model.B)[:, ins], np.asarray(model.C)[outs]
+    return model.A, model.B[:, ins], model.C[outs]
 
 
 def control_matrix(
-    model: control.StateSpace, *, inputs: Sequence[str], outputs: Sequence[str]
+    model: HasMatrices, *, inputs: Sequence[str], outputs: Sequence[str]
 ) -> tuple[Array, tuple[int, ...]]:
     """The first derivative of each output that the inputs move, and which derivative that is (Falb and Wolovich 1967).
 
@@ -106,12 +168,12 @@ def control_matrix(
 
 
 def static_decoupling(
-    model: control.StateSpace, *, inputs: Sequence[str], outputs: Sequence[str], frequency: float | None = None
+    model: HasMatrices, *, inputs: Sequence[str], outputs: Sequence[str], frequency: float | None = None
 ) -> Decoupling:
     """A constant matrix of input mixing.
 
     Args:
-        model: `control.StateSpace` with named signals, e.g. `linearize(...).to_control()`.
+        model: with named signals and without delays, e.g. `linearize(...)`.
         inputs, outputs: names, paired in order; the on-axis response of outputs[i] is that to axis i.
         frequency: where the axes are decoupled [rad/s]; without it at high frequency, by the inverse of
             `control_matrix`.
@@ -140,13 +202,19 @@ def static_decoupling(
     return _static(mixing, inputs, outputs)
 
 
+def unmixed(*, inputs: Sequence[str], outputs: Sequence[str]) -> Decoupling:
+    """No decoupling: axis i is input i."""
+    return _static(np.eye(len(inputs)), inputs, outputs)
+
+
 def _static(mixing: Array, inputs: Sequence[str], outputs: Sequence[str]) -> Decoupling:
-    system = control.ss([], [], [], mixing, inputs=list(outputs), outputs=list(inputs))
+    n, none = len(inputs), np.zeros((0, 0))
+    system = LinearSystem(none, np.zeros((0, n)), np.zeros((n, 0)), mixing, (), tuple(outputs), tuple(inputs))
     return Decoupling(system, tuple(inputs), tuple(outputs))
 
 
 def dynamic_decoupling(
-    model: control.StateSpace,
+    model: HasMatrices,
     *,
     inputs: Sequence[str],
     outputs: Sequence[str],
@@ -167,16 +235,15 @@ def dynamic_decoupling(
     Raises:
         SwashError: where a zero does not lie in the left half plane, with the states that take part most.
     """
-    names = list(model.state_labels)
-    kept = chosen(model, keep if keep is not None else names, "state")
-    part = control.ss(
-        np.asarray(model.A)[np.ix_(kept, kept)],
-        np.asarray(model.B)[kept],
-        np.asarray(model.C)[:, kept],
-        np.asarray(model.D),
-        states=[names[i] for i in kept],
-        inputs=list(model.input_labels),
-        outputs=list(model.output_labels),
+    kept = chosen(model.states, keep if keep is not None else model.states, "state")
+    part = LinearSystem(
+        model.A[np.ix_(kept, kept)],
+        model.B[kept],
+        model.C[:, kept],
+        model.D,
+        tuple(model.states[i] for i in kept),
+        model.inputs,
+        model.outputs,
     )
     matrix, degrees = control_matrix(part, inputs=inputs, outputs=outputs)
     A, B, C = _square(part, inputs, outputs)
@@ -186,7 +253,7 @@ def dynamic_decoupling(
     eye = np.eye(A.shape[0])
     rows = [c @ np.linalg.matrix_power(A + w * eye, r) for c, w, r in zip(C, wanted, degrees, strict=True)]
     inverse = np.linalg.inv(matrix)
-    feedback = inverse @ np.array(rows)
+    feedback: Array = np.asarray(inverse @ np.array(rows), dtype=np.float64)
     forward = inverse @ np.diag(wanted ** np.array(degrees))
     closed = A - B @ feedback
     values, vectors = np.linalg.eig(closed)
@@ -194,19 +261,19 @@ def dynamic_decoupling(
     if values[worst].real > _STABLE:
         order = largest_first(np.abs(vectors[:, worst]))[:3]
         zero = np.round(values[worst], 6) + 0.0  # chains of integrators leave rounding about the origin
-        states = ", ".join(part.state_labels[i] for i in order if abs(vectors[i, worst]) > 0.1)
+        states = ", ".join(part.states[i] for i in order if abs(vectors[i, worst]) > 0.1)
         raise SwashError(
             f"the filter would not come to rest: the model has a zero at {zero.real:.3g} +- {abs(zero.imag):.3g}j 1/s "
             f"(in {states}).",
             where="model",
             hint="Leave slow states out of the copy (keep=...), choose other outputs, or decouple statically.",
         )
-    system = control.ss(closed, B @ forward, -feedback, forward, inputs=list(outputs), outputs=list(inputs))
+    system = LinearSystem(closed, B @ forward, -feedback, forward, part.states, tuple(outputs), tuple(inputs))
     return Decoupling(system, tuple(inputs), tuple(outputs))
 
 
 def coupling(
-    model: control.StateSpace,
+    model: HasMatrices,
     frequencies: ArrayLike,
     *,
     inputs: Sequence[str],
@@ -227,6 +294,6 @@ def coupling(
     for w in np.atleast_1d(np.asarray(frequencies, dtype=np.float64)):
         G = C @ np.linalg.solve(1j * w * eye - A, B)
         if by is not None:
-            G = G @ np.atleast_2d(by.system(1j * w))
+            G = G @ response_at(by.system, float(w))
         ratios.append(np.abs(G / np.diag(G)))
     return np.moveaxis(np.array(ratios), 0, -1)

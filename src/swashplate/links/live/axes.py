@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.control.laws.linear_decoupling import static_decoupling
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers.series import AXES
 from swashplate.models.vehicle import Vehicle
@@ -86,12 +88,7 @@ def _at_once_decoupled(model: LinearModel, directions: Array) -> Array | None:
     None where the first derivatives do not tell the axes apart: thrust perpendicular to the disc leaves the cyclic
     nothing to do until the disc has tilted, while collective pitches at once.
     """
-    import control
-
-    from swashplate.control.laws.linear_decoupling import static_decoupling
-
-    names = list(model.states)
-    by_axis = control.ss(model.A, model.B @ directions, np.eye(len(names)), 0.0, inputs=list(STICKS), outputs=names)
+    by_axis = dataclasses.replace(model, B=model.B @ directions, D=np.zeros((len(model.states), 4)), inputs=STICKS)
     try:
         return static_decoupling(by_axis, inputs=STICKS, outputs=_OUTPUTS).matrix
     except SwashError:

@@ -115,9 +115,7 @@ def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> Non
         world = World(sp.vehicle(name, in_plane="blade-element"))
         mixing = world.pilot.gains["raw", True][3:19].reshape(4, 4)
         model = sp.linearize(world.vehicle, world.trim)
-        matrix = static_decoupling(
-            model.to_control(), inputs=["A1", "B1", "theta0T", "theta0"], outputs=["p", "q", "r", "w"]
-        ).matrix
+        matrix = static_decoupling(model, inputs=["A1", "B1", "theta0T", "theta0"], outputs=["p", "q", "r", "w"]).matrix
         rows = [world.vehicle.input_names.index(entry) for entry in ("A1", "B1", "theta0T", "theta0")]
         shares = np.linalg.solve(matrix, mixing[rows])
         assert np.allclose(shares, np.diag(np.diag(shares)), atol=1e-12)
