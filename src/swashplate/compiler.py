@@ -87,7 +87,10 @@ def shared_library(sources: Sequence[Path], out: Path, *, options: Sequence[str]
         raise ExportError("there is no C compiler here (cc, gcc or clang, or the extra 'compiler').", where=out.name)
     if useless := answer(program)[1]:
         raise ExportError(useless, where=out.name)
-    command = [*program, *STRICT, "-fPIC", "-shared", *options, "-o", str(out), *(str(file) for file in sources), "-lm"]
+    known = [
+        option for option in options if option != NATIVE or answer(program)[0]
+    ]  # some refuse it on some processors
+    command = [*program, *STRICT, "-fPIC", "-shared", *known, "-o", str(out), *(str(file) for file in sources), "-lm"]
     named = " ".join(program)
     code, _, said = ran(command, where=out.name)
     if code != 0:

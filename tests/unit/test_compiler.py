@@ -62,6 +62,19 @@ def test_one_that_lies_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         compiler.shared_library([tmp_path / "a.c"], tmp_path / "a.so")
 
 
+def test_one_that_does_not_know_this_processor_compiles_for_all_of_its_kind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there = compiler.compiler()
+    if there is None:
+        pytest.skip("there is no C compiler")
+    refusing = f'case "$*" in *{compiler.NATIVE}*) echo unsupported >&2; exit 1;; esac\nexec {" ".join(there)} "$@"\n'
+    made(tmp_path, refusing.encode(), monkeypatch)
+    (tmp_path / "a.c").write_text("double twice(double x);\ndouble twice(double x) { return 2 * x; }\n")
+    built = compiler.shared_library([tmp_path / "a.c"], tmp_path / "a.so", options=(compiler.NATIVE,))
+    assert ctypes.CDLL(str(built)).twice
+
+
 def test_one_that_cannot_be_started_is_told(tmp_path: Path) -> None:
     (tmp_path / "cc").write_text("no program")
     with pytest.raises(ExportError, match=r"cc cannot be started: Permission denied"):
