@@ -1,4 +1,4 @@
-"""What leaves the house: the exported C step (as `swash export --format c` writes it) and the Gymnasium environments.
+"""What leaves the house: the exported C step (as `swash export --format c` writes it).
 
 Held against `simulate` of `benchmarks.single` and `benchmarks.helicopter`, which fly the same equations.
 """
@@ -54,19 +54,3 @@ def step(name: str, *, steps: int, repeats: int, **options: object) -> Result:
 
         rate = best_rate(run, steps, repeats=repeats)
     return Result(f"exported C step, {name}", rate, STEP_TARGET, f"{start.size} states, float64, one core")
-
-
-def environments(*, steps: int, repeats: int, count: int = 1024) -> Result:
-    """Gymnasium's vector environment, natively vectorised: environment steps (five Runge-Kutta steps each)."""
-    from swashplate.links.gym.vector import HelicopterVectorEnv
-
-    envs = HelicopterVectorEnv(count, "coax")
-    actions = np.zeros(envs.action_space.shape, np.float32)
-
-    def run() -> None:
-        envs.reset(seed=0)
-        for _ in range(steps):
-            envs.step(actions)
-
-    rate = best_rate(run, steps * count, repeats=repeats)
-    return Result("Gymnasium, vectorised hover", rate, None, f"{count} environments, agent steps of 5 x 4 ms")

@@ -17,8 +17,6 @@ CASES: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("raptor50", "tip_loss", {"tip_loss": True}),
     ("raptor50", "induced_factor", {"induced_factor": True}),
     ("raptor50", "ground_effect", {"ground_effect": "cheeseman-bennett"}),
-    ("raptor50", "aerofoil", {"aerofoil": "naca0012"}),
-    ("raptor50", "aerofoil, inflow = pitt-peters", {"aerofoil": "naca0012", "inflow": "pitt-peters"}),
 )
 SHORT = CASES[:1]
 """Whose plain loop another benchmark has compiled; each of the others compiles a trim and a loop, for 8 s."""

@@ -51,7 +51,6 @@ def measure(*, short: bool) -> list[Result]:
             if short
             else [export.step("raptor50", steps=4_000 * scale, repeats=repeats, bar=True, inflow="pitt-peters")]
         ),
-        export.environments(steps=20 * scale, repeats=repeats, count=64 if short else 1024),
         *many.batches("coax", "float64", steps=10 * scale, repeats=repeats),
         *([] if short else many.batches("coax", "float32", steps=10 * scale, repeats=repeats)),
         *([] if short else many.batches("raptor50", "float64", steps=4 * scale, repeats=repeats, promised=False)),

@@ -31,7 +31,7 @@ def installed(name: str, site: Path) -> Iterator[None]:
     about.mkdir(exist_ok=True)
     head = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
     (about / "METADATA").write_text(head, encoding="utf-8")
-    groups = project["entry-points"].items()
+    groups = project.get("entry-points", {}).items()
     text = "\n".join(f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in points.items()) for group, points in groups)
     (about / "entry_points.txt").write_text(text, encoding="utf-8")
     sys.path.insert(0, str(site))

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from docs_pages import regenerated
+from prediction_picture import prediction_picture
 
 import swashplate as sp
-from swashplate.reporting.pictures import prediction_picture
 from swashplate.validation.floors import CLOSED_ROWS, ROWS
 from swashplate.validation.validation import PREDICTORS
 

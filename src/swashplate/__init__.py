@@ -88,7 +88,6 @@ if TYPE_CHECKING:
     from swashplate.identification.time.equation_error import equation_error, stepwise
     from swashplate.identification.time.linear_time_fit import fit_in_time
     from swashplate.identification.time.vehicle_time_fit import fit_vehicle
-    from swashplate.links.live.film import film_replay
     from swashplate.links.live.replay import replay
     from swashplate.models.card import Card, Parameter
     from swashplate.models.catalogue import cards_by_name as vehicles
@@ -96,13 +95,11 @@ if TYPE_CHECKING:
     from swashplate.models.coax_choices import CHOICES
     from swashplate.models.conventional.new_card import new_card
     from swashplate.models.vehicle import Vehicle
-    from swashplate.physics.earth import Earth
     from swashplate.physics.environment import Environment
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
     from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
     from swashplate.simulation.derivatives_over_speed import derivatives
-    from swashplate.simulation.height_velocity import height_velocity
     from swashplate.simulation.integrate import simulate
     from swashplate.simulation.linearize import linearize
     from swashplate.simulation.lpv import schedule as speed_schedule
@@ -124,7 +121,6 @@ __all__ = [
     "QUIET",
     "Card",
     "DaskScheduler",
-    "Earth",
     "Environment",
     "Flight",
     "FrequencyResponse",
@@ -162,7 +158,6 @@ __all__ = [
     "export_flight",
     "export_model",
     "fetch_dataset",
-    "film_replay",
     "fit_in_time",
     "fit_ss",
     "fit_state_space",
@@ -173,7 +168,6 @@ __all__ = [
     "fly_maneuver",
     "handling_qualities",
     "harmonics",
-    "height_velocity",
     "hover_hold",
     "hover_trim",
     "identify",

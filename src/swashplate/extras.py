@@ -16,11 +16,9 @@ EXTRA_OF: Mapping[str, str] = {
     "casadi": "model",
     "ziglang": "compiler",
     "pymavlink": "link",
-    "imageio_ffmpeg": "live",
     "pyulog": "logs",
     "rosbags": "logs",
     "mcap": "mcap",
-    "gymnasium": "rl",
     "distributed": "scale",
     "pyarrow": "scale",
 }

@@ -100,7 +100,6 @@ def test_without_casadi_it_says_which_extra(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("coax", "--format", "ardupilot-statespace"), "swash link ardupilot"),
         (("coax", "--format", "fmu", "--precision", "single"), "are double"),
         (("coax", "--format", "c", "--name", "///"), "gives no name"),
         (("coax", "--format", "c", "--speed", "0-2"), "takes one speed"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from swashplate.flights.flight import Flight
 from tipping import TRUTH, tipped, tipping
 
 GAINS = (0.3, 0.3, 0.3, 0.3, 0.06)
-PACKAGES = ("rate_least_squares", "triax_log", "attitude_pd", "stability_table", "ducted_fan")
+PACKAGES = ("rate_least_squares", "triax_log", "attitude_pd", "stability_table", "ducted_fan", "gym_hover")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -35,7 +35,7 @@ def test_a_package_is_short_and_lies_outside(name: str) -> None:
     folder = own_package.EXAMPLES / name
     assert len((folder / f"{name}.py").read_text().splitlines()) < 60
     project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
-    assert all(group.startswith("swashplate.") for group in project["entry-points"])
+    assert all(group.startswith("swashplate.") for group in project.get("entry-points", {}))
 
 
 def test_an_estimator_is_chosen_by_its_name() -> None:
@@ -100,6 +100,38 @@ def test_an_export_is_a_format_like_any_other(tmp_path: Path) -> None:
     row = next(line for line in table if line[0] == "omega")
     assert float(row[table[0].index("fan [1]")]) == pytest.approx(model.B[model.states.index("omega"), 0], rel=1e-4)
     assert row[1] == "rad/s/s"
+
+
+def test_a_vehicle_is_an_environment_of_gymnasium() -> None:
+    """Gymnasium accepts it, proportional feedback keeps the place for ten seconds, and rotors that stop lose it."""
+    gymnasium = pytest.importorskip("gymnasium")
+    import gym_hover  # type: ignore[import-not-found]  # noqa: F401
+    from gymnasium.utils.env_checker import check_env
+
+    env = gymnasium.make("swashplate/Hover-v0", vehicle="coax").unwrapped
+    check_env(env, skip_render_check=True)
+
+    def flown(policy: Callable[[np.ndarray], np.ndarray]) -> tuple[list[float], bool]:
+        (seen, _), rewards, over = env.reset(seed=0), [], False
+        while not over:
+            seen, reward, lost, truncated, _ = env.step(policy(seen))
+            rewards.append(reward)
+            over = lost or truncated
+        return rewards, lost
+
+    def held(seen: np.ndarray) -> np.ndarray:
+        north, east, down, u, v, w, roll, pitch, heading, p, q, r = seen
+        climb, turn = 0.6 * (down + w), -0.3 * heading - 0.2 * r
+        nose = 1.5 * (pitch - np.clip(-0.15 * north - 0.25 * u, -0.3, 0.3)) - 0.15 * q
+        right = 1.5 * (roll + np.clip(-0.15 * east - 0.25 * v, -0.3, 0.3)) - 0.15 * p
+        return np.clip([climb - turn, climb + turn, right, -nose], -1.0, 1.0)
+
+    rewards, lost = flown(held)
+    assert (len(rewards), lost) == (500, False)
+    assert np.mean(rewards) > 0.9
+    rewards, lost = flown(lambda seen: np.array([-1.0, -1.0, 0.0, 0.0]))
+    assert lost
+    assert rewards[-1] == -10.0
 
 
 def test_a_name_that_no_package_has_is_told() -> None:

@@ -435,10 +435,6 @@ def test_a_number_that_nothing_uses_is_refused() -> None:
     assert swash("trim", "coax", "--option", "rotor=inflow", "--set", "rotor_chord=0.04").code == 0
 
 
-def test_autorotation_on_the_command_line() -> None:
-    outcome = swash("trim", "raptor50", "--autorotation", "--speed", "0-8/8")
-    assert outcome.code == 0
-    assert "climb [m/s]" in outcome.out
-    assert "has no shaft power" in one_message(swash("trim", "coax", "--autorotation"))
+def test_a_descent_that_the_air_drives_is_told() -> None:
     climbing = swash("trim", "raptor50", "--climb", "-12")
     assert "the air drives the rotors with" in climbing.err

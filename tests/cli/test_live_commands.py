@@ -99,9 +99,6 @@ def test_replay_refuses_what_it_cannot_show(tmp_path: Path) -> None:
     told = one_message(swash("replay", tmp_path / "poor.csv", "--model", "coax", "--port", "0"))
     assert "lacks x, y, z" in told
     assert "It has p" in told
-    film, frames = tmp_path / "a.mp4", tmp_path / "frames"
-    assert "Give one of them" in one_message(swash("replay", "x.nc", "--video", film, "--frames", frames))
-    assert "does not exist" in one_message(swash("replay", "x.nc", "--video", tmp_path / "no" / "a.mp4"))
 
 
 def test_serves_until_interrupted(tmp_path: Path) -> None:

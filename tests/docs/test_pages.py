@@ -42,11 +42,9 @@ PAGES = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page 
 HEAVY = {
     "docs/explanation/flights-under-feedback.md",
     "docs/explanation/lpv.md",
-    "docs/explanation/round-earth.md",
     "docs/howto/check-a-controller.md",
     "docs/howto/decouple-and-hold.md",
     "docs/howto/fly-under-ardupilot-or-px4.md",
-    "docs/howto/train-a-policy.md",
     "docs/notebooks/log-to-flight.md",
 }
 """Pages that fly and compile long for themselves alone; what they call is run in short by tests/cli and tests/unit."""

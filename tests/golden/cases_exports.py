@@ -105,12 +105,12 @@ def c_of_the_others(folder: Path) -> Values:
 
 @case()
 def linear_exports(folder: Path) -> Values:
-    """python-control, .mat and ArduPilot's state space, of a vehicle and of a state-space model."""
+    """python-control and .mat, of a vehicle and of a state-space model."""
     found: Values = {}
     for kind in ("control", "matlab"):
         found |= named(f"raptor50.{kind}", exported(folder, "raptor50", kind, "--speed", "5"))
         found |= named(f"rotor_body.{kind}", exported(folder, "rotor_body", kind))
-    return found | named("ardupilot", exported(folder, "raptor50", "ardupilot-statespace"))
+    return found
 
 
 @case(needs=["casadi"])

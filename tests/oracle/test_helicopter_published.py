@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hand_buildup import build_up
 from published_helicopters import KNOT, lynx_published, lynx_rows, r50_identified
 from swashplate.models.catalogue import vehicle
-from swashplate.models.conventional.buildup import build_up
 from swashplate.models.conventional.derivative_table import DerivativeTable
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment

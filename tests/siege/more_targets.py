@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable, Mapping
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from swashplate.api.campaigns.plan import plan_campaign, planned_in
 from swashplate.api.campaigns.result_files import NUMPY, PARQUET, packed
 from swashplate.api.campaigns.store import PLAN, RESULTS, CampaignStore
 from swashplate.links.ardupilot.gains import read_parameter_file
-from swashplate.models.conventional.aerofoil_file import parse_aerofoil
 from swashplate.models.published import read_published
 
 from .target import Target, by_bytes, by_entries
@@ -36,25 +34,6 @@ PUBLISHED = (
     b"name,value,unit\nX_u,-0.02,\nM_q,-1.9,\nZ_theta0,-90.1,\nN_r,-0.4,\n",
     b",u,w,q,theta,v,p,phi,r,theta0\nu,-0.02,0.03,0.2,-9.8,0,-0.1,0,0,5.1\nq,0.01,0,-1.9,0,0,0.3,0,0,2.2\n",
 )
-CARD = """
-kind = "conventional"
-name = "x"
-"""
-
-
-def _aerofoil() -> bytes:
-    """Two blocks of the packaged table."""
-    whole = (resources.files("swashplate.models") / "data" / "aerofoils" / "naca0012.csv").read_text().splitlines()
-    head = [line for line in whole if not line[0].isdigit()]
-    rows = [line for line in whole if line[0].isdigit()]
-    first = rows[0].split(",")[:2]
-    return "\n".join([*head, *(row for row in rows if row.split(",")[:2] == first)]).encode()
-
-
-def _use_aerofoil(path: Path) -> None:
-    from swashplate.models.conventional import aerofoil_file
-
-    parse_aerofoil(aerofoil_file._text(path), str(path))
 
 
 def _use_campaign(path: Path) -> None:
@@ -94,7 +73,6 @@ def _of(suffix: str, whole: Callable[[], tuple[bytes, ...]], use: Callable[[Path
 
 
 MORE: Mapping[str, Callable[[], Target]] = {
-    "aerofoil table": _of(".csv", lambda: (_aerofoil(),), _use_aerofoil),
     "ArduPilot parameters": _of(".parm", lambda: (PARAMETERS,), read_parameter_file),
     "published derivatives": _of(".csv", lambda: PUBLISHED, read_published),
     "campaign": _of(".toml", lambda: (CAMPAIGN.encode(),), _use_campaign),

@@ -25,7 +25,6 @@ from swashplate.control.draws.robustness import draw_models
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.lqg.design import design
 from swashplate.errors import SwashError
-from swashplate.export.ardupilot_state_space import KEYS, read_ardupilot
 from swashplate.export.control_json import control_json, read_linear
 from swashplate.export.linear import Linear
 from swashplate.filtering.sensor_suite import suite
@@ -306,7 +305,6 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     "fit of a vehicle": _documents("json", lambda: (_fit_of_vehicle(),), _drawn("coax")),
     "fit of a model": _documents("json", lambda: (_fit_of_model(),), _drawn("structure")),
     "linear model": _documents("json", lambda: (_linear(),), read_linear),
-    "ArduPilot model": _documents("json", lambda: (json.dumps(dict.fromkeys(KEYS, 0.5)).encode(),), read_ardupilot),
     "maneuver": _texts(MANEUVERS, sp.maneuver),
     "expression": _texts(EXPRESSIONS, parse_tie),
     **MORE,

@@ -41,7 +41,6 @@ STARTS = {
     "compiler.py": "the C compiler; that of ziglang by Python's -I",
     "flights/foreign.py": "own_python",
     "links/ardupilot/sitl.py": "an autopilot that the user names",
-    "links/live/film.py": "ffmpeg",
     "links/live/identifying.py": "own_python",
     "systems.py": "ends what sitl.py has started",
 }

@@ -46,7 +46,7 @@ def export_model(
 
     Args:
         model: a vehicle or a linear model, or its name or file (also `.json` and `.mat` of an export).
-        form: "c", "fmu", "ardupilot-statespace", "control", "matlab", "simulink", or another package's.
+        form: "c", "fmu", "control", "matlab", "simulink", or another package's.
         name: what files and C functions begin with; the model's own name where None.
         trim: where a vehicle starts, and what its linear model is about; hover where None.
         precision: of C ("double" or "single"); the other formats are double.

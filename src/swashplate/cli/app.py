@@ -23,7 +23,6 @@ from swashplate.cli import (
     fit_ss,
     fit_tf,
     fit_time,
-    height_velocity,
     identify,
     inspect,
     link,
@@ -91,7 +90,7 @@ app.command("track", short_help="Estimate along a log, sample by sample as on bo
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
 app.command("open", short_help="Look at any log in the browser: one page for all of it.")(open.open_)
 app.command("live", short_help="Fly a model in the browser, in real time.")(live.live)
-app.command("replay", short_help="Look at a logged flight beside a model's prediction, or film it.")(replay.replay)
+app.command("replay", short_help="Look at a logged flight beside a model's prediction.")(replay.replay)
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
 app.command("plot", short_help="Draw logs over time or frequency, also several over each other.")(plot.plot)
@@ -100,9 +99,6 @@ app.command("reconstruct", short_help="Find biases and scale factors of a flight
     reconstruct.reconstruct
 )
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
-app.command("height-velocity", short_help="Heights and speeds from which an engine failure can be landed.")(
-    height_velocity.height_velocity
-)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
 app.command("stitch", short_help="One model from linear models at several speeds.")(stitch.stitch)
 app.command("combine", short_help="Multiply, divide, invert responses; close or open a loop.")(combine.combine)

@@ -85,8 +85,8 @@ class Conditions:
     turn: float
     environment: Environment
 
-    def curve(self, *, autorotation: bool = False) -> TrimCurve:
-        """A trim at every speed, or the descent there that needs no power."""
+    def curve(self) -> TrimCurve:
+        """A trim at every speed."""
         from swashplate.simulation.trim_curve import trim_curve
 
         return trim_curve(
@@ -96,7 +96,6 @@ class Conditions:
             lateral=self.lateral,
             turn=self.turn,
             environment=self.environment,
-            autorotation=autorotation,
         )
 
     def trims(self) -> tuple[Trim, ...]:

@@ -41,7 +41,7 @@ def export(
         typer.Option(
             "--format",
             help="c: C99 step, rates, Jacobians. fmu: FMI 2.0 co-simulation. simulink: S-function. control: JSON for "
-            "python-control. matlab: .mat. ardupilot-statespace: JSON for SITL. mcap: a flight for Foxglove, "
+            "python-control. matlab: .mat. mcap: a flight for Foxglove, "
             "Lichtblick, PlotJuggler and Rerun. Or another package's.",
         ),
     ],

@@ -1,8 +1,7 @@
-"""`swash replay`: look at a logged flight in the browser, with a model's prediction beside it, or film it."""
+"""`swash replay`: look at a logged flight in the browser, with a model's prediction beside it."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -34,13 +33,6 @@ def replay(
         bool,
         typer.Option("--hold-missing", help="Hold the model's inputs that the log lacks at hover; the page says so."),
     ] = False,
-    video: Annotated[
-        Path | None, typer.Option("--video", metavar="FILE", help="Write a film (.mp4) instead of opening a page.")
-    ] = None,
-    frames: Annotated[
-        Path | None, typer.Option("--frames", metavar="DIR", help="Write numbered pictures instead, for a paper.")
-    ] = None,
-    frame_rate: Annotated[float, typer.Option("--frame-rate", help="Pictures per second.", min=1.0, max=100.0)] = 25.0,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
     mapping: options.Mapping = None,
@@ -53,21 +45,14 @@ def replay(
     open_page: live.Open = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Replay a flight: scrub through it in the browser, or film it."""
+    """Replay a flight: scrub through it in the browser."""
     import swashplate as sp
     from swashplate.cli.console import progress
     from swashplate.cli.reading import asked, read
 
-    if video is not None and frames is not None:
-        raise SwashError("and --frames are one too many.", channel="--video", hint="Give one of them.")
-    if video is not None and not video.absolute().parent.is_dir():
-        raise SwashError("the folder does not exist.", where=video.parent, channel="--video", hint="Make it first.")
-    if frames is not None and frames.exists() and not frames.is_dir():
-        raise SwashError("is a file, expected a folder.", where=frames, channel="--frames")
     chosen = None if model is None else given.vehicle_of(model, None, None)
     if posterior is not None and chosen is None:
         raise SwashError("is of no model: give it with --model.", channel="--posterior")
-    film_place = video or frames
     with progress(quiet=quiet) as line:
 
         def prepared() -> Replay:
@@ -84,23 +69,12 @@ def replay(
                 typer.echo(note, err=True)
             return shown
 
-        if film_place is None:
-            sp.show_replay(
-                prepared,
-                host=host,
-                port=port,
-                allow_remote=allow_remote,
-                open_page=open_page,
-                say=line.say,
-                ready=lambda address: live.told(address, quiet=quiet),
-            )
-            return
-        film = sp.film_replay(
-            prepared(),
-            film_place,
-            pictures=video is None,
-            rate=frame_rate,
-            tell=lambda done, total: line.say("drawing", done=done, total=total),
+        sp.show_replay(
+            prepared,
+            host=host,
+            port=port,
+            allow_remote=allow_remote,
+            open_page=open_page,
+            say=line.say,
+            ready=lambda address: live.told(address, quiet=quiet),
         )
-    if not quiet:
-        typer.echo(f"Written: {film}")

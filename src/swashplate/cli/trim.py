@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 @given.flown
 def trim(
     asked: given.Conditions,
-    autorotation: Annotated[
-        bool, typer.Option("--autorotation", help="Find the sink rate that needs no engine power.")
-    ] = False,
     plot: given.OutPage = None,
     json: options.Json = False,
 ) -> None:
@@ -31,7 +28,7 @@ def trim(
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
 
-    curve = asked.curve(autorotation=autorotation)
+    curve = asked.curve()
     asked.tell(curve)
     if plot is not None:
         import swashplate as sp

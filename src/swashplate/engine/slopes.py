@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.arrays import IMAGINARY, Array
+from swashplate.arrays import Array
 from swashplate.engine.equations import Equations, unpack_rows
 from swashplate.engine.roots import Looping, require_casadi
 from swashplate.errors import ExportError
-from swashplate.physics.backend import ArrayBackend, Backend, CasadiBackend, newton
+from swashplate.physics.backend import Backend, CasadiBackend, newton
 
 Scalars = Callable[[Sequence[Any], Sequence[Any], Sequence[Any], Backend], Sequence[Any]]
 """`f(x, w, p, xp)`: a row of scalars of a state row, a driving row and a row of numbers."""
@@ -28,28 +28,26 @@ def rates_and_slopes(equations: Equations, x: Array, w: Array, p: Array) -> tupl
         x, w, p: rows as in `engine.trace.traced_rates`.
 
     Raises:
-        ExportError: for equations that can neither be traced nor take complex numbers.
+        ExportError: for equations that CasADi cannot trace.
     """
     return _of_rates(equations)(x, w, p)
 
 
 def slopes_of(f: Scalars, sizes: tuple[int, int, int], *, where: str) -> Slopes:
-    """A function's values and slopes: from its graph, or by imaginary steps where CasADi cannot trace it.
-
-    Not traced is what sums over arrays (aerofoil tables).
+    """A function's values and slopes, from its graph.
 
     Args:
         f: what is differentiated. sizes: of x, w and p. where: whose it is, for messages.
 
     Raises:
-        ExportError: where CasADi cannot trace it; when it is called, where it takes no complex numbers either.
+        ExportError: where CasADi cannot trace it.
     """
     casadi = require_casadi()
     given = [casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True)]
     try:
         values, slopes = with_slopes(f, *given)
     except Exception as error:  # whatever a model of another package does with numbers that are none
-        return _by_imaginary_steps(f, ExportError(f"CasADi cannot trace the equations: {error}", where=where))
+        raise ExportError(f"CasADi cannot trace the equations: {error}", where=where) from error
     graph = casadi.Function("slopes", given, [casadi.densify(values), casadi.densify(slopes)], {"cse": True})
 
     def at(x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
@@ -114,50 +112,3 @@ def _sizes(equations: Equations) -> tuple[int, int, int]:
 
 def _rates(equations: Equations) -> Scalars:
     return lambda x, w, p, xp: equations.vehicle.rates(x, *unpack_rows(equations, w, p), xp)
-
-
-class _ComplexArrays:
-    """NumPy's functions of numbers whose imaginary part is a slope, where NumPy's own would compare it or lose it."""
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(np, name)
-
-    @staticmethod
-    def floor(x: Any) -> Any:
-        return np.floor(np.real(x))
-
-    @staticmethod
-    def abs(x: Any) -> Any:
-        return np.where(np.real(x) < 0.0, -x, x)
-
-    @staticmethod
-    def minimum(a: Any, b: Any) -> Any:
-        return np.where(np.real(b) < np.real(a), b, a)
-
-    @staticmethod
-    def maximum(a: Any, b: Any) -> Any:
-        return np.where(np.real(b) > np.real(a), b, a)
-
-    def clip(self, x: Any, low: Any, high: Any) -> Any:
-        return self.minimum(self.maximum(x, low), high)
-
-    @staticmethod
-    def arctan2(y: Any, x: Any) -> Any:
-        turned = np.real(x) * np.imag(y) - np.real(y) * np.imag(x)
-        return np.arctan2(np.real(y), np.real(x)) + 1j * turned / (np.real(x) ** 2 + np.real(y) ** 2)
-
-
-def _by_imaginary_steps(f: Scalars, refused: ExportError) -> Slopes:
-    """Steps along the imaginary axis, exact to rounding (Squire and Trapp 1998), all directions side by side."""
-
-    def at(x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
-        row, n = np.concatenate([x, w]), len(x)
-        moved = row[:, None] + 1j * IMAGINARY * np.eye(row.size)
-        try:
-            values = f(list(moved[:n]), list(moved[n:]), p.tolist(), ArrayBackend(_ComplexArrays()))
-            told = np.stack([np.broadcast_to(value, row.size) for value in values]).astype(np.complex128)
-        except Exception as error:
-            raise refused from error
-        return told[:, 0].real.copy(), told[:, :n].imag / IMAGINARY, told[:, n:].imag / IMAGINARY
-
-    return at

@@ -77,7 +77,6 @@ FORMATS: Registry[Maker] = Registry(
     own={
         "c": "swashplate.export.makers:c",
         "fmu": "swashplate.export.makers:fmu",
-        "ardupilot-statespace": "swashplate.export.makers:ardupilot",
         "control": "swashplate.export.makers:control",
         "matlab": "swashplate.export.makers:matlab",
         "simulink": "swashplate.export.makers:simulink",
@@ -100,7 +99,7 @@ def export_model(
     Args:
         model: a vehicle (packaged, a card's or identified) or a linear model, as `swash fit-ss` writes it or as
             `read_linear` and `read_matlab` read it.
-        form: "c", "fmu", "ardupilot-statespace", "control", "matlab", "simulink", or another package's (`FORMATS`).
+        form: "c", "fmu", "control", "matlab", "simulink", or another package's (`FORMATS`).
         name: what files and C functions begin with.
         trim: where a vehicle starts, and what its linear model is about; hover where none is given.
         precision: of C ("double" or "single"); the other formats are double.

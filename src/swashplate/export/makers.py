@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from swashplate.errors import ExportError
 from swashplate.export.formats import Export, ExportRequest
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.trim import Trim
 
 if TYPE_CHECKING:
-    from swashplate.export.ardupilot_state_space import Sticks
     from swashplate.export.traced import Traced
 
 
@@ -56,31 +53,6 @@ def matlab(asked: ExportRequest) -> Export:
     from swashplate.export import matlab as files
 
     return Export({f"{asked.name}.mat": files.matlab(asked.linear())})
-
-
-def ardupilot(asked: ExportRequest) -> Export:
-    """ArduPilot's state-space JSON for SITL."""
-    from swashplate.export.ardupilot_state_space import Sticks, ardupilot_state_space, to_json
-
-    model, about = asked.model, asked.about
-    sticks = _sticks(model, about) if about is not None and isinstance(model, Vehicle) else Sticks({})
-    numbers, notes = ardupilot_state_space(asked.linear(), sticks)
-    return Export(_encoded({f"{asked.name}_ardupilot.json": to_json(numbers)}), notes)
-
-
-def _sticks(vehicle: Vehicle, trim: Trim) -> Sticks:
-    """Full sticks from a single-rotor card: cyclic to its stop, collective and tail over their whole ranges."""
-    from swashplate.export.ardupilot_state_space import Sticks
-
-    limits = dict(zip(vehicle.input_names, vehicle.input_limits, strict=True))
-    whole = {name: high - low for name, (low, high) in limits.items()}
-    reach = {name: whole[name] if name == "theta0" else whole[name] / 2.0 for name in whole}
-    if "theta0" not in limits:
-        return Sticks(reach)
-    if trim.speed or trim.lateral or trim.climb or trim.turn:
-        raise ExportError("the format's equations are about hover.", channel="--speed", hint="Leave it out.")
-    commands, states = trim.commands(), trim.states()
-    return Sticks(reach, states["phi"], float(vehicle.values().rotor_speed), (*limits["theta0"], commands["theta0"]))
 
 
 def _traced(asked: ExportRequest) -> Traced:

@@ -7,17 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swashplate.arrays import Array
 from swashplate.engine.equations import SURROUNDINGS, parameter_row
 from swashplate.engine.fly import FlightPlan, fly
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.earth import Earth
 from swashplate.physics.environment import Environment
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
-from swashplate.simulation.earth_flight import PLACES, from_earth, over_earth, to_earth
 from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.step_size import check_step
@@ -39,7 +36,6 @@ def simulate(
     delays: Delays = None,
     sensors: Sensors | None = None,
     seed: int | None = None,
-    earth: Earth | None = None,
 ) -> Flight:
     """Fly a vehicle through given inputs; classical Runge-Kutta of order 4, float64.
 
@@ -60,9 +56,6 @@ def simulate(
             that the vehicle's card knows (`sp.structure` models and identified ones). The flight has the commands.
         sensors: sensor models that turn the true flight into a log; they need a `seed`.
         seed: of the sensors' noise; the same call with the same seed gives the same bits on the same machine.
-        earth: that is round and turns; None for a flat one. Then p, q, r are rates against the stars, roll, pitch and
-            yaw against the vertical where the vehicle is, x, y, z in the axes of the origin, and the flight has
-            latitude, longitude and altitude too.
 
     Returns:
         The true flight, stream "uniform" (time, all states, inputs, voltage, wind), or what the sensors make of it.
@@ -85,25 +78,16 @@ def simulate(
     acting = acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first)
     numbers = parameter_row(vehicle, surroundings)
 
-    def flown(moved: Vehicle, begin: Array, quaternion: bool | None = None) -> Array:
-        plan = FlightPlan(
-            begin[:, None],
-            numbers[:, None],
-            acting[:, :, None],
-            1.0 / (rate * substeps),
-            hold=substeps,
-            keep=substeps,
-            held=interpolation == "held",
-        )
-        return fly(moved, plan, quaternion=quaternion)[0][:, :, 0]
-
-    places: Array | None = None
-    if earth is not None:
-        if vehicle.traits.linear:
-            raise SwashError("holds near one trim over a flat Earth only.", channel="earth", where=vehicle.name)
-        states, places = from_earth(flown(over_earth(vehicle, earth), to_earth(np.asarray(x0), earth), False), earth)
-    else:
-        states = flown(vehicle, np.asarray(x0))
+    plan = FlightPlan(
+        np.asarray(x0)[:, None],
+        numbers[:, None],
+        acting[:, :, None],
+        1.0 / (rate * substeps),
+        hold=substeps,
+        keep=substeps,
+        held=interpolation == "held",
+    )
+    states = fly(vehicle, plan)[0][:, :, 0]
     flight = simulated_flight(
         vehicle,
         time,
@@ -117,9 +101,6 @@ def simulate(
         },
     )
     check_divergence(vehicle, time, states, flight)
-    if places is not None:
-        columns = {n: ("time", places[:, i], {"units": u}) for i, (n, u) in enumerate(PLACES.items())}
-        flight = flight.with_streams({"uniform": flight.streams["uniform"].assign(columns)})
     if sensors is None:
         return flight
     from swashplate.simulation.sensors import observe

@@ -11,12 +11,12 @@ import numpy as np
 
 from swashplate.errors import SwashError, TrimError
 from swashplate.models.catalogue import from_card
-from swashplate.models.conventional.buildup import build_up
 from swashplate.models.conventional.derivative_table import DerivativeTable, split_name, unit
 from swashplate.models.published import read_published
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.shown import Saved
+from swashplate.simulation.derivatives import derivative_table
 from swashplate.simulation.trim import Trim, trim
 from swashplate.text_table import text_table
 
@@ -144,7 +144,7 @@ def compare_derivatives(vehicle: Vehicle, at: Trim, path: str | Path, *, primed:
         primed: its roll and yaw rows are mixed by the product of inertia.
 
     Raises:
-        SwashError: for a file that cannot be read, a flight that turns, or a vehicle without a build-up.
+        SwashError: for a file that cannot be read, a flight that turns, or a vehicle without a single rotor.
     """
     if at.turn:
         raise SwashError("takes straight flight.", channel="--published", hint="Leave out --turn.")
@@ -156,25 +156,25 @@ def compare_derivatives(vehicle: Vehicle, at: Trim, path: str | Path, *, primed:
 def hold_against(
     vehicle: Vehicle, at: Trim, published: Mapping[str, float], *, primed: bool = False
 ) -> PublishedComparison:
-    """A card's table by build-up against published derivatives, and which assumptions bring it nearer, best first.
+    """A card's derivatives against published derivatives, and which assumptions bring it nearer, best first.
 
     An assumption is taken on while it lowers the mean difference (each at most 100 %) by 0.3 points. It explains a
     table and is no fit: no number of the card is changed but those that a report leaves out (set to zero).
 
     Args:
-        vehicle: a single-rotor card with inflow "glauert" or "uniform" and no phase lag.
+        vehicle: a single-rotor helicopter.
         at: its trim, in straight flight.
         published: by the names of `DerivativeTable`, SI.
         primed: the published roll and yaw rows are taken to be mixed by the product of inertia.
 
     Raises:
-        SwashError: for a vehicle without a build-up.
+        SwashError: for a vehicle that is no single-rotor helicopter.
     """
     scale = _scale(published)
     comparison = PublishedComparison(published, scale, ())
 
     def step(words: str, flown: Vehicle, where: Trim, mixed: bool) -> ComparisonStep:
-        table = build_up(flown, where.state, where.inputs, where.environment)
+        table = derivative_table(flown, where)
         if mixed:
             card = flown.card.values()
             table = table.primed(**{name: card[name] for name in ("inertia_xx", "inertia_zz", "inertia_xz")})

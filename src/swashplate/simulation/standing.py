@@ -88,8 +88,7 @@ def no_ground(where: str) -> SwashError:
         "is a linear model of flight, or stitched from such, without ground, rotors or a battery, so it cannot "
         "start from the ground as an autopilot expects.",
         where=where,
-        hint="Fly it with `swash live`, or give the autopilot a vehicle, e.g. raptor50. ArduPilot's own state-space "
-        "model is written by `swash export --format ardupilot-statespace`.",
+        hint="Fly it with `swash live`, or give the autopilot a vehicle, e.g. raptor50.",
     )
 
 

@@ -13,7 +13,6 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.public import resolve
 from swashplate.shown import Shown
-from swashplate.simulation.autorotation import autorotations
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import Trim
 
@@ -130,7 +129,6 @@ def trim_curve(
     lateral: float = 0.0,
     turn: float = 0.0,
     environment: Environment | None = None,
-    autorotation: bool = False,
 ) -> TrimCurve:
     """Steady flight over a range of speeds.
 
@@ -139,22 +137,13 @@ def trim_curve(
         speeds: ahead, ascending [m/s].
         climb: rate of climb [m/s]. lateral: speed to the right [m/s]. turn: rate of turn to the right [rad/s].
         environment: wind, air and voltage.
-        autorotation: sink as fast as needs no power of the engine (`autorotations`), instead of at a given climb.
 
     Raises:
-        SwashError: without any speed; for autorotation with a climb or a turn.
+        SwashError: without any speed.
         TrimError: at the first speed that cannot be flown, with the limit that stops it.
     """
     if not len(speeds):
         raise SwashError("a trim curve needs at least one speed.", channel="speeds")
-    if autorotation:
-        if climb or turn:
-            raise SwashError(
-                "finds the rate of descent of a straight flight itself.",
-                channel="autorotation",
-                hint="Leave out climb and turn.",
-            )
-        return TrimCurve(vehicle, autorotations(vehicle, speeds, lateral=lateral, environment=environment))
     return TrimCurve(
         vehicle,
         trims_over_speed(vehicle, speeds, climb=climb, lateral=lateral, turn=turn, environment=environment),

@@ -46,7 +46,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "maneuver need": ("needed_excitation",),
     "open": ("open_logs",),
     "plot": ("plot_logs",),
-    "replay": ("replay", "show_replay", "film_replay"),
+    "replay": ("replay", "show_replay"),
     "respond": ("respond", "uniform_records"),
     "simulate": ("fly_maneuver", "monte_carlo"),
     "structures list": ("structures",),

@@ -12,7 +12,7 @@ from swashplate.arrays import Array
 from swashplate.engine.equations import equations_of, parameter_row, unpack_rows
 from swashplate.engine.slopes import rates_and_slopes, slopes_of
 from swashplate.errors import ExportError
-from swashplate.physics.backend import FloatBackend, newton
+from swashplate.physics.backend import FloatBackend
 from swashplate.simulation import steady
 
 
@@ -48,25 +48,6 @@ def test_slopes_of_any_function() -> None:
     np.testing.assert_allclose(by_w, [[2.0], [0.0]])
     with pytest.raises(ExportError, match="here: CasADi cannot trace the equations"):
         slopes_of(lambda x, w, p, xp: [x[0].no_number()], (1, 1, 1), where="here")(*np.zeros((3, 1)))
-
-
-def test_slopes_of_what_casadi_cannot_trace() -> None:
-    """Every function that an equation may take, on both sides of its kinks: the graph's slopes, by imaginary steps."""
-
-    def scalars(x: Any, w: Any, p: Any, xp: Any) -> list[Any]:
-        a, b, c = x[0], x[1], w[0]
-        once = [xp.sin(a), xp.cos(b), xp.tan(c), xp.sqrt(a * a + 1.0), xp.atan2(a, b), xp.atan2(b, c), xp.abs(a)]
-        twice = [xp.minimum(a, b), xp.maximum(a, b), xp.minimum(b, c), xp.maximum(c, 0.1), xp.where(a > b, a * b, c)]
-        return [*once, *twice, newton(lambda r: (r * r * r + r - a, 3.0 * r * r + 1.0), b, steps=30, xp=xp), p[0]]
-
-    def untraced(x: Any, w: Any, p: Any, xp: Any) -> list[Any]:
-        return [xp.arrays.sum(xp.arrays.stack([part, part * 0.0]), axis=0) for part in scalars(x, w, p, xp)[:-1]]
-
-    for place in ([0.7, 1.3, -0.4], [1.3, -0.7, 0.3], [-0.2, 0.1, 2.0]):
-        given = np.array(place[:2]), np.array(place[2:]), np.array([3.0])
-        expected = slopes_of(scalars, (2, 1, 1), where="here")(*given)
-        for exact, found in zip(expected, slopes_of(untraced, (2, 1, 1), where="here")(*given), strict=True):
-            np.testing.assert_allclose(found, exact[:-1], rtol=1e-14, atol=1e-14)
 
 
 def test_a_trim_asks_the_equations_once_for_each_step(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Linear models for python-control, MATLAB and ArduPilot's state-space helicopter: what goes out comes back."""
+"""Linear models for python-control and MATLAB: what goes out comes back."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import ExportError
-from swashplate.export.ardupilot_state_space import KEYS, Sticks, ardupilot_state_space, assembled, read_ardupilot
 from swashplate.export.control_json import read_control, read_linear
 from swashplate.export.formats import export_model
 from swashplate.export.linear import Linear, of_state_space, of_vehicle
@@ -128,69 +127,6 @@ def test_mat_brings_back_matrices_names_units_delays_and_the_trim() -> None:
     np.testing.assert_array_equal(found["state_start"], trim.state)
     np.testing.assert_array_equal(found["input_start"], trim.inputs)
     assert str(found["name"]) == "raptor50"
-
-
-def test_ardupilot_holds_the_hybrid_structure_exactly(tmp_path: Path) -> None:
-    truth = structure("hybrid").with_values({"Ncol": -3.0, "Np": 0.0, "Mcol": 0.0, "tau_ped": 0.03})
-    made = export_model(truth, "ardupilot-statespace", name="hybrid")
-    (path,) = made.save(tmp_path)
-    numbers = read_ardupilot(path)
-    assert set(numbers) == set(KEYS)
-    values = truth.numbers()
-    assert numbers["Lb1s"] == pytest.approx(values["Lb"])
-    assert numbers["tf"] == pytest.approx(values["tau_f"])
-    assert numbers["Lfa1s"] == pytest.approx(values["Ba"])
-    assert numbers["time_delay_ped"] == pytest.approx(30.0)
-    assert numbers["Mflg"] == pytest.approx(-values["Alon"])  # its stick is forward positive, ArduPilot's nose up
-    again = assembled(numbers)
-    expected = of_state_space(truth, name="hybrid")
-    both = [np.sort_complex(np.linalg.eigvals(model.A)) for model in (again, expected)]
-    np.testing.assert_allclose(both[0], both[1], atol=1e-9)
-    assert "roll 0.0%, pitch 0.0%, yaw 0.0%" in made.notes[-1]
-
-
-def test_ardupilot_keeps_the_modes_of_a_helicopters_card() -> None:
-    raptor = sp.vehicle("raptor50")
-    trim = sp.trim(raptor, environment=sp.Environment(air_density=1.2))
-    made = export_model(raptor, "ardupilot-statespace", name="raptor50", trim=trim)
-    numbers = json.loads(made.files["raptor50_ardupilot.json"])
-    assert numbers["nominal_rpm"] == pytest.approx(1600, rel=1e-3)
-    assert numbers["hover_lean"] == pytest.approx(np.degrees(trim.states()["phi"]))
-    assert numbers["coll_min"] < numbers["coll_hover"] < numbers["coll_max"]
-    for key in ("Mflg", "Lflt", "Nped", "Lb1s", "Ma1s", "Yb1s"):
-        assert numbers[key] > 0.0, key
-    for key in ("Xa1s", "Zcol", "Nr", "Zw", "Xu", "Yv"):
-        assert numbers[key] < 0.0, key
-    # The unstable hovering oscillation and the rotor's mode.
-    mine, theirs = np.linalg.eigvals(sp.linearize(raptor, trim).A), np.linalg.eigvals(assembled(numbers).A)
-    for value in (complex(0.762, 0.976), complex(-31.3, 9.69)):
-        assert np.min(np.abs(mine - value)) < 0.05
-        assert np.min(np.abs(theirs - value)) < 0.05 * max(1.0, abs(value))
-
-
-def test_a_bar_that_does_not_fit_is_told_of() -> None:
-    made = export_model(structure("thirteen_state"), "ardupilot-statespace", name="thirteen")
-    assert "another aircraft" in made.notes[-1]
-
-
-@pytest.mark.parametrize(
-    ("text", "said"), [('{"Ma1": 1}', "Ma1"), ('{"tf": "0.1"}', "tf"), ("[1]", "object"), ("", "JSON")]
-)
-def test_ardupilots_reader_names_what_is_wrong(text: str, said: str, tmp_path: Path) -> None:
-    path = tmp_path / "model.json"
-    path.write_text(text)
-    with pytest.raises(ExportError, match=said):
-        read_ardupilot(path)
-
-
-def test_ardupilot_refuses_what_has_no_cyclic_of_a_single_rotor() -> None:
-    with pytest.raises(ExportError, match="swash link ardupilot"):
-        export_model(sp.vehicle("coax"), "ardupilot-statespace", name="coax")
-    with pytest.raises(ExportError, match="single-rotor"):
-        ardupilot_state_space(of_state_space(structure("heave"), name="heave"), Sticks({}))
-    raptor = sp.vehicle("raptor50")
-    with pytest.raises(ExportError, match="about hover"):
-        export_model(raptor, "ardupilot-statespace", name="r", trim=sp.trim(raptor, speed=5.0))
 
 
 def test_c_and_fmu_refuse_delays_that_differ_between_outputs_or_leave_them_out_with_words() -> None:

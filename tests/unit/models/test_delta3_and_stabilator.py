@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
+from hand_buildup import build_up
 from swashplate.errors import CardError, SwashError
 from swashplate.models.card import Parameter, packaged_cards
 from swashplate.models.catalogue import from_card, vehicle
-from swashplate.models.conventional.buildup import build_up
 from swashplate.models.conventional.main_rotor import main_rotor
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle

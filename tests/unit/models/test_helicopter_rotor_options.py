@@ -1,4 +1,4 @@
-"""Tip loss, uneven induced power and ground effect of single-rotor helicopters; power verdicts; autorotation."""
+"""Tip loss, uneven induced power and ground effect of single-rotor helicopters; power verdicts."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.errors import CardError, SwashError, TrimError
+from swashplate.errors import CardError
 from swashplate.models.catalogue import from_card, vehicle
 from swashplate.models.conventional.helicopter import HelicopterLoads, loads
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
-from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
+from swashplate.physics.environment import Environment
 from swashplate.simulation.trim_curve import TrimCurve
 
 XP = FloatBackend()
@@ -115,27 +115,6 @@ def test_a_mirrored_helicopter_does_the_same(options: dict[str, object]) -> None
     np.testing.assert_allclose(other, signs * rates, rtol=1e-11, atol=1e-11)
 
 
-def test_autorotation_holds_the_rotor_speed_without_an_engine() -> None:
-    """The same helicopter with its throttle closed: the rotor neither slows nor speeds up there, but does elsewhere."""
-    found = sp.trim_curve(vehicle("raptor50"), (0.0, 8.0), autorotation=True)
-    engine = vehicle("raptor50", rotor_speed="throttle")
-    p = engine.values()
-    hover = math.sqrt(p.mass * LABORATORY_GRAVITY / (2.0 * CALM.air_density * math.pi * p.rotor_radius**2))
-    for at in found.trims:
-        assert abs(found.power(at) or 0.0) < 1e-2
-        row = [*at.state, p.rotor_speed, 0.0]
-        rates = dict(zip(engine.state_names, engine.rates(row, [*at.inputs, 0.0], p), strict=True))
-        assert abs(rates["omega"]) < 1e-3
-        assert 1.6 * hover < -at.climb < 2.4 * hover  # measured: 1.7 to 2 in vertical descent (Leishman 2006, sec. 5.6)
-    assert "climb [m/s]" in found.columns()
-    steeper = sp.trim(vehicle("raptor50"), climb=found.trims[0].climb - 1.0)
-    row = [*steeper.state, p.rotor_speed, 0.0]
-    assert engine.rates(row, [*steeper.inputs, 0.0], p)[engine.index("omega")] > 0.1
-    verdict = TrimCurve(vehicle("raptor50"), (steeper,)).remarks
-    assert any("the air drives the rotors with" in words and "autorotation" in words for words in verdict)
-    assert not any("autorotation" in words or "engine" in words for words in found.remarks)
-
-
 def test_more_power_than_the_engine_has_is_said(hover: sp.Trim) -> None:
     weak = vehicle("raptor50").with_values({"engine_power": 400.0})
     assert TrimCurve(vehicle("raptor50"), (hover,)).remarks == ()
@@ -145,12 +124,6 @@ def test_more_power_than_the_engine_has_is_said(hover: sp.Trim) -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(SwashError, match="has no shaft power, and so no autorotation"):
-        sp.trim_curve(vehicle("coax"), (0.0,), autorotation=True)
-    with pytest.raises(SwashError, match="finds the rate of descent of a straight flight itself"):
-        sp.trim_curve(vehicle("raptor50"), (0.0,), climb=-3.0, autorotation=True)
-    with pytest.raises(TrimError, match=r"no autorotation at 20 m/s: at .* of sink the rotors still need power"):
-        sp.trim_curve(vehicle("raptor50").with_values({"rotor_drag": 0.06}), (20.0,), autorotation=True)
     with pytest.raises(CardError, match="ground_effect: is 'true', expected one of 'none'"):
         vehicle("raptor50", ground_effect="true")
     card = vehicle("raptor50").card

@@ -14,7 +14,6 @@ from swashplate.errors import SwashError
 from swashplate.reporting.figures.of_flight import over_time
 from swashplate.reporting.html import render, write_page
 from swashplate.reporting.packing import figures_text, read_figures
-from swashplate.reporting.pictures import prediction_picture
 from swashplate.reporting.report import report
 from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.theme import line
@@ -114,18 +113,6 @@ def test_failure_leaves_nothing_half_written(tmp_path: Path) -> None:
     with pytest.raises(SwashError, match="cannot be written"):
         report(fit(), path=tmp_path / "file" / "r.html", modes=modes())
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]
-
-
-def test_pictures_are_written_and_repeatable(tmp_path: Path) -> None:
-    sample = validation()
-    predicted = prediction_picture(sample, path=tmp_path / "p.png")
-    assert predicted.read_bytes().startswith(b"\x89PNG")
-    one = prediction_picture(sample, path=tmp_path / "a.svg").read_bytes()
-    assert one == prediction_picture(sample, path=tmp_path / "b.svg").read_bytes()
-    assert b"<svg" in one
-    with pytest.raises(SwashError, match=r"expected \.png or \.svg"):
-        prediction_picture(sample, path=tmp_path / "a.bmp")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.svg", "b.svg", "p.png"]
 
 
 def test_a_page_of_many_long_channels_is_small_enough_to_mail(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Life on the ground on the paths beside the links: exported C, FMU, the gym environment, the live page's loop.
+"""Life on the ground on the paths beside the links: exported C, FMU, the live page's loop.
 
 Each is given the same rows of inputs: 120 s parked with the servos stirred at random (less in the short form), rotors
 spooled up, a hop where the vehicle can without an autopilot (the coaxial), down, stopped, and all of it again.
@@ -157,25 +157,7 @@ def _given(memory: Any, time: Any, measured: Any, wanted: Any, gains: Any) -> tu
     return memory, gains
 
 
-def gym_environment(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
-    """Actions that ask for the row's inputs, with an action's whole reach about the middle of each."""
-    pytest.importorskip("gymnasium")
-    from swashplate.links.gym.flying import flying
-    from swashplate.links.gym.tasks import task_of
-
-    low, high = np.array(made.input_limits).T
-    made_ready = flying(made, task_of("hover", {}), rate=1.0 / DT, authority=1.0)
-    middle = replace(made_ready.trim, inputs=0.5 * (low + high))
-    env = replace(made_ready, trim=middle, free=tuple(range(len(low))), reach=0.5 * (high - low))
-    x, rows = at_rest(made, middle.environment)[None], []
-    for k, given in enumerate(inputs):
-        action = (given - middle.inputs) / env.reach
-        x, _, _, _ = env.advance(x, np.array([k]), action[None], env.parameters)
-        rows.append(x[0])
-    return np.array(rows)
-
-
-PATHS: dict[str, Flown] = {"C": exported_c, "FMU": fmu, "live": live_loop, "gym": gym_environment}
+PATHS: dict[str, Flown] = {"C": exported_c, "FMU": fmu, "live": live_loop}
 
 
 @pytest.mark.parametrize("which", ["C", pytest.param("live", marks=pytest.mark.proof)])
@@ -202,48 +184,6 @@ def test_a_helicopter_lives_two_minutes_on_the_ground(name: str, which: str, tmp
 @pytest.mark.parametrize("name", ["crazyflie", "x8", "coaxial15", "ingenuity", "lynx", "r50", "rmax"])
 def test_every_other_vehicle_lives_two_minutes_on_the_ground(name: str, which: str, tmp_path: Path) -> None:
     lives(name, PATHS[which], tmp_path, parked=120.0)
-
-
-@pytest.mark.proof
-@pytest.mark.parametrize("together", [False, True], ids=["one", "many"])
-def test_the_gym_starts_on_the_ground(together: bool) -> None:
-    """Stopped it stands where it was put; more than hovering power lifts it off; many are as many single ones."""
-    pytest.importorskip("gymnasium")
-    from swashplate.links.gym.environment import HelicopterEnv
-    from swashplate.links.gym.flying import ABOVE
-    from swashplate.links.gym.vector import HelicopterVectorEnv
-
-    options: dict[str, Any] = {"ground": True, "authority": 1.0, "task_options": {"duration": 60.0}}
-    env = HelicopterEnv("coax", "hover", **options)
-    flown = env.flying
-    _, told = env.reset(seed=4)
-    stopped = -flown.trim.inputs / flown.reach
-    begun = told["state"]
-    for _ in range(50):
-        seen, _, lost, _, told = env.step(stopped)
-        assert not lost
-    still = told["state"]
-    np.testing.assert_allclose(still[:12], begun[:12], atol=1e-5)
-    if together:
-        many = HelicopterVectorEnv(2, "coax", "hover", **options)
-        _, all_told = many.reset(seed=4)
-        np.testing.assert_array_equal(all_told["state"][0], begun)
-        for _ in range(50):
-            *_, all_told = many.step(np.tile(stopped, (2, 1)))
-        np.testing.assert_allclose(all_told["state"][0], still, atol=1e-9)
-    assert seen[2] == pytest.approx(-ABOVE - begun[2], abs=1e-4), "the place is above the ground"
-    up = [env.step(np.where(flown.trim.inputs > 0.1, 0.1, 0.0))[4]["state"][2] for _ in range(75)]
-    assert up[-1] < begun[2] - 0.05
-
-
-def test_a_governed_throttle_is_an_action_on_the_ground() -> None:
-    pytest.importorskip("gymnasium")
-    from swashplate.links.gym.flying import flying
-    from swashplate.links.gym.tasks import task_of
-
-    raptor = sp.vehicle("raptor50")
-    assert len(flying(raptor, task_of("hover", {}), ground=True).free) == 5
-    assert len(flying(raptor, task_of("hover", {})).free) == 4  # in the air
 
 
 def test_a_vehicle_that_sinks_into_the_ground_is_seen(tmp_path: Path) -> None:

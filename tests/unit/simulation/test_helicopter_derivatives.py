@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hand_buildup import build_up
 from swashplate.errors import SwashError
 from swashplate.models.catalogue import vehicle
-from swashplate.models.conventional.buildup import build_up
 from swashplate.models.conventional.derivative_table import MOTIONS, ROWS, factor_to_feet, split_name, unit
 from swashplate.physics.environment import Environment
 from swashplate.simulation.derivatives import derivative_table

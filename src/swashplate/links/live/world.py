@@ -78,7 +78,7 @@ class World:
         self._p = parameter_row(vehicle, around)
         self._drawn = [parameter_row(one, around) for one in draws]
         self._limits = np.array(vehicle.input_limits).T
-        # Skids and stopped rotors need the step that links and gym take.
+        # Skids and stopped rotors need the step that links take.
         self._rate = 1.0 / LONGEST_STEP if vehicle.card.options.get("ground") else PHYSICS_RATE
         self._substeps = round(self._rate / self.pilot.rate)
         self.period = self._substeps / self._rate

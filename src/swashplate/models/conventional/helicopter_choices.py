@@ -17,8 +17,6 @@ _WHOLE = (
     "fuselage_area_y",
     "fuselage_area_z",
 )
-_STRAIGHT = ("rotor_lift_slope", "rotor_drag", "rotor_drag_thrust")
-"""What an aerofoil table stands in for."""
 _WITH_OPTION = {"bar": ("bar_gain", "bar_inertia"), "gyro": ("gyro_gain",), "servos": ("servo_time",)}
 
 
@@ -30,7 +28,6 @@ def helicopter_choices(card: Card) -> Mapping[str, Choice]:
     """
     switched = [name for option, names in _WITH_OPTION.items() if card.options.get(option, False) for name in names]
     bar = [name for name in switched if name.startswith("bar_")]
-    whole = [name for name in _WHOLE if not (_tabled(card) and name in _STRAIGHT)]
     return {
         "rotor": Choice(
             "rotor",
@@ -40,7 +37,7 @@ def helicopter_choices(card: Card) -> Mapping[str, Choice]:
         "full": Choice(
             "full",
             "the rotor, lift slopes and drag of rotor, tail rotor and fuselage, and what the card's options add",
-            tuple(_with_tolerance(card, name) for name in (*whole, *switched)),
+            tuple(_with_tolerance(card, name) for name in (*_WHOLE, *switched)),
         ),
     }
 
@@ -49,21 +46,15 @@ def helicopter_effects(card: Card) -> Sequence[PhysicalEffect]:
     """What numbers can leave out: the hub's spring, the distorted wake, drag, and what options add."""
     drag = {f"fuselage_area_{axis}": 0.0 for axis in "xyz"}
     bar = (PhysicalEffect("stabilizer bar", {"bar_gain": 0.0}),) if card.options.get("bar", False) else ()
-    by_thrust = PhysicalEffect("profile drag that grows with thrust", {"rotor_drag_thrust": 0.0})
-    growing = () if _tabled(card) else (by_thrust,)
     gyro = (PhysicalEffect("yaw gyro", {"gyro_gain": 0.0}),) if card.options.get("gyro", False) else ()
     return (
         PhysicalEffect("spring of the hub", {"hub_stiffness": 0.0}),
         PhysicalEffect("wake distorted by pitch and roll rate", {"wake_distortion": 0.0}),
         PhysicalEffect("drag of the fuselage", drag),
-        *growing,
+        PhysicalEffect("profile drag that grows with thrust", {"rotor_drag_thrust": 0.0}),
         *bar,
         *gyro,
     )
-
-
-def _tabled(card: Card) -> bool:
-    return bool(card.options.get("aerofoil", "none") != "none")
 
 
 def _tolerance(card: Card, name: str) -> float:

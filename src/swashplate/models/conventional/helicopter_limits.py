@@ -11,11 +11,9 @@ from swashplate.models.conventional.helicopter import HelicopterLoads, Helicopte
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
-from swashplate.physics.blade_element import Disc
 from swashplate.physics.environment import Environment
 from swashplate.physics.flapping import Flapping
 from swashplate.physics.frames import Vector, local_to_body
-from swashplate.physics.tabled_blades import TabledBlades, blade_doubts
 
 _TURNING = 0.5
 """Share of the governed speed below which a rotor carries nothing that could be doubted."""
@@ -25,8 +23,6 @@ _FLAPPING = 0.21
 _THROUGH = 0.15
 """Advance ratio, C_T / sigma, flapping [rad] and share of the tip speed at which air comes through the disc, beyond
 which reversed flow, stall and large angles count (0.15: the air meets the blades at 0.2 rad at three quarters)."""
-_SHARE = 0.05
-"""Share of the disc that may be beyond stall or drag divergence, or outside the table, without a word; assumed."""
 
 
 def shaft_power(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> float:
@@ -49,39 +45,7 @@ def doubts_by_kind(vehicle: Vehicle, x: Array, u: Array, environment: Environmen
     body = state.body
     air = body.velocity + local_to_body(environment.wind, body.attitude, xp).scaled(-1.0)
     omega = par.rotor_speed if state.rotor is None else state.rotor.omega
-    doubts = rotor_doubts(acting.main_rotor.force, air, float(acting.induced), omega, state.disc, par, environment)
-    if acting.main.blades is not None and omega >= _TURNING * par.rotor_speed:
-        for kind in ("advance", "stall"):  # what a straight lift line leaves out is in the table
-            doubts.pop(kind, None)
-        doubts |= _blade_words(acting.main.seen, acting.main.blades)
-    return doubts
-
-
-def _blade_words(seen: Disc, blades: TabledBlades) -> dict[str, str]:
-    """Where blade elements are beyond what their table or quasi-steady flow can say, in words by kind."""
-    at, doubts = blade_doubts(seen, blades), dict[str, str]()
-    of = "of the disc outside a quarter of the radius"
-    if at.stalled > _SHARE:
-        doubts["stall"] = (
-            f"the blades are beyond the angle of their largest lift on {at.stalled:.0%} {of}: loads there are the "
-            "table's, and dynamic stall is left out"
-        )
-    if at.diverged > _SHARE:
-        doubts["divergence"] = (
-            f"drag diverges on {at.diverged:.0%} {of} (it rises by more than 0.1 per Mach number; tips reach "
-            f"Mach {at.mach:.2f})"
-        )
-    if at.reversed_flow > _SHARE:
-        doubts["advance"] = f"air meets the blades from behind on {at.reversed_flow:.0%} {of}: yawed flow is left out"
-    if at.beyond > _SHARE:
-        (slow, fast), (small, large) = blades.table.span
-        least, most = at.reynolds
-        low, high = (round(float(np.degrees(angle)), 3) for angle in blades.table.measured)
-        doubts["table"] = (
-            f"{at.beyond:.0%} {of} is outside the aerofoil table ({low:g} to {high:g} deg, Mach {slow:g} to {fast:g}, "
-            f"Reynolds number {small:.2g} to {large:.2g}; here {least:.2g} to {most:.2g}, to Mach {at.mach:.2f})"
-        )
-    return doubts
+    return rotor_doubts(acting.main_rotor.force, air, float(acting.induced), omega, state.disc, par, environment)
 
 
 def rotor_doubts(

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 from swashplate.errors import CardError
 from swashplate.models.card import Card, no_option
-from swashplate.models.conventional.aerofoil_file import aerofoil_of
 from swashplate.physics.ground_effect import FORMS as GROUND_EFFECTS
-from swashplate.physics.tabled_blades import AerofoilTable
 
 
 class HelicopterOptions(NamedTuple):
@@ -45,8 +42,7 @@ class HelicopterOptions(NamedTuple):
             tailplane.
         stabilator: the horizontal tail's incidence follows air speed, collective and pitch rate (`stabilator_*`), in
             place of `tailplane_incidence`.
-        aerofoil: the main blades' table of lift, drag and moment (`aerofoil_file`), in place of `rotor_lift_slope`,
-            `rotor_drag` and `rotor_drag_thrust`; None for those. A card names a packaged table or a file, or "none".
+
         ground_effect: "cheeseman-bennett" or "hayden" over ground at z = 0 (`ground_effect.induced_share`), or "none".
     """
 
@@ -73,7 +69,6 @@ class HelicopterOptions(NamedTuple):
     stiff_blades: bool = False
     tail_in_wake: bool = False
     ground_effect: str = "none"
-    aerofoil: AerofoilTable | None = None
 
     @property
     def sense(self) -> float:
@@ -123,10 +118,10 @@ def helicopter_options(card: Card) -> HelicopterOptions:
     Raises:
         CardError: naming the option that is not known or has no such value.
     """
-    where, said = card.where, {name: value for name, value in card.options.items() if name != _AEROFOIL}
+    where, said = card.where, card.options
     for name, value in said.items():
         if name not in _CHOICES:
-            raise no_option(name, (*_CHOICES, _AEROFOIL), where=where)
+            raise no_option(name, _CHOICES, where=where)
         if not any(value is choice or (isinstance(value, str) and value == choice) for choice in _CHOICES[name]):
             expected = ", ".join(map(repr, _CHOICES[name]))
             raise CardError(f"is {value!r}, expected one of {expected}.", where=where, channel=name)
@@ -140,30 +135,4 @@ def helicopter_options(card: Card) -> HelicopterOptions:
         )
     if chosen.grip and not chosen.ground:
         raise CardError("needs ground to hold.", where=where, channel="grip", hint="Add ground = true.")
-    named = card.options.get(_AEROFOIL, _NONE)
-    if not isinstance(named, str):
-        raise CardError(f"is {named!r}, expected a table's name or file.", where=where, channel=_AEROFOIL)
-    if named == _NONE:
-        return chosen
-    for name, value in _NOT_TABLED:
-        if getattr(chosen, name) == value:
-            raise CardError(
-                f"does not go with {name} = {str(value).lower() if value is True else repr(value)}, which is written "
-                "for a straight lift line.",
-                where=where,
-                channel=_AEROFOIL,
-                hint=f"Change {name}, or leave the table out.",
-            )
-    return chosen._replace(aerofoil=aerofoil_of(named, card)[0])
-
-
-def with_whole_path(card: Card) -> Card:
-    """A card whose aerofoil table is found from wherever the card is saved."""
-    named = card.options.get(_AEROFOIL, _NONE)
-    if named == _NONE:
-        return card
-    return replace(card, options={**card.options, _AEROFOIL: aerofoil_of(str(named), card)[1]})
-
-
-_AEROFOIL, _NONE = "aerofoil", "none"
-_NOT_TABLED = (("inflow", "pitt-peters-static"), ("in_plane", "thrust-tilt"), ("delta3", True))
+    return chosen

@@ -23,7 +23,7 @@ from swashplate.models.conventional.helicopter import (
 from swashplate.models.conventional.helicopter_checks import check_numbers, with_added
 from swashplate.models.conventional.helicopter_choices import helicopter_choices, helicopter_effects
 from swashplate.models.conventional.helicopter_limits import doubts_by_kind, shaft_power
-from swashplate.models.conventional.helicopter_options import helicopter_options, with_whole_path
+from swashplate.models.conventional.helicopter_options import helicopter_options
 from swashplate.models.conventional.helicopter_parameters import UNITS, HelicopterParameters
 from swashplate.models.nesting import rebuild
 from swashplate.models.traits import Axis, Pose, RecordingFit, Traits
@@ -115,7 +115,7 @@ def conventional(card: Card) -> Vehicle:
         CardError: for a number that is missing, unknown, in another unit or impossible, or an unknown option.
     """
     options = helicopter_options(card)
-    card = with_whole_path(with_added(card, options).checked_against(UNITS))
+    card = with_added(card, options).checked_against(UNITS)
     check_numbers(card)
     speed = card.values()["rotor_speed"]
     nothing = HelicopterState(

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from swashplate.errors import ExportError
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
-from swashplate.physics import atmosphere, blade_element, flapping, ground_effect, inflow, tabled_blades
+from swashplate.physics import blade_element, flapping, ground_effect, inflow
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.flapping import Flapping
 from swashplate.physics.frames import Vector
 from swashplate.physics.inflow import Inflow
-from swashplate.physics.tabled_blades import TabledBlades
 
 _PI = 3.141592653589793
 
@@ -24,18 +22,13 @@ class Contribution(NamedTuple):
 
 
 class MainRotor(NamedTuple):
-    """The main rotor's loads on the fuselage, torque [N m], and the rates of disc [rad/s] and inflow [1/s].
-
-    `seen` is what the blades see, and `blades` they themselves where they have a table.
-    """
+    """The main rotor's loads on the fuselage, torque [N m], and the rates of disc [rad/s] and inflow [1/s]."""
 
     acting: Contribution
     torque: Scalar
     disc: Flapping
     inflow: Inflow | None
     induced: Scalar
-    seen: blade_element.Disc
-    blades: TabledBlades | None
 
 
 def main_rotor(
@@ -85,9 +78,8 @@ def main_rotor(
     blade = blade_element.WHOLE
     if options.tip_loss:
         blade = blade_element.span(par.rotor_tip_loss, par.rotor_root_cutout)
-    tabled = _tabled(tip, density, solidity, par, options, xp)
     # Moments of a shorter blade are those of a whole one with this lift slope (m3 is 1/4 there).
-    flap_slope = slope if blade is blade_element.WHOLE or tabled is not None else slope * 4.0 * blade.m3
+    flap_slope = slope if blade is blade_element.WHOLE else slope * 4.0 * blade.m3
     seen = blade_element.Disc(
         mu_x, mu_y, mu_z, 0.0, 0.0, 0.0, p / omega, q / omega, theta0, par.rotor_twist, A1, B1, 0.0, own.a1, own.b1
     )
@@ -121,12 +113,7 @@ def main_rotor(
             free = blade_element.thrust_coefficient(still_air, solidity, slope, blade)
             loss = free - blade_element.thrust_coefficient(more, solidity, slope, blade)
         lam0 = inflow.momentum_inflow(free, loss, mu_z, mu2, xp)
-        if tabled is not None:
-            near = 1.0
-            if options.ground_effect != "none":
-                near = _near_ground(height, mu2, lam0, par, options, xp)
-            lam0 = tabled_blades.tabled_inflow(seen, tabled, lam0, near, mu2=mu2, xp=xp)
-        elif options.ground_effect != "none":
+        if options.ground_effect != "none":
             loss = loss * _near_ground(height, mu2, lam0, par, options, xp)
             lam0 = inflow.momentum_inflow(free, loss, mu_z, mu2, xp)
         flow = Inflow(lam0, 0.0, 0.0)
@@ -148,23 +135,13 @@ def main_rotor(
     seen = seen._replace(lam0=flow.lam0, lam_c=flow.lam_c, lam_s=flow.lam_s)
 
     # Flapping: coning, then the tip-path plane's rates in space.
-    if tabled is None:
-        seen = _coned(seen, blade, held, par, flaps, options)
-    elif not options.coning:
-        seen = seen._replace(a0=par.precone)
-    else:
-        mean = tabled_blades.tabled_loads(seen._replace(a0=par.precone), tabled, xp).moments.mean
-        seen = seen._replace(a0=flapping.coning(mean, held, par.precone, free=1.0))
+    seen = _coned(seen, blade, held, par, flaps, options)
     bending = flapping.faded_wake_distortion(par.wake_distortion, mu2, par.wake_distortion_fade, xp)
     # Dynamic inflow has the wake's lag in its states.
     kept = 0.0 if options.inflow == "pitt-peters" else bending * flapping.wake_follows(held.excess, through2, xp)
     lag = (xp.cos(par.phase_lag), xp.sin(par.phase_lag)) if options.phase_lag else None
     tilted = seen._replace(a1=held.damping * own.a1, b1=held.damping * own.b1)
-    slopes = None
-    if tabled is None:
-        still = _moments(tilted._replace(p=0.0, q=0.0), blade)
-    else:
-        still, slopes = _tangent(tilted, tabled, (p / omega, q / omega), kept, held, xp)
+    still = _moments(tilted._replace(p=0.0, q=0.0), blade)
     plane_p, plane_q = flapping.plane_rates(
         own,
         still,
@@ -173,7 +150,6 @@ def main_rotor(
         wake_distortion=kept,
         phase_lag=lag,
         deficiency=deficiency,
-        slopes=slopes,
     )
     disc_rates = Flapping(omega * plane_q - q, sense * (omega * plane_p - p))
 
@@ -187,23 +163,11 @@ def main_rotor(
         lam_c, lam_s = lam_c + c - (cc * c + cs * s), lam_s + s - (cs * c + ss * s)
     moving = seen._replace(p=plane_p, q=plane_q, lam_c=lam_c, lam_s=lam_s)
     inflow_rates = None
-    twisting = Vector(0.0, 0.0, 0.0)  # on the hub, by the profile's own moment
-    if tabled is None:
-        CT = blade_element.thrust_coefficient(moving, solidity, slope, blade)
-        form = blade_element.thrust_tilt_loads if options.in_plane == "thrust-tilt" else blade_element.disc_loads
-        coefficients = form(moving, solidity, slope, par.rotor_drag + par.rotor_drag_thrust * CT * CT, blade)
-    else:
-        acting = tabled_blades.tabled_loads(moving, tabled, xp)
-        CT, rolled = acting.CT, sense * acting.roll
-        twisting = Vector(rolled * ct, acting.pitch, rolled * st)
-        coefficients = blade_element.DiscLoads(*acting[:4])
+    CT = blade_element.thrust_coefficient(moving, solidity, slope, blade)
+    form = blade_element.thrust_tilt_loads if options.in_plane == "thrust-tilt" else blade_element.disc_loads
+    coefficients = form(moving, solidity, slope, par.rotor_drag + par.rotor_drag_thrust * CT * CT, blade)
     if induced is not None:
-        by_q, by_p, by_q_sin, by_p_sin = slopes or (0.25, 0.0, 0.0, 0.25)
-        loading = blade_element.FlapMoments(
-            still.mean,
-            still.cos + by_q * plane_q + by_p * plane_p,
-            still.sin + by_q_sin * plane_q + by_p_sin * plane_p,
-        )
+        loading = blade_element.FlapMoments(still.mean, still.cos + 0.25 * plane_q, still.sin + 0.25 * plane_p)
         change = inflow.pitt_peters_rates(
             momentum,
             CT,
@@ -227,55 +191,7 @@ def main_rotor(
     force = Vector(ahead * ct + thrust * st, sense * pressure * coefficients.CY, ahead * st - thrust * ct)
     roll, yaw = held.moment * disc.b1, sense * torque
     moment = hub.cross(force) + Vector(roll * ct - yaw * st, held.moment * disc.a1, roll * st + yaw * ct)
-    if tabled is not None:
-        moment = moment + twisting.scaled(pressure * par.rotor_radius)
-    return MainRotor(Contribution(force, moment), torque, disc_rates, inflow_rates, flow.lam0 * tip, moving, tabled)
-
-
-def _tabled(
-    tip: Scalar, density: Scalar, solidity: Scalar, par: Any, options: HelicopterOptions, xp: Backend
-) -> TabledBlades | None:
-    """The blades with their table, in the standard day's air of this density; None without a table."""
-    if options.aerofoil is None:
-        return None
-    if xp.arrays is None:
-        raise ExportError(
-            "equations with an aerofoil table cannot be written as C: their sums over blade elements are not traced.",
-            channel="aerofoil",
-            hint="Export a linear model (swash linearize --out DIR), or leave the table out (--option aerofoil=none).",
-        )
-    temperature = atmosphere.temperature_of(density, xp)
-    reynolds = density * tip * par.rotor_chord / atmosphere.viscosity(temperature, xp)
-    ends = (par.rotor_root_cutout, par.rotor_tip_loss) if options.tip_loss else (0.0, 1.0)
-    mach, chord = tip / atmosphere.sound_speed(temperature, xp), par.rotor_chord / par.rotor_radius
-    return TabledBlades(options.aerofoil, solidity, par.rotor_lift_slope, chord, mach, reynolds, *ends)
-
-
-def _tangent(
-    tilted: blade_element.Disc,
-    blades: TabledBlades,
-    shaft: tuple[Scalar, Scalar],
-    kept: Scalar,
-    held: flapping.Hinge,
-    xp: Backend,
-) -> tuple[blade_element.FlapMoments, tuple[Scalar, Scalar, Scalar, Scalar]]:
-    """Flap moments with their slopes by the disc's turning, at a disc that turns with the shaft.
-
-    Exact where the disc stands still against the shaft, as in trim, and to second order in its rate elsewhere.
-
-    Returns:
-        The moments as `flapping.plane_rates` takes them, those of a disc that does not turn, and the slopes.
-    """
-    p, q = shaft
-    at = tabled_blades.tabled_loads(tilted._replace(p=(1.0 - kept) * p, q=(1.0 - kept) * q), blades, xp)
-    turned, rest = held.damping - kept, 0.25 * (1.0 - held.damping)
-    by_q, by_p, by_q_sin, by_p_sin = at.slopes
-    still = blade_element.FlapMoments(
-        at.moments.mean,
-        at.moments.cos - turned * (by_q * q + by_p * p) - rest * q,
-        at.moments.sin - turned * (by_q_sin * q + by_p_sin * p) - rest * p,
-    )
-    return still, at.slopes
+    return MainRotor(Contribution(force, moment), torque, disc_rates, inflow_rates, flow.lam0 * tip)
 
 
 def _moments(seen: blade_element.Disc, blade: blade_element.Span) -> blade_element.FlapMoments:

@@ -20,7 +20,6 @@ SECTIONS: Registry[Callable[[Any], Section]] = Registry(
         "ModelComparison": f"{_HERE}.of_comparison:section_of_comparison",
         "Residuals": f"{_HERE}.of_comparison:section_of_residuals",
         "Suggestion": f"{_HERE}.views:section_of_gains",
-        "HeightVelocity": "swashplate.reporting.height_velocity_page:section_of_height_velocity",
         "TrimCurve": f"{_MODELS}:section_of_trims",
         "Derivatives": f"{_MODELS}:section_of_derivatives",
         "LinearModel": f"{_MODELS}:section_of_linear_model",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +11,7 @@ import swashplate as sp
 from swashplate.errors import FlightError, SwashError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
-from swashplate.links.live import film
 from swashplate.links.live.replay import Replay, as_json, floor, gaps, replay
-from swashplate.links.live.wireframe import Camera, helicopter
 from swashplate.simulation.sensors import QUIET
 
 
@@ -172,56 +168,3 @@ def test_the_page_gets_everything_it_draws(shown: Replay) -> None:
 
 def test_gaps_are_seen() -> None:
     assert gaps(np.array([0.0, 0.1, 0.2, 1.0, 1.1])).tolist() == [False, False, False, True, False]
-
-
-def test_the_camera_sees_ahead_as_up_and_east_as_right() -> None:
-    camera = Camera(np.zeros(3), heading=0.0, distance=10.0, lift=0.3)
-    middle, ahead, right, above = camera.project(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -1.0]]))
-    assert np.allclose(middle, 0.0)
-    assert ahead[1] > 0.0
-    assert abs(ahead[0]) < 1e-12
-    assert right[0] > 0.0
-    assert above[1] > ahead[1]
-    assert np.all(np.isnan(camera.project(np.array([[-50.0, 0.0, -20.0]]))))
-
-
-def test_the_drawn_disc_leans_with_the_rotor(shown: Replay) -> None:
-    from swashplate.links.live.picture import picture
-
-    shape = picture(shown.vehicle)
-    x = np.zeros(12)
-    parts = {"rotors": [[0.1, 0.0, 100.0, 0.0, 0.0, -10.0]], "bar": None, "tail": None}
-    disc = next(points for kind, points in helicopter(shape, x, parts, time=0.0) if kind == "disc")
-    east = disc[np.argmax(disc[:, 1])]
-    west = disc[np.argmin(disc[:, 1])]
-    assert east[2] > west[2] + 0.1 * shape["size"], "a disc that leans right is low on the right"
-
-
-def test_a_film_is_a_film(shown: Replay, tmp_path: Path) -> None:
-    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg is not installed")
-    told: list[tuple[int, int]] = []
-    count = film.write_film(shown, tmp_path / "flight.mp4", rate=1.0, tell=lambda done, of: told.append((done, of)))
-    assert told[-1] == (count, count) == (6, 6)
-    probed = subprocess.run(
-        [ffmpeg.get_ffmpeg_exe(), "-i", tmp_path / "flight.mp4", "-f", "null", "-"], capture_output=True, text=True
-    ).stderr
-    assert "1280x720" in probed
-    assert "h264" in probed
-    assert [path.name for path in tmp_path.iterdir()] == ["flight.mp4"]
-
-
-def test_pictures_change_with_the_flight(shown: Replay, tmp_path: Path) -> None:
-    assert film.write_pictures(shown, tmp_path / "frames", rate=1.0) == 6
-    names = sorted(path.name for path in (tmp_path / "frames").iterdir())
-    assert names == [f"frame-{n:05d}.png" for n in range(1, 7)]
-    assert len({(tmp_path / "frames" / name).read_bytes() for name in names}) == 6
-
-
-def test_what_ffmpeg_cannot_write_is_told(shown: Replay, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg is not installed")
-    with pytest.raises(SwashError, match=r"ends in '\.avi'"):
-        film.write_film(shown, tmp_path / "flight.avi")
-    monkeypatch.setattr(ffmpeg, "get_ffmpeg_exe", lambda: shutil.which("false"))
-    with pytest.raises(SwashError, match="ffmpeg could not write it"):
-        film.write_film(shown, tmp_path / "flight.mp4", rate=2.0)
-    assert not list(tmp_path.iterdir())

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hand_disc_differential import disc_differential, flow_change, inflow_change, skew_change
 from swashplate.arrays import Array
 from swashplate.models.conventional.derivative_table import COLUMNS
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
 from swashplate.physics import blade_element, flapping, inflow
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.blade_element import Disc
-from swashplate.physics.disc_differential import disc_differential, flow_change, inflow_change, skew_change
 from swashplate.physics.frames import Vector
 
 _XP = FloatBackend()

@@ -11,16 +11,16 @@ from functools import partial
 
 import numpy as np
 
-from swashplate.arrays import Array
-from swashplate.errors import SwashError
-from swashplate.models.conventional.buildup_airframe import (
+from hand_buildup_airframe import (
     Wake,
     fin_slopes,
     fuselage_slopes,
     tail_rotor_slopes,
     tailplane_slopes,
 )
-from swashplate.models.conventional.buildup_main_rotor import main_rotor_slopes
+from hand_buildup_main_rotor import main_rotor_slopes
+from swashplate.arrays import Array
+from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import DerivativeTable
 from swashplate.models.conventional.helicopter import HelicopterState
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
@@ -64,7 +64,6 @@ def build_up(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> 
         "tip_loss, induced_factor or ground_effect": options.tip_loss
         or options.induced_factor
         or options.ground_effect != "none",
-        "aerofoil tables": options.aerofoil is not None,
         "tail rotors in the main rotor's wake": options.tail_in_wake,
     }
     for words, chosen in without.items():

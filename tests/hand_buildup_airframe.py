@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hand_buildup_main_rotor import changes
+from hand_disc_differential import inflow_change
 from swashplate.arrays import Array
-from swashplate.models.conventional.buildup_main_rotor import changes
 from swashplate.models.conventional.derivative_table import COLUMNS
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
 from swashplate.physics import inflow, tail_rotor, tail_surfaces
 from swashplate.physics.backend import FloatBackend
-from swashplate.physics.disc_differential import inflow_change
 from swashplate.physics.frames import Vector
 
 _XP = FloatBackend()
