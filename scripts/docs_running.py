@@ -73,12 +73,14 @@ class Command:
     @property
     def slow(self) -> bool:
         """Minutes long: real flights are identified from, or predicted; a helicopter's derivatives are compiled."""
-        long = _REAL in self.line or self.words[1] == "demo" or "raptor" in self.line
-        return self.words[0] == "swash" and self.words[1] in _SLOW and long
+        long = _REAL in self.line or "demo" in self.words[:2] or "raptor" in self.line
+        return self.words[0] == "swash" and long and set(self.words[1:2]) <= set(_SLOW)
 
     @property
     def runs(self) -> bool:
-        return self.words[0] == "swash" and not self.line.startswith(("swash data fetch", "swash live", "swash replay"))
+        """Whether it ends by itself, without a network."""
+        served = self.line == "swash" or self.line.startswith(("swash live", "swash replay"))
+        return self.words[0] == "swash" and not served and not self.line.startswith("swash data fetch")
 
 
 def commands(fence: Fence) -> list[Command]:

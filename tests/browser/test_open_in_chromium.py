@@ -150,6 +150,18 @@ def test_a_dropped_log_is_drawn_zoomed_and_searched(browser: Any, address: str, 
     visit.close()
 
 
+def test_a_card_opens_a_flight_that_ships_and_names_its_command(browser: Any, address: str) -> None:
+    visit = Visit(browser, address)
+    assert visit.of("getComputedStyle(document.getElementById('views')).display") == "none", "nothing to view yet"
+    visit.page.click("[data-try='helicopter_sweeps.bin']")
+    drawn(visit)
+    visit.until("document.querySelectorAll('#sweeps button').length === 2")
+    visit.view("code")
+    codes = visit.of("[...document.querySelectorAll('[data-code=\"Command line\"]')].map(e => e.textContent)")
+    assert "swash inspect examples/helicopter_sweeps.bin" in codes
+    visit.close()
+
+
 def test_a_flipped_gyro_is_told_and_mended_by_its_button(browser: Any, address: str, tmp_path: Path) -> None:
     table(tmp_path / "flipped.csv", flip=True)
     visit = Visit(browser, address)

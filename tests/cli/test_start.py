@@ -66,8 +66,15 @@ def test_version(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "casadi not installed, numpy 1.2.3" in told.out
 
 
-def test_without_a_verb_there_is_help_and_a_usage_error() -> None:
-    assert swash().code == 2
+def test_without_a_verb_the_page_opens_and_help_lists_the_verbs(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr("swashplate.api.open_logs.open_logs", lambda logs, **given: asked.append((logs, given)))
+    assert swash().code == 0
+    assert [(logs, given["port"], given["open_page"]) for logs, given in asked] == [((), None, True)]
+    told = swash("--help")
+    assert told.code == 0
+    assert "identify" in told.out
+    assert len(asked) == 1, "help opens nothing"
 
 
 def test_an_unknown_verb_and_a_missing_option_are_usage_errors() -> None:

@@ -42,6 +42,7 @@ STARTS = {
     "flights/foreign.py": "own_python",
     "links/ardupilot/sitl.py": "an autopilot that the user names",
     "links/live/identifying.py": "own_python",
+    "links/logs/cockpit.py": "own_python",
     "systems.py": "ends what sitl.py has started",
 }
 """Files that start processes, and what: a new one is looked at here before it is added."""

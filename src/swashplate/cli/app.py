@@ -52,7 +52,7 @@ app = typer.Typer(
     help="From a small helicopter's flight log to a validated model.",
     rich_markup_mode=None,  # plain help: rich takes longer to load than everything else that --help needs
     pretty_exceptions_enable=False,
-    no_args_is_help=True,
+    invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
@@ -70,6 +70,7 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def root(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
@@ -77,7 +78,9 @@ def root(
         bool, typer.Option("--debug", help="Show the full traceback of an error (or set SWASHPLATE_DEBUG=1).")
     ] = False,
 ) -> None:
-    """From a small helicopter's flight log to a validated model."""
+    """From a small helicopter's flight log to a validated model. Without a verb, a page to try it on opens."""
+    if context.invoked_subcommand is None:
+        open.open_(port=None, open_page=True)
 
 
 app.command("identify", short_help="Identify a vehicle from flights, with a report.")(identify.identify)

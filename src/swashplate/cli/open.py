@@ -19,7 +19,10 @@ def open_(
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
-    port: live.Port = 8019,
+    port: Annotated[
+        int | None,
+        typer.Option("--port", help="Port of the page; 0 takes any free one. If not given: 8019.", min=0, max=65535),
+    ] = None,
     host: live.Host = "127.0.0.1",
     allow_remote: Remote = False,
     open_page: live.Open = False,
@@ -27,7 +30,8 @@ def open_(
 ) -> None:
     """Look at logs in the browser: plots, problems and their corrections, events, spectra, track, sweeps to gains.
 
-    Every view says which command and which lines of Python do the same.
+    Without a log the page offers examples that come with the package, and a place to drop files; `swash` alone opens
+    it. Every view says which command and which lines of Python do the same.
     """
     from swashplate.api.open_logs import open_logs
     from swashplate.cli.console import progress

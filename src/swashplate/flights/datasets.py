@@ -14,6 +14,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from swashplate.errors import DatasetError
+from swashplate.flights import example_logs
 from swashplate.registry import nearest
 
 
@@ -296,6 +297,8 @@ def fetch(name: str, *, registry: Mapping[str, Dataset] = REGISTRY) -> tuple[Pat
 def locate(path_or_name: str | Path, *, registry: Mapping[str, Dataset] = REGISTRY) -> Path:
     """The file that a user means: a path, or a registered file as "coax56/flight_2011-08-01_vertical".
 
+    "examples/NAME" is one of those that come with the package.
+
     A path that exists wins. What is neither is returned as a path, for the reader to say that it is missing.
 
     Raises:
@@ -303,6 +306,8 @@ def locate(path_or_name: str | Path, *, registry: Mapping[str, Dataset] = REGIST
     """
     path = Path(path_or_name)
     name, _, file = path.as_posix().partition("/")
+    if name == example_logs.NAME and not path.exists() and (shipped := example_logs.example(file)):
+        return shipped
     if path.exists() or name not in registry or not file:
         return path
     files = registry[name].files

@@ -80,6 +80,8 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
         Route("/logs", ask.get(desk.as_dict)),
         _post("/upload", begin, name=ask.text(1000), size=ask.whole(0, 1 << 50)),
         Route("/upload/{token}/{at:number}", piece, methods=["POST"]),
+        _post("/example", lambda file: {"log": desk.open_example(file).number}, file=_NAME),
+        _post("/fly", desk.cockpit.begin),
         _post("/close", close, log=_LOG),
         _post("/apply", apply, log=_LOG, units=ask.names(200, 60), drop_bad_stamps=ask.switch),
         _post(

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from swashplate.errors import SwashError
-from swashplate.flights.conditioning.synchronise import synchronise
+from swashplate.flights import example_logs
 from swashplate.flights.flight import did_you_mean
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.bins import trace
+from swashplate.links.logs.cockpit import Cockpit
 from swashplate.links.logs.code_lines import Read
 from swashplate.links.logs.identify_sweep import Identified, Tell, identify_sweep
 from swashplate.links.logs.job import PageJob
@@ -38,11 +39,13 @@ class Desk:
         self._logs: dict[int, Opened] = {}
         self.uploads = Uploads()
         self.job = PageJob()
+        self.cockpit = Cockpit()
         for path, read in given:
             self._put(path, read)
 
     def close(self) -> None:
         """Stop what runs, and remove what was dropped and made."""
+        self.cockpit.close()
         self.job.close()
         self.uploads.close()
 
@@ -57,15 +60,26 @@ class Desk:
             self._logs[number] = made = Opened(number, path, read)
         return made
 
-    def open(self, path: Path) -> Opened:
-        """A file that was dropped, read.
+    def open(self, path: Path, name: str = "") -> Opened:
+        """A file that was dropped, read under its name, or under that by which a command finds it.
 
         Raises:
             SwashError: where too many logs are open.
         """
-        made = self._put(path, Read(path.name))
+        made = self._put(path, Read(name or path.name))
         made.load(made.read)
         return made
+
+    def open_example(self, file: str) -> Opened:
+        """A log that comes with the package.
+
+        Raises:
+            SwashError: where there is none of this name.
+        """
+        path = example_logs.example(file)
+        if path is None:
+            raise SwashError(f"there is no example '{file}'.", hint="Reload the page.")
+        return self.open(path, f"{example_logs.NAME}/{path.name}")
 
     def read_given(self) -> None:
         """Read what the command line gave, one after the other."""
@@ -104,7 +118,9 @@ class Desk:
         """Every log as the page lists it, and what may be dropped."""
         with self._lock:
             logs = list(self._logs.values())
-        return {"logs": [log.as_dict() for log in logs], "largest": LARGEST, "piece": PIECE}
+        examples = [{"file": e.file, "title": e.title, "words": e.words} for e in example_logs.EXAMPLES]
+        listed = [log.as_dict() for log in logs]
+        return {"logs": listed, "largest": LARGEST, "piece": PIECE, "examples": examples}
 
     # ---- what is drawn -----------------------------------------------------------------------------------------
     def traces(self, wanted: Sequence[tuple[int, str, float, float]], *, bins: int) -> list[dict[str, Any]]:
@@ -143,6 +159,8 @@ class Desk:
         Raises:
             SwashError: where the two share no motion, or what they share does not match.
         """
+        from swashplate.flights.conditioning.synchronise import synchronise  # SciPy's images take half a second
+
         one, other = self.log(first), self.log(second)
         shift = synchronise(one.ready, other.ready)
         middle = 0.5 * (other.ready.start + other.ready.stop)

@@ -10,6 +10,7 @@ import * as parameters from "./parameters.js";
 import * as plots from "./plots.js";
 import { post } from "./server.js";
 import * as spectrum from "./spectrum.js";
+import * as start from "./start.js";
 import * as state from "./state.js";
 import * as theme from "./theme.js";
 import * as track from "./track.js";
@@ -22,6 +23,7 @@ let known = "";
 
 // What is drawn of a log that has just come: rates, attitude and commands where it has them, else its first channels.
 function greet() {
+  document.body.toggleAttribute("data-logs", state.logs.size > 0);
   views.count();
   const now = [...state.logs.values()].map((log) => `${log.id}:${log.version}:${log.state}`).join(" ");
   if (now === known) return;
@@ -42,11 +44,14 @@ function greet() {
   state.say("charts");
 }
 
-for (const part of [trouble, code, views, channel_list, log_list, plots, findings, events, parameters, spectrum, track, identify, drop]) part.begin();
+for (const part of [trouble, code, views, channel_list, log_list, plots, findings, events, parameters, spectrum, track, identify, drop, start]) part.begin();
 state.on("logs", greet);
 theme.begin();
 const told = await log_list.refresh();
-if (told) drop.allow(told);
+if (told) {
+  drop.allow(told);
+  start.offer(told.examples);
+}
 state.say("charts");
 window.swash = { state, post };
 document.documentElement.dataset.ready = "yes";
