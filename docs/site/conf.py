@@ -1,4 +1,4 @@
-"""The site made from docs/ by `make site`: Sphinx, MyST and the pydata theme (docs/decisions/0045)."""
+"""The site made from docs/ by `make site`: Sphinx, MyST and the pydata theme."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def test_a_batch_is_measured_on_the_device_that_is_there(monkeypatch: pytest.Mon
 def test_a_coax_in_float32_stays_with_float64_for_a_second() -> None:
     found = device.measure(sp.vehicle("coax"), vehicles=64, repeats=1)
     assert found.close
-    # What decision 142 reckons with.
+    # What `research/speed.md` reckons with.
     assert found.flops == pytest.approx(12_477, rel=0.1)
     assert found.bytes == pytest.approx(10_908, rel=0.3)
 

@@ -25,7 +25,7 @@ Slope = Callable[[Array], tuple[float, Array]]
 """Cost and gradient at a scaled row, priors not included; several threads ask it."""
 
 _ACCEPTED = 0.8
-"""Mean acceptance that the step is chosen for: longer steps mix worse on a real flight (decision 119)."""
+"""Mean acceptance that the step is chosen for: longer steps mix worse on a real flight (decision 167)."""
 _FIRST_STEP = 0.5
 _DOUBLINGS = 8
 _RAN_AWAY = 1000.0
