@@ -59,14 +59,14 @@ speed: $(STAMP)
 	$(QUICK) $(BIN)/python -m benchmarks.run --short
 
 proof: $(STAMP)
-	$(BIN)/python scripts/proof.py
+	$(BIN)/python -m tests.proof
 
-# Sizes: make siege SIEGE="--minutes 10 --only files"; see python scripts/siege.py --help
+# Sizes: make siege SIEGE="--minutes 10 --only files"; see python -m tests.siege.run --help
 siege: $(STAMP)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python scripts/siege.py $(SIEGE)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.siege.run $(SIEGE)
 
 site: $(STAMP)
-	$(BIN)/python scripts/build_site.py
+	$(BIN)/python docs/site/build_site.py
 
 clean:
 	rm -rf src/swashplate/links/live/page/vendor .venv build dist demo .pytest_cache .ruff_cache .hypothesis .import_linter_cache

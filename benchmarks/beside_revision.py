@@ -1,6 +1,6 @@
 """Whole commands beside those of an older revision, in turn on the same machine: how much has changed, whatever it is.
 
-python -m benchmarks.beside_revision REVISION [--repeats 3] [--out FILE.json]    FILE: for scripts/proof.py --put
+python -m benchmarks.beside_revision REVISION [--repeats 3] [--out FILE.json]    FILE: for tests/proof.py --put
 
 Both codes run with the libraries that are installed, with caches of their own: empty, then filled.
 """
@@ -71,7 +71,7 @@ def measure(revision: str, *, repeats: int) -> dict[tuple[str, str], list[dict[s
 
 
 def as_section(found: dict[tuple[str, str], list[dict[str, float]]], revision: str) -> dict[str, Any]:
-    """The measured runs in the form of scripts/proof.py: medians, and the share that is left of the former time."""
+    """The measured runs in the form of tests/proof.py: medians, and the share that is left of the former time."""
 
     def median(what: str, code: str, kind: str) -> float:
         return statistics.median(run[kind] for run in found[what, code])

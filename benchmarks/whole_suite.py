@@ -1,6 +1,6 @@
 """`make test` beside that of an older revision, in turn on the same machine: each in a clone with nothing compiled.
 
-python -m benchmarks.whole_suite REVISION [--out FILE.json]    FILE: for scripts/proof.py --put
+python -m benchmarks.whole_suite REVISION [--out FILE.json]    FILE: for tests/proof.py --put
 
 This code runs before and after the older one, so that a machine that becomes slower is seen. Fifty minutes, all in all.
 """
@@ -60,7 +60,7 @@ def suite(revision: str) -> dict[str, float]:
 
 
 def as_section(former: dict[str, float], this: list[dict[str, float]], revision: str) -> dict[str, Any]:
-    """The measured runs in the form of scripts/proof.py, with the share that is left of the former time."""
+    """The measured runs in the form of tests/proof.py, with the share that is left of the former time."""
     clock = statistics.mean(run["clock"] for run in this)
     share = clock / former["clock"]
     runs = [("former", former), *(("this", run) for run in this)]

@@ -1,9 +1,9 @@
 """Choice of what a fit frees and how far ahead it looks, by blocked cross-validation inside one flight: a table.
 
-    python scripts/choose_by_blocks.py august|july [CHOICE ...]
+    python research/choose_by_blocks.py august|july [CHOICE ...]
 
 Each third of the flight's longest record is predicted by what the other two taught, with their delays, trims and noise;
-no other flight is looked at. Some minutes of processor time. The table is in docs/decisions/0099.
+no other flight is looked at. Some minutes of processor time. The table is in real-flights.md.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from real_flights import CHANNELS, FLIGHTS
+from flights import CHANNELS, FLIGHTS
 
 import swashplate as sp
 from swashplate.arrays import Array

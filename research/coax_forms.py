@@ -1,6 +1,6 @@
 """The CoaX's rotor forms on the real flights: what each learns from one, and how it predicts the other. A table.
 
-    python scripts/coax_forms.py
+    python research/coax_forms.py
 
 Some minutes of processor time. The table is in docs/explanation/coax-model.md.
 """
@@ -11,7 +11,7 @@ import sys
 import time
 
 import held_out
-from real_flights import FLIGHTS
+from flights import FLIGHTS
 
 import swashplate as sp
 

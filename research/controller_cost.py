@@ -1,6 +1,6 @@
 """What one step of an exported controller costs: instructions (callgrind), stack (gcc), code and constants (size).
 
-    python scripts/controller_cost.py CONTROLLER.c [...]
+    python research/controller_cost.py CONTROLLER.c [...]
 
 Needs gcc, binutils and valgrind. The instructions are counted on the machine that it runs on, over random readings, the
 largest count of them given; they hold the C library's sin, cos, sqrt and atan2, the only part that branches.

@@ -1,6 +1,6 @@
 """How straight the models fly that a fit cannot tell apart, which numbers make the spread, and what takes it out.
 
-    python scripts/drift_study.py FIT_FOLDER [MODELS]
+    python research/drift_study.py FIT_FOLDER [MODELS]
 
 FIT_FOLDER is what `swash identify --vehicle coax ... --out FIT_FOLDER` wrote. The tables are those of
 docs/howto/decouple-and-hold.md; minutes.

@@ -1,6 +1,6 @@
 """The paper's Fig. 10 (a step of the pitch command over 6 m) for the model of the August flight, as it would be flown.
 
-    python scripts/figure_10.py [MODELS]
+    python research/figure_10.py [MODELS]
 
 The model is that of the tutorial "first model", with its identified delays. It and MODELS (60) drawn from the fit's
 covariance fly the step with three laws (none, the paper's, ours), each in gusts of its own, and once in still air. The
@@ -12,7 +12,7 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from real_flights import FLIGHTS
+from flights import FLIGHTS
 
 import swashplate as sp
 from swashplate.api.decouple import FlownStep

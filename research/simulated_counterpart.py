@@ -1,11 +1,11 @@
 """Do the bounds of a real flight's fit cover the truth? Its model flown in simulation, and identified again.
 
-    python scripts/simulated_counterpart.py august|july [SEEDS]
+    python research/simulated_counterpart.py august|july [SEEDS]
 
 18 s under a hover hold with small multisines in all axes, in still air and in gusts of wind (0.1 m/s per axis), without
 and with the line of the upper rotor in height and attitude that the cameras see. By likelihood, by errors ahead as
 on the page of the real flights, and by likelihood with a wind. What it says is in docs/explanation/what-to-trust.md and
-docs/decisions/0018. Ten seconds a fit, three quarters of a minute with a wind.
+real-flights.md. Ten seconds a fit, three quarters of a minute with a wind.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from real_flights import CHOICE, FLIGHTS, HORIZON
+from flights import CHOICE, FLIGHTS, HORIZON
 from scipy.signal import lfilter
 
 import swashplate as sp

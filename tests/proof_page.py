@@ -9,7 +9,7 @@ from typing import Any
 
 
 def leave(name: str, found: dict[str, Any]) -> None:
-    """Write a section of the page (see scripts/proof.py) where `make proof` asks for it."""
+    """Write a section of the page (see tests/proof.py) where `make proof` asks for it."""
     folder = os.environ.get("SWASHPLATE_PROOF")
     if folder:
         Path(folder, f"{name}.json").write_text(json.dumps(found), encoding="utf-8")

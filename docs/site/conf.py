@@ -6,7 +6,7 @@ import gc
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 gc.set_threshold(200_000, 50, 1000)  # pages are many small objects that stay; looking for garbage took a seventh
 
 project = "swashplate"
@@ -25,6 +25,7 @@ html_copy_source = False
 html_show_sourcelink = False
 html_show_search_summary = False  # it is fetched, which browsers refuse for files
 html_context = {"default_mode": "auto"}
+html_search_scorer = str(Path(__file__).with_name("search_scorer.js"))
 html_show_sphinx = False
 html_show_copyright = False
 html_sidebars = {"index": [], "search": []}

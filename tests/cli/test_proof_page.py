@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from pathlib import Path
-from typing import Any
 
-import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests import proof
+from tests.siege.run import siege_section
 
 
-@pytest.fixture
-def proof() -> Any:
-    spec = importlib.util.spec_from_file_location("proof", ROOT / "scripts" / "proof.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_every_result_becomes_a_section(proof: Any, tmp_path: Path) -> None:
+def test_every_result_becomes_a_section(tmp_path: Path) -> None:
     recovery = {
         "title": "Recovery",
         "text": "50 seeds.",
@@ -45,7 +32,7 @@ def test_every_result_becomes_a_section(proof: Any, tmp_path: Path) -> None:
         assert part in page, page
 
 
-def test_a_section_is_put_anew_and_the_others_stay(proof: Any) -> None:
+def test_a_section_is_put_anew_and_the_others_stay() -> None:
     sections = [{"title": title, "text": f"old {title}.", "passed": True} for title in ("A", "Speed", "Speed of B")]
     page = "# Proof\n\n" + "\n\n".join(map(proof.section, sections)) + f"\n\n{proof.BEGIN}\n\nS\n\n{proof.END}\n"
     again = proof.put(page, {"title": "Speed", "text": "new.", "passed": False}, "2026-11-27")
@@ -56,7 +43,7 @@ def test_a_section_is_put_anew_and_the_others_stay(proof: Any) -> None:
     assert added == page.replace(proof.BEGIN, f"## C\n\nRun by itself on 2026-11-27. more.\n\n{proof.BEGIN}")
 
 
-def test_what_ran_by_itself_stays_where_a_later_run_lacks_it(proof: Any) -> None:
+def test_what_ran_by_itself_stays_where_a_later_run_lacks_it() -> None:
     page = proof.put("# Proof\n", {"title": "Slurm", "text": "two jobs.", "passed": True}, "2026-11-28")
     page = proof.put(page, {"title": "Speed", "text": "slow.", "passed": False}, "2026-11-28")
     page = proof.with_siege(
@@ -70,12 +57,7 @@ def test_what_ran_by_itself_stays_where_a_later_run_lacks_it(proof: Any) -> None
 
 
 def test_a_campaign_that_has_not_run_here_stays_as_the_page_has_it(tmp_path: Path) -> None:
-    spec = importlib.util.spec_from_file_location("besieging", ROOT / "scripts" / "siege.py")
-    assert spec is not None
-    assert spec.loader is not None
-    siege = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(siege)
-    page = siege.proof.with_siege("# Proof", "# Siege\n\nx\n\n## Disks\n\nold disks\n\n## Files\n\nold files")
+    page = proof.with_siege("# Proof", "# Siege\n\nx\n\n## Disks\n\nold disks\n\n## Files\n\nold files")
     (tmp_path / "files-0.json").write_text(json.dumps({"title": "Files", "text": "new files"}), encoding="utf-8")
-    made = siege.siege_section(tmp_path, page)
+    made = siege_section(tmp_path, page)
     assert made.endswith("## Disks\n\nold disks\n\n## Files\n\nnew files")

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import ast
-import importlib.util
 import inspect
 import re
 import runpy
-import sys
 from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
+import block_diagram as diagram
+import docs_pages as docs
+import docs_running as running
 import matplotlib as mpl
 import pytest
 import typer
@@ -27,17 +27,6 @@ ROOT = Path(__file__).resolve().parents[2]
 _FLIGHTS = ("flight_2011-08-01_vertical.mat", "flight_2011-07-25_hover_crash.mat")
 
 
-def _script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
-running, docs, diagram = _script("docs_running"), _script("docs_pages"), _script("block_diagram")
 PAGES = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in docs.pages()}
 HEAVY = {
     "docs/explanation/flights-under-feedback.md",
@@ -141,12 +130,12 @@ def test_a_command_is_one_that_the_command_line_takes(name: str, command: Any) -
 
 @pytest.mark.parametrize("name", [name for name, text in PAGES.items() if "<!-- generated:" in text])
 def test_what_is_generated_is_current(name: str) -> None:
-    assert docs.regenerated(PAGES[name]) == PAGES[name], "run: python scripts/docs_pages.py"
+    assert docs.regenerated(PAGES[name]) == PAGES[name], "run: python docs/site/docs_pages.py"
 
 
 def test_the_block_diagram_is_that_of_the_equations() -> None:
     assert diagram.as_svg(diagram.Trace()) == diagram.PICTURE.read_text(encoding="utf-8"), (
-        "run: python scripts/block_diagram.py"
+        "run: python docs/site/block_diagram.py"
     )
 
 

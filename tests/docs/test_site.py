@@ -61,7 +61,7 @@ def built(folder: Path, *options: str, docs: Path = DOCS) -> Path:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site of `make site`."""
-    assert "scripts/build_site.py" in (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nsite:")[2][:80]
+    assert "docs/site/build_site.py" in (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nsite:")[2][:80]
     return built(tmp_path_factory.mktemp("whole"))
 
 
@@ -262,6 +262,9 @@ def test_a_reader_searches_a_word_and_follows_a_door(browser: Any, site: Path, s
     page.keyboard.press("Enter")
     page.wait_for_url("**/search.html?*")
     page.locator("#search-results li a[href*='howto/identify-from-a-sweep.html']").first.wait_for()
+    weighed = "name => Scorer.score([name, '', '', '', 100, ''])"
+    user, decision, proof = (page.evaluate(weighed, n) for n in ("howto/install", "decisions/0001-x", "proof"))
+    assert user == 100 > decision > proof, "pages of users come first"
 
     page.goto((site / "index.html").as_uri())
     page.locator(".bd-article a[href='doors/tune-an-autopilot.html']").first.click()

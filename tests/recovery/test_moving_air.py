@@ -1,6 +1,7 @@
 """A CoaX that hovers under feedback in moving air, seen by cameras that its upper rotor shakes, is identified again.
 
-The counterpart of the July flight in short: one seed; scripts/simulated_counterpart.py has both flights and more seeds.
+The counterpart of the July flight in short: one seed; both flights and more
+seeds: research/simulated_counterpart.py.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ _CLOSE = 5.0
 
 _ANSWERS = "on commands that answer the motion it may beat a model that is right"
 """A true model of a quadrotor, flown in gusts by its autopilot, loses to it by hundreds of points in the simulation of
-`scripts/multirotor_verdict.py`."""
+`research/multirotor.md`."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Both real CoaX flights, each predicted by what the other one taught: docs/real-flights.md and what quotes it.
 
-    python scripts/real_flights.py
+    python docs/site/real_flights.py
 
 About five minutes on 2 cores. Everything on the page is computed here; nothing is typed in.
 """
@@ -19,11 +19,11 @@ import swashplate as sp
 from swashplate.validation.floors import CLOSED_ROWS, ROWS
 from swashplate.validation.validation import PREDICTORS
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 FLIGHTS = {"august": "coax56/flight_2011-08-01_vertical", "july": "coax56/flight_2011-07-25_hover_crash"}
 CHANNELS = ("u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 CHOICE, HORIZON, CLOSED = "balanced", (0.25, 1.0), ("yaw",)
-"""By blocked cross-validation inside each flight (`scripts/choose_by_blocks.py`, docs/decisions/0099)."""
+"""By blocked cross-validation inside each flight (`research/choose_by_blocks.py`, decision 99)."""
 WANTED = {0.5: ("phi", "theta", "p", "q", "u", "v"), 1.0: ("phi", "theta", "p", "q"), 2.0: ("phi", "theta", "p", "q")}
 """Where the model is to beat every rival: horizon [s] and channels."""
 
@@ -129,7 +129,7 @@ def main() -> int:
     command = (
         f"--free {CHOICE} --horizon {HORIZON[0]:g},{HORIZON[1]:g} --keep-unexcited --close-loop {','.join(CLOSED)}"
     )
-    said = f"Written by `scripts/real_flights.py`; do not edit. As `swash identify` with `{command}` makes it."
+    said = f"Written by `docs/site/real_flights.py`; do not edit. As `swash identify` with `{command}` makes it."
     page = "\n\n".join(["# The real flights", said, *sections])
     (ROOT / "docs" / "real-flights.md").write_text(page + "\n", encoding="utf-8")
     for quoting in (ROOT / "README.md", ROOT / "docs" / "explanation" / "what-to-trust.md"):

@@ -1,6 +1,6 @@
 """Besieges the program and writes what came out into docs/proof.md, between its two marks: `make siege` (an hour).
 
-    python scripts/siege.py [--minutes M] [--only NAME] [--files N] [--kills N] [--packets N] ...
+    python -m tests.siege.run [--minutes M] [--only NAME] [--files N] [--kills N] [--packets N] ...
 
 Campaigns: `files` (damaged logs and documents), `kills` (hard kills, and disks that break), `disks` (a small disk that
 is full or read-only, mounted for it), `places` (paths that are no file), `packets` (everything that listens), `pages`
@@ -9,7 +9,7 @@ little of everything). Each ends at its number or at its share of the minutes, w
 what was reached. Exit code 1 where anything fell. `make proof` leaves the section as it is.
 
 What is found on top of these (a soak of links, say) is a JSON file build/siege/NAME.json in the form of
-`scripts/proof.py`; all that are there are written.
+`tests/proof.py`; all that are there are written.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import proof
+from tests import proof
 
 ROOT = proof.ROOT
 FOLDER = ROOT / "build" / "siege"

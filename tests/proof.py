@@ -2,7 +2,7 @@
 
 Three fifths of its tests took 54 minutes on two slow cores.
 
-    python scripts/proof.py [--assemble-only | --put FILE ...]
+    python -m tests.proof [--assemble-only | --put FILE ...]
 
 Tests marked `proof` and the benchmarks leave JSON files in build/proof (the folder that SWASHPLATE_PROOF names):
 
@@ -12,7 +12,7 @@ Tests marked `proof` and the benchmarks leave JSON files in build/proof (the fol
 `python -m benchmarks.run --out` writes. Files of an earlier run are removed first, so that nothing old is reported.
 With `--put`, nothing runs: sections of the given files take the places of those of the same title, and say their day.
 Such sections stay where a later run has none of that title: it had no Slurm, no Kubernetes or no older code beside it.
-What `make siege` wrote into the page (scripts/siege.py) is kept.
+What `make siege` wrote into the page (tests/siege/run.py) is kept.
 """
 
 from __future__ import annotations

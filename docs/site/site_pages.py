@@ -3,6 +3,7 @@
 * A page with `<!-- navigation -->` gives its children by its own lists: every item that begins with a link to a page,
   under its heading of the second level. So the list that a person reads and the navigation are the same.
 * A link to a file of the repository's root leads to its page (`OF_THE_ROOT`).
+* A link into research/, which is no part of the site, becomes the name of its file.
 * `<!-- include -->` before a link to a file of the repository's root shows that file there, with links that hold.
 * `<!-- python reference -->` becomes every public name with its signature and docstring (`site_reference`).
 * A page of docs/notebooks is offered as a Jupyter notebook too.
@@ -37,6 +38,7 @@ OF_THE_ROOT = {
 
 _INCLUDE = re.compile(r"^<!-- include -->\[[^\]]+\]\((?:\.\./)+(\w+\.md)\)$", re.MULTILINE)
 _TO_THE_ROOT = re.compile(r"\]\((?:\.\./)+([A-Z]+\.md)\)")
+_TO_RESEARCH = re.compile(r"\[([^\[\]]*)\]\((?:\.\./)+(research/[\w./-]+\.md)(?:#[^)]*)?\)")
 _LINK = re.compile(r"\[([^\[\]]*)\]\((?!https?:|#)([^)\s]+)\)")
 _HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 _ITEM = re.compile(r"^(?:[*-]|\d+\.) +\**\[[^\]]+\]\(([^)#]+)\.md\)", re.MULTILINE)
@@ -104,6 +106,7 @@ def _read(app: Any, name: str, source: list[str]) -> None:
     text = _INCLUDE.sub(lambda match: included(match[1], f"{name}.md"), source[0])
     here = posixpath.dirname(name) or "."
     text = _TO_THE_ROOT.sub(lambda match: f"]({posixpath.relpath(OF_THE_ROOT[match[1]], here)})", text)
+    text = _TO_RESEARCH.sub(r"\1 (`\2`)", text)
     if REFERENCE in text:
         text = text.replace(REFERENCE, site_reference.reference())
     if name.startswith(NOTEBOOKS):

@@ -19,7 +19,7 @@ from swashplate.models.catalogue import EQUATIONS
 from swashplate.registry import Registry
 
 REGISTRIES: tuple[Registry[Any], ...] = (EQUATIONS, ESTIMATORS, READERS, CONTROLLERS, FORMATS, PARTS)
-EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 @contextmanager

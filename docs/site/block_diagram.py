@@ -1,7 +1,7 @@
 """The CoaX's block diagram (Fankhauser et al., Fig. 3), drawn from its equations as they run.
 
-    python scripts/block_diagram.py           writes docs/pictures/coax-block-diagram.svg
-    python scripts/block_diagram.py --print   prints blocks and arrows as text
+    python docs/site/block_diagram.py           writes docs/pictures/coax-block-diagram.svg
+    python docs/site/block_diagram.py --print   prints blocks and arrows as text
 
 The equations are evaluated once on numbers that remember where they come from, with every function of
 `swashplate.physics` watched: what a function reads makes the arrows into its block, what its result reaches the arrows
@@ -30,7 +30,7 @@ from swashplate.models.nesting import leaves, rebuild
 from swashplate.physics import drive_train, fuselage, rigid_body, rotor, stabilizer_bar, swashplate
 from swashplate.physics.environment import Environment
 
-PICTURE = Path(__file__).resolve().parent.parent / "docs" / "pictures" / "coax-block-diagram.svg"
+PICTURE = Path(__file__).resolve().parents[2] / "docs" / "pictures" / "coax-block-diagram.svg"
 _COMPONENTS = (drive_train, stabilizer_bar, swashplate, rotor, fuselage, rigid_body)
 _QUIET = ("air_density", "gravity")
 """Surroundings that scale everything: not drawn."""

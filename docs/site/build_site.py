@@ -1,6 +1,6 @@
 """Builds the site of docs/ into build/site: `make site`. Needs no network; a warning is an error.
 
-python scripts/build_site.py [FOLDER]
+python docs/site/build_site.py [FOLDER]
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def command(out: Path, pages: Path) -> list[str]:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from swashplate.validation.validation import AxisVerdict
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "real-flights.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "real-flights.md"
 _DIRECTION = re.compile(r"^## (Learnt in \w+, predicting \w+)$", re.MULTILINE)
 _VERDICT = re.compile(r"^\* (\w+): \*\*(.+?)\*\*\. (.+)$", re.MULTILINE)
 _NUMBERS = re.compile(r"^(.+?) at ([\d.]+) s\.")
 
 
 def directions(page: str) -> dict[str, list[AxisVerdict]]:
-    """The verdicts of each direction, as `scripts/real_flights.py` wrote them.
+    """The verdicts of each direction, as `docs/site/real_flights.py` wrote them.
 
     Raises:
         ValueError: where the page no longer has the form that is read here.

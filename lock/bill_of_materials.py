@@ -1,6 +1,6 @@
 """Writes the software bill of materials, CycloneDX 1.6 JSON, from lock/dev.txt and web/package-lock.json.
 
-    python scripts/bill_of_materials.py [FILE]        build/swashplate.cdx.json where not given
+    python lock/bill_of_materials.py [FILE]        build/swashplate.cdx.json where not given
 
 The same locks in the same environment give the same bytes: no time, no random number. Every library has its version,
 its package URL and the hashes of its archives as the lock has them; a licence where it is installed and names one.

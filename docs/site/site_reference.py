@@ -14,7 +14,7 @@ from pathlib import Path
 
 from swashplate import public
 
-SOURCE = Path(__file__).resolve().parent.parent / "src"
+SOURCE = Path(__file__).resolve().parents[2] / "src"
 GROUPS = {
     "flights": "Flights: reading, checking, conditioning, manoeuvres",
     "identification": "Identification",
