@@ -17,7 +17,7 @@ from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.response_names import under_names_of
 from swashplate.identification.frequency.search_candidates import WIDEST, parameter_names
 from swashplate.identification.frequency.start_values import at_flown_trim, from_linear_model, from_models
-from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.frequency.state_space_fit import fit_state_space, unmoved_inputs
 from swashplate.identification.frequency.structure_search import search_structures
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.catalogue import vehicle
@@ -119,7 +119,10 @@ def fit_ss(
             responses,
             structures=given,
             choice=choice,
-            prepare=lambda one: with_given(at_flown_trim(one, responses), *(_own(one, n) for n in (start, fixed))),
+            prepare=lambda one: with_given(
+                at_flown_trim(one, responses).with_unmoved(unmoved_inputs(responses)),
+                *(_own(one, n) for n in (start, fixed)),
+            ),
             judge=(lambda one: _held_out(one, flights, band)) if flights else None,
             seed=seed,
             say=lambda text: say("trying structures", note=text),

@@ -24,8 +24,8 @@ from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.identification.frequency.response_cost import ACCEPTABLE
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.responses.signs import response_sign
-from swashplate.identification.time.feedback import UNMOVED
 from swashplate.models.card import Card
+from swashplate.models.linear.state_space import UNMOVED
 
 _SEEN = (12.0, 120.0)
 """rad/s: where the sense of a vehicle's answer is read off."""
@@ -157,5 +157,5 @@ def refused_by_card(card: Card) -> str:
         return ""
     return (
         f"{', '.join(unmoved)}: fitted although no flight moved it from outside. The model may be the controller that "
-        "flew. Fly a sweep of it, or fit it without --keep-unexcited."
+        "flew. Fly a sweep of it, or leave it out of the fit."
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
+from swashplate.flights.excitation import OUTSIDE
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource, scale_words
 from swashplate.identification.estimators import Data, Question
@@ -74,6 +75,7 @@ def fit_state_space(
     model = structure_of(model)
     if not model.free:
         raise IdentificationError("every parameter is fixed or tied: there is nothing to fit.", channel=model.name)
+    model = model.with_unmoved(unmoved_inputs(responses))
     choice = PairChoice(band, bands or {}, tuple(without), least_coherence)
     targets, ceilings, left_out = choice.targets(model, responses)
     others = {}
@@ -212,6 +214,13 @@ def fit_targets(
         settings={**dict(settings or {}), "started_from": source or "given values"},
         seconds=time.perf_counter() - began,
     )
+
+
+def unmoved_inputs(responses: FrequencyResponse) -> list[str]:
+    """Inputs of which the responses say that nothing moved them from outside."""
+    told, channels = responses.settings.get("excitation", {}), responses.settings.get("channels", {})
+    kinds = {name: told.get(name, told.get(channels.get(name), {})).get("kind") for name in responses.inputs}
+    return [name for name, kind in kinds.items() if kind is not None and kind not in OUTSIDE]
 
 
 def silent(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[tuple[str, str], ...]:

@@ -18,6 +18,7 @@ from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.models.linear.state_space import UNMOVED
 from swashplate.models.traits import Axis
 from swashplate.models.vehicle import Vehicle
 
@@ -128,10 +129,6 @@ def _words(axis: str, told: AnswerShares, peak: float, phase: float, *, still: b
         f"{axis}: {share}: it is a controller's answer, and this record cannot tell the {axis} dynamics from the "
         f"controller. Add an independent sweep or multisine to the {axis} reference and log rotor speed and voltage."
     )
-
-
-UNMOVED = "unmoved"
-"""Section of an identified card: axes that were fitted although no flight moved them from outside."""
 
 
 def mark_unmoved(vehicle: Vehicle, free: Collection[str], axes: Sequence[AxisExcitation]) -> Vehicle:

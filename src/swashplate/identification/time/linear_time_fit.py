@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.errors import IdentificationError
+from swashplate.flights.excitation import CONTROLLER, excitations, of_inputs
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.records import Record, uniform_table
@@ -77,6 +78,8 @@ def fit_in_time(
     ahead = ahead_of(horizon, method)
     refuse_lowpassed(flights)
     pieces, delays = linear_records(model, flights, names, biases=biases)
+    moved = of_inputs(excitations(flights, model.inputs, outputs=names))
+    model = model.with_unmoved(name for name, one in moved.items() if one.kind == CONTROLLER)
     kind: type[OutputErrors] = {"filter-error": FilterErrors}.get(method, OutputErrors)
     if method == "prediction-error" and GustErrors.suits(model):
         kind = GustErrors

@@ -13,7 +13,7 @@ from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter
 from swashplate.models.delays import BY_ENTRY, BY_OUTPUT, SECTION
 from swashplate.models.linear.card_vehicle import NAME, SIZE, entry_name, entry_unit, linear
-from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
+from swashplate.models.linear.state_space import UNMOVED, ModelParameter, StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
 from swashplate.models.vehicle import Vehicle
 
@@ -107,7 +107,9 @@ def linear_vehicle(model: StateSpaceModel, *, limits: Mapping[str, tuple[float, 
     }
     if (size := model.document.get("shape", {}).get(SIZE)) is not None:
         options[SIZE] = float(size)
-    card = Card(NAME, model.title, model.trust, options, parameters, observer=_delays(model), path=model.name)
+    learnt: dict[str, Mapping[str, float]] = {**_delays(model)}
+    learnt |= {UNMOVED: dict(model.document[UNMOVED])} if UNMOVED in model.document else {}
+    card = Card(NAME, model.title, model.trust, options, parameters, observer=learnt, path=model.name)
     made = linear(card)
     parts: dict[str, Any] = {f.name: getattr(made, f.name) for f in fields(Vehicle)}
     return StateSpaceVehicle(**parts | {"structure": model})

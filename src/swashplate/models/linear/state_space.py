@@ -22,6 +22,8 @@ from swashplate.errors import CardError
 from swashplate.models.linear import late_entries, python_control, sensitivities
 from swashplate.models.linear.expressions import Expression
 
+UNMOVED = "unmoved"
+"""Section of an identified model: what was fitted although nothing moved it from outside."""
 MATRICES = ("M", "F", "G", "H0", "H1", "D")
 
 
@@ -125,6 +127,12 @@ class StateSpaceModel:
         for name in self.tie_order:
             values[name] = self._tie(name)(values)
         return values
+
+    def with_unmoved(self, inputs: Iterable[str]) -> StateSpaceModel:
+        """A copy whose file names the inputs that nothing moved from outside in the data of a fit; gains refuse it."""
+        document = {key: part for key, part in self.document.items() if key != UNMOVED}
+        named = {name: 1.0 for name in inputs if name in self.inputs}
+        return replace(self, document=document | ({UNMOVED: named} if named else {}))
 
     def with_values(self, values: Mapping[str, float], **changes: Any) -> StateSpaceModel:
         """A copy with other numbers; ties follow. `changes` go to each changed parameter (e.g. `free=False`).

@@ -55,7 +55,7 @@ from swashplate.models.linear import state_space_checks as checks
 from swashplate.models.linear.accelerometer import AXES, TRIM, specific_force
 from swashplate.models.linear.composition import PREFIX, document, is_composed
 from swashplate.models.linear.expressions import Expression
-from swashplate.models.linear.state_space import Element, ModelParameter, StateSpaceModel
+from swashplate.models.linear.state_space import UNMOVED, Element, ModelParameter, StateSpaceModel
 from swashplate.models.linear.structure_parts import PARTS
 from swashplate.registry import nearest
 
@@ -78,6 +78,7 @@ _SECTIONS = {
     "trim",
     "fit",
     "composed",
+    UNMOVED,
 }
 _PARAMETER = {
     "value",
@@ -321,6 +322,8 @@ class _Reader:
         checks.delays(delays, self.inputs, self.outputs, entries, path=self.path)
         checks.limits(self._table("limits"), self.inputs, path=self.path)
         checks.shape(self._table("shape"), path=self.path)
+        if unknown := sorted(set(self._table(UNMOVED)) - set(self.inputs)):
+            raise CardError("is no input.", where=self.path, channel=f"{UNMOVED}.{unknown[0]}")
         idle = sorted(set(self.parameters) - self.used)
         if idle:
             raise CardError(
