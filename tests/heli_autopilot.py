@@ -3,7 +3,8 @@
 It reads answers as `SIM_JSON.cpp` does (keys looked for from the front, no JSON parser), counts frames, repeats itself
 while nobody answers, mixes for an H3-120 swashplate and truncates pulses to whole microseconds. Between gyro and servo
 stand what `copter-heli.parm` puts there: a gyro filter and filters of target and error at 20 Hz, integrals of roll and
-pitch that leak down to ILMI, a cyclic cut at H_CYC_MAX, and a rotor speed output that ramps.
+pitch that leak down to ILMI, a cyclic cut at H_CYC_MAX, and a rotor speed output that ramps. Tail and rotor speed leave
+one loop later than the swashplate (`rc_write_angle`), and the rates of the log are means of the last loop.
 """
 
 from __future__ import annotations
@@ -163,7 +164,9 @@ class HeliAutopilot:
         sweep: (axis 0 roll to 3 collective, function of time since it began) added after the rate controllers.
         sticks: roll, pitch, yaw and collective that reach the servos while it does not fly.
         keep: lean per m and m/s. lifting: collective per m, and per m/s.
-        log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep, and p, q, r behind the gyro filter.
+        log: rows of time, p, q, r (means of the last loop), mixer roll, pitch, yaw, collective, sweep, and p, q, r
+            behind the gyro filter.
+        scaled: outputs that are set as scaled values and leave with the next loop, from 0.
     """
 
     send: Send
@@ -183,6 +186,7 @@ class HeliAutopilot:
     collective: float = 0.0
     keep: tuple[float, float] = (0.04, 0.08)
     lifting: tuple[float, float] = (0.06, 0.08)
+    scaled: tuple[int, ...] = (3, 7)
     ekf: Ekf = field(default_factory=Ekf)
     _sums: np.ndarray = field(default_factory=lambda: np.zeros(3))
     _lift: float = 0.0
@@ -193,6 +197,8 @@ class HeliAutopilot:
     _heading: float = 0.0
     _slope: LowPass = field(default_factory=lambda: LowPass(1))
     _missed: np.ndarray | None = None
+    _turning: np.ndarray | None = None
+    _waiting: dict[int, int] = field(default_factory=dict)
 
     def exchange(self) -> dict[str, list[float]]:
         """One frame: send, wait for the answer, control."""
@@ -308,8 +314,12 @@ class HeliAutopilot:
         mixer = np.clip(mixer, -1.0, 1.0)
         mixer[:2] *= min(1.0, CYCLIC / max(1e-9, math.hypot(mixer[0], mixer[1])))
         self.collective = collective
-        self._pulses = self._mixed(mixer, collective)
-        self.log.append((now, *measured, *mixer, collective, swept, *gyro))
+        computed = self._mixed(mixer, collective)
+        self._pulses = [self._waiting.get(output, pulse) for output, pulse in enumerate(computed)]
+        self._waiting = {output: computed[output] for output in self.scaled}
+        mean = measured if self._turning is None else 0.5 * (self._turning + measured)
+        self._turning = measured
+        self.log.append((now, *mean, *mixer, collective, swept, *gyro))
 
     def _lean(self, state: dict[str, list[float]]) -> tuple[float, float]:
         c, s = math.cos(state["attitude"][2]), math.sin(state["attitude"][2])

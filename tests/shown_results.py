@@ -79,7 +79,8 @@ def designed() -> DesignedManeuver:
 
 def gains() -> AutopilotGains:
     loops = tuple(LoopWorth(name, 8.0, 50.0, 0.02, 9.0, 14.0, 3.0, 1.6) for name in ("roll rate", "pitch rate"))
-    found = SimpleNamespace(law=SimpleNamespace(rate=400.0, vehicle="coax"), loops=loops, problems=("too little.",))
+    law = SimpleNamespace(rate=400.0, vehicle="coax")
+    found = SimpleNamespace(law=law, loops=loops, stabilize=loops, problems=("too little.",))
     return AutopilotGains("ardupilot", "coax", found, {"P": 0.1}, ("P",), (), "5 ms")  # type: ignore[arg-type]
 
 

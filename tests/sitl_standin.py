@@ -55,7 +55,8 @@ class Firmware(HeliAutopilot):
         faults: "never-ekf"; "nowhere" (its checks pass, the EKF has no place); "warm" (ready after 12 s);
             "reboot" (in the sweep); "crash" (a floating point exception at lift-off); "frozen" (stops sending at
             lift-off); "sweepless" (System ID is refused); "frame" (FRAME_CLASS 8 whatever the file says); "old"
-            (version 4.1); "plane"; "mute" (no MAVLink); "backwards" (yaw of a coaxial); "stubborn" (ignores SIGTERM).
+            (version 4.1); "plane"; "copter" (the multicopters' build); "mute" (no MAVLink); "backwards" (yaw of a
+            coaxial); "stubborn" (ignores SIGTERM).
     """
 
     def boot(self, parameters: dict[str, float], ports: tuple[int, int, int], faults: set[str]) -> None:
@@ -80,6 +81,9 @@ class Firmware(HeliAutopilot):
         self.mav = common.MAVLink(None, srcSystem=1, srcComponent=1)
         self.ears = common.MAVLink(None)
         self.ears.robust_parsing = True
+        framed = {COAXIAL: common.MAV_TYPE_COAXIAL}  # a multicopter's binary calls itself by the frame that it is given
+        own = common.MAV_TYPE_GENERIC if "copter" in faults else common.MAV_TYPE_HELICOPTER
+        self.kind = framed.get(parameters["FRAME_CLASS"], own)
         self.mode, self.rows, self.pwm = STABILIZE, [], [1500] * 16
         self.running_since, self.interlocked, self.landed_since = math.inf, False, math.inf
         self.chirp: Chirp | None = None
@@ -95,6 +99,7 @@ class Firmware(HeliAutopilot):
             tuple(g.get(f"ATC_RAT_{a}_D", 0.0) for a in ("RLL", "PIT", "YAW")),
         )
         self.coaxial = g["FRAME_CLASS"] == COAXIAL
+        self.scaled = (0, 1, 2, 3) if self.coaxial else (3, 7)
         self.keep = (0.04, 0.08) if not self.coaxial else (
             g["PSC_POSXY_P"] * g["PSC_VELXY_P"] / 9.81, g["PSC_VELXY_P"] / 9.81
         )  # fmt: skip
@@ -130,7 +135,7 @@ class Firmware(HeliAutopilot):
             self.tell("statustext", 6, words[place : place + 50].encode(), number, place // 50)
 
     def beat(self) -> None:
-        kind = common.MAV_TYPE_FIXED_WING if "plane" in self.faults else common.MAV_TYPE_HELICOPTER
+        kind = common.MAV_TYPE_FIXED_WING if "plane" in self.faults else self.kind
         self.tell("heartbeat", kind, 3, 81 | (128 if self.armed else 0), self.mode, 3)
 
     def refusal(self) -> str:

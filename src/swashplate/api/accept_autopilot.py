@@ -18,7 +18,8 @@ from swashplate.api.saying import Say, silent
 from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
-from swashplate.control.laws.ardupilot.law import GRAVITY
+from swashplate.control.laws.ardupilot.law import GRAVITY, RATE_OF_LOOPS
+from swashplate.control.laws.ardupilot.outputs import HELD, LOGGED, output_delays
 from swashplate.control.laws.ardupilot.parameters import known
 from swashplate.errors import SwashError
 from swashplate.extras import library
@@ -55,8 +56,6 @@ from swashplate.simulation.trim import trim
 
 _RATE = 100.0
 """Hz of the records: what the System ID mode logs by default."""
-_LOOP = 400.0
-"""Hz of ArduCopter's loops, where it does not say."""
 _MIXING = ("MOT_", "H_C")
 """What a mixer's parameters begin with."""
 _COMPENSATED = ("MOT_BAT_VOLT_MAX", "MOT_BAT_V_MAX")
@@ -175,14 +174,15 @@ def accept_autopilot(
     logs = sitl.logs()
     comparison: TruthBeside | None = None
     if flown:
-        late = 0.5 / values.get("SCHED_LOOP_RATE", _LOOP)
+        loop = values.get("SCHED_LOOP_RATE", RATE_OF_LOOPS)
+        late = (HELD + LOGGED) / loop + output_delays("ardupilot", law.frame, len(names), loop)
         moved = mixed(mixer, other.trim, _mixing(values, law.parameters, law.frame), inputs=names)
 
         def response(linear: LinearModel, axis: str, output: str, omega: Array) -> Complex:
             return mixer_response(linear, moved[axis], output, omega, late=late, gravity=float(around.gravity))
 
         swept = {axis: chirps[axis] for axis in flown}
-        comparison = _judged(logs, swept, partial(response, other), partial(response, model), pilot, lines)
+        comparison = _judged(logs, swept, partial(response, other), partial(response, model), loop, pilot, lines)
     log = logs[-1] if logs else None
     return Acceptance(str(binary), version, called, tuple(sitl.command), tuple(lines), comparison, log, folder, speed)
 
@@ -292,6 +292,7 @@ def _judged(
     flown: Mapping[str, Chirp],
     true: Truth,
     own: Truth,
+    loop: float,
     pilot: TrialPilot,
     lines: list[TrialLine],
 ) -> TruthBeside | None:
@@ -304,7 +305,7 @@ def _judged(
         damage = "; ".join(flight.provenance.damage)
         lines.append(TrialLine("log", damage or f"{flight.duration:.0f} s", "read, not damaged", not damage))
         lines.append(_rotor_line(flight, pilot))
-        comparison = beside_truth(flight, flown, true, own, rate=_RATE)
+        comparison = beside_truth(flight, flown, true, own, rate=_RATE, loop=loop)
     except SwashError as error:
         lines.append(TrialLine("log", str(error), "read", False))
         return None

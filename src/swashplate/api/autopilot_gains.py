@@ -130,6 +130,7 @@ class AutopilotGains(Shown):
             "late": self.late,
             "parameters": dict(self.parameters),
             "loops": [asdict(loop) | {"holds": loop.holds} for loop in self.found.loops],
+            "stabilize": [asdict(loop) for loop in self.found.stabilize],
             "slowest": {"real": self.found.slowest.real, "imaginary": abs(self.found.slowest.imag)},
             "flown": [asdict(flight) for flight in self.flown],
             "problems": list(self.problems),
@@ -162,9 +163,13 @@ class AutopilotGains(Shown):
                 delay_words(loop.delay),
                 *(f"{value:.2f}" for value in (loop.crossover, loop.bandwidth, loop.rejection, loop.peak)),
             )
-            for loop in self.found.loops
+            for loop in (
+                *self.found.loops,
+                *(replace(each, name=f"{each.name} alone") for each in self.found.stabilize),
+            )
         ]
-        lines += ["", text_table(head, rows), "each broken with the others closed; frequencies in rad/s", ""]
+        lines += ["", text_table(head, rows), "each broken with the others closed; frequencies in rad/s"]
+        lines += ["alone: in STABILIZE, no height or place held; what a sweep at the mixer measures", ""]
         shown = [(name, f"{self.parameters[name]:.4g}") for name in self.gains if name not in RENAMED]
         lines.append(text_table(("parameter", "value"), shown))
         if self.flown:
@@ -203,8 +208,9 @@ def autopilot_gains(
         vehicle: in free flight; any model whose outputs an autopilot can be mapped to.
         autopilot: "ardupilot" or "px4".
         name, servos: as of `swashplate.link_ardupilot`.
-        delays: from command to actuator [s], one for all or by input; where not given those that the model knows, and
-            5 ms where it knows none.
+        delays: from output to actuator [s], one for all or by input; where not given those that the model knows, and
+            5 ms where it knows none. A SITL has none. What the firmware sends a loop later
+            (`control.laws.ardupilot.outputs`) comes to them.
         notch: of the gyros, frequency and width [Hz]; ArduPilot only.
         rate: of the loops [Hz]; 400 for ArduPilot, 250 for PX4.
         parameters: judge these instead (by name, or a .parm file); ArduPilot only.
@@ -247,7 +253,7 @@ def autopilot_gains(
         lines,
         tuple(gains),
         flown,
-        told,
+        told + _sent_later(design.law),
         refused_by_card(vehicle.card),
         parameters is not None,
     )
@@ -261,8 +267,13 @@ def _late(vehicle: Vehicle, given: Mapping[str, float] | float | None) -> tuple[
     elif known:
         whose = "identified"
     else:
-        whose = "assumed: the model knows no delay and may know no servos; --delay says more"
+        whose = "assumed: the model knows no delay and may know no servos; --delay says more, and 0 is a SITL's"
     return dict(late), f"{', '.join(f'{name} {1e3 * value:.3g} ms' for name, value in late.items())} ({whose})"
+
+
+def _sent_later(law: ArduPilotLaw) -> str:
+    by_delay = [f"{1e3 * delay:.3g} ms" for delay in sorted(set(law.output_delays) - {0.0})]
+    return f"; outputs of servos that the firmware sends a loop later: {by_delay[0]} more" if by_delay else ""
 
 
 def _flown(vehicle: Vehicle, hover: Trim, design: CascadeGains, mode: FlightMode) -> FlownMode:

@@ -13,7 +13,7 @@ from swashplate.links.ardupilot.parameters import as_written
 from swashplate.links.ardupilot.parameters import parameters as for_ardupilot
 from swashplate.links.mavlink.comparison import ComparedParameter, compared, rate_problems
 from swashplate.links.mavlink.connection import Connection
-from swashplate.links.mavlink.greeting import ARDUPILOT, AUTOPILOT_NAMES, PX4, greet
+from swashplate.links.mavlink.greeting import ARDUPILOT, AUTOPILOT_NAMES, PX4, greet, other_build
 from swashplate.links.mavlink.health import Health, listen_to_health
 from swashplate.links.mavlink.parameter_reading import ask_by_name, read_parameters
 from swashplate.links.px4.parameters import parameters as for_px4
@@ -135,12 +135,13 @@ def check_autopilot(
     expected = _expected(vehicle, firmware, name, servos)
     packed = firmware == "px4"
     with Connection(mavlink or ADDRESSES[firmware], timeout=timeout) as connection:
-        greet(connection, _AUTOPILOTS[firmware], timeout)
+        kind = greet(connection, _AUTOPILOTS[firmware], timeout)
         reading = read_parameters(connection, packed=packed)
         ask_by_name(connection, reading, expected, packed=packed)
         health = listen_to_health(connection, duration=listen)
     comparisons = compared(expected, reading)
-    problems = [p.problem for p in comparisons if p.problem]
+    build = other_build(kind, vehicle.traits.servo_layout) if firmware == "ardupilot" else ""
+    problems = [build] if build else [p.problem for p in comparisons if p.problem]
     if not reading.complete:
         told = f"{len(reading.missing)} of {reading.count} parameters never came, although they were asked for again"
         problems.append(

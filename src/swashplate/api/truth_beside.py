@@ -24,8 +24,9 @@ from swashplate.links.ardupilot.trial import TrialLine
 from swashplate.models.linear.transfer_function import TransferFunction
 
 GAIN, PHASE, SIGMAS = 1.0, 7.0, 3.0
-"""dB and degrees that an estimate may be off the truth, or so many random errors where those are more."""
-_WITHIN = f"within {GAIN:g} dB and {PHASE:g} deg, or {SIGMAS:g} random errors"
+"""dB and degrees that an estimate may be off the truth at most, or so many random errors where those are more."""
+ROUNDED = 2.7
+"""Degrees that whole microseconds turn a sine of the least amplitude that is swept (`trial_sweeps.RESOLVED`)."""
 COHERENT = 0.8
 """Coherence from which on a line is judged."""
 _SWEPT = "sid_target"
@@ -70,8 +71,13 @@ class TruthBeside:
     remarks: list[str] = field(default_factory=list)
 
 
-def beside_truth(flight: Flight, flown: Mapping[str, Chirp], truth: Truth, own: Truth, *, rate: float) -> TruthBeside:
+def beside_truth(
+    flight: Flight, flown: Mapping[str, Chirp], truth: Truth, own: Truth, *, rate: float, loop: float
+) -> TruthBeside:
     """Take a log through `respond`, `fit_tf` and `fit_ss`, and judge each against the truth.
+
+    The phase that a response may be off is what rounded pulses turn it (`ROUNDED`) and half a loop, for stamps are of
+    whole loops; of a fit, also what its form misses when it is fitted to the vehicle's own linearisation.
 
     A form or structure that cannot follow the vehicle that flew, fitted to its own linearisation, is told and not
     judged: it would speak of itself. What `respond` gives is always judged.
@@ -80,14 +86,14 @@ def beside_truth(flight: Flight, flown: Mapping[str, Chirp], truth: Truth, own: 
         flight: as logged, with a System ID sweep for each axis.
         flown: the sweeps by axis.
         truth: what the estimates are held against. own: of the vehicle that flew.
-        rate: of the records [Hz].
+        rate: of the records [Hz]. loop: of the autopilot [Hz].
     """
     comparison = TruthBeside()
     by_axis = _sweeps_by_axis(flight, flown, comparison)
     axes = [axis for axis in MIXER_AXES if axis in by_axis]
     for together in _grouped(axes):
         try:
-            _judge(flight, [by_axis[axis] for axis in together], together, flown, truth, own, rate, comparison)
+            _judge(flight, [by_axis[axis] for axis in together], together, flown, truth, own, rate, loop, comparison)
         except SwashError as error:
             comparison.lines.append(TrialLine(f"{' and '.join(together)}: estimate", str(error), "an estimate", False))
     return comparison
@@ -121,6 +127,7 @@ def _judge(
     truth: Truth,
     own: Truth,
     rate: float,
+    loop: float,
     comparison: TruthBeside,
 ) -> None:
     named = [MIXER_AXES[axis] for axis in axes]
@@ -156,23 +163,27 @@ def _judge(
         comparison.lines.append(
             TrialLine(f"{axis}: coherent", told, f"{100 * _LEAST_SHARE:.0f} % of the band", share >= _LEAST_SHARE)
         )
-        comparison.lines.append(_verdict(f"{axis}: respond beside truth", h, true, error, good))
+        limit = ROUNDED + np.degrees(0.5 / loop * responses.omega)
+        comparison.lines.append(_verdict(f"{axis}: respond beside truth", h, true, error, good, limit))
         estimate = np.asarray(simple[place].response(responses.omega))
         curves["fit-tf"] = (responses.omega, estimate)
-        line = _verdict(f"{axis}: fit-tf beside truth", estimate, true, error, good)
-        follows = _follows(exact, axis, np.asarray(_fitted(exact, axis, forms[place]).response(responses.omega)))
+        best = np.asarray(_fitted(exact, axis, forms[place]).response(responses.omega))
+        line = _verdict(f"{axis}: fit-tf beside truth", estimate, true, error, good, limit + _misses(exact, axis, best))
+        follows = _follows(exact, axis, best)
         comparison.lines.append(line if follows else _told(line, f"no form of {', '.join(FORMS[axis])} follows"))
         if fitted is not None:
             o, i = list(fitted.outputs).index(a.output), list(fitted.inputs).index(a.input)
             estimate = fitted.response(responses.omega)[:, o, i]
             curves["fit-ss"] = (responses.omega, estimate)
-            line = _verdict(f"{axis}: fit-ss beside truth", estimate, true, error, good)
+            what = f"{axis}: fit-ss beside truth"
+            line = _verdict(what, estimate, true, error, good, limit)
             if not line.passed:  # only then is it asked whether the structure could have done it
                 assert name is not None
-                best = fit_ss(name, exact).structure
-                assert best is not None
-                follows = _follows(exact, axis, best.response(responses.omega)[:, o, i])
-                line = line if follows else _told(line, f"the structure {name} does not follow")
+                structure = fit_ss(name, exact).structure
+                assert structure is not None
+                best = structure.response(responses.omega)[:, o, i]
+                line = _verdict(what, estimate, true, error, good, limit + _misses(exact, axis, best))
+                line = line if _follows(exact, axis, best) else _told(line, f"the structure {name} does not follow")
             comparison.lines.append(line)
         comparison.curves[(a.output, a.input)] = curves
         comparison.lines.append(_lateness(axis, h, true, responses, good))
@@ -201,6 +212,12 @@ def _form(exact: FrequencyResponse, axis: str) -> str:
     return FORMS[axis][0]
 
 
+def _misses(exact: FrequencyResponse, axis: str, best: Complex) -> Array:
+    """Degrees by which a form is off the vehicle's own response when it is fitted to that."""
+    a = MIXER_AXES[axis]
+    return _distance(best, exact.pair(a.output, a.input)[0])[1]
+
+
 def _follows(exact: FrequencyResponse, axis: str, estimate: Complex) -> bool:
     a = MIXER_AXES[axis]
     gain, phase = _distance(estimate, exact.pair(a.output, a.input)[0])
@@ -218,16 +235,27 @@ def _distance(estimate: Complex, true: Complex) -> tuple[Array, Array]:
     return 20.0 * np.abs(np.log10(np.abs(ratio))), np.degrees(np.abs(np.angle(ratio)))
 
 
-def _verdict(what: str, estimate: Complex, true: Complex, error: Array, good: NDArray[np.bool_]) -> TrialLine:
-    """The largest distance over the coherent lines; the random errors there widen what is allowed."""
+def _verdict(
+    what: str, estimate: Complex, true: Complex, error: Array, good: NDArray[np.bool_], limit: Array
+) -> TrialLine:
+    """The largest distance over the coherent lines; the random errors there widen what is allowed.
+
+    Args:
+        limit: of the phase [deg] by frequency; no more than `PHASE` of it counts.
+    """
+    limit = np.minimum(PHASE, limit)
+    within = f"within {GAIN:g} dB and {limit.min():.1f} to {limit.max():.1f} deg, or {SIGMAS:g} random errors"
     if not good.any():
-        return TrialLine(what, "nothing coherent", _WITHIN, False)
+        return TrialLine(what, "nothing coherent", within, False)
     gain, phase = _distance(estimate[good], true[good])
     sigma = np.nan_to_num(error[good])
-    allowed = np.maximum(GAIN, SIGMAS * 20.0 / np.log(10.0) * sigma), np.maximum(PHASE, SIGMAS * np.degrees(sigma))
+    allowed = (
+        np.maximum(GAIN, SIGMAS * 20.0 / np.log(10.0) * sigma),
+        np.maximum(limit[good], SIGMAS * np.degrees(sigma)),
+    )
     passed = bool(np.all(gain <= allowed[0]) and np.all(phase <= allowed[1]))
     distance = f"{gain.max():.2f} dB, {phase.max():.1f} deg"
-    return TrialLine(what, distance, _WITHIN, passed)
+    return TrialLine(what, distance, within, passed)
 
 
 def _lateness(axis: str, h: Complex, true: Complex, responses: FrequencyResponse, good: NDArray[np.bool_]) -> TrialLine:

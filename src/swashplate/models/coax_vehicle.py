@@ -148,6 +148,8 @@ def rotor_factors(vehicle: Vehicle) -> dict[str, float]:
 
 _RING = (0.5, 2.0)
 """Sink over the hover's induced velocity between which wakes come back through the discs (Leishman 2006, sec. 2.13)."""
+_CARRIES = 0.1
+"""Of the weight: rotors that lift less have no wake that could come back, and no number of it is told."""
 _STALLED = 0.13
 """C_T / sigma beyond which blades stall."""
 
@@ -168,7 +170,8 @@ def inflow_doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment
     hover = math.sqrt(max(sum(acting.lift), 0.0) / (2.0 * environment.air_density * area))
     across, doubts = math.hypot(air.x, air.y), {}
     low, high = (share * hover for share in _RING)
-    if low < air.z < high and across < hover:
+    carries = sum(acting.lift) > _CARRIES * par.mass * environment.gravity
+    if carries and low < air.z < high and across < hover:
         doubts["vortex ring"] = (
             f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({low:.1f} to {high:.1f} m/s "
             f"below {hover:.1f} m/s of speed), where momentum theory is only a mean"

@@ -22,6 +22,7 @@ pytest.importorskip("pymavlink")
 import swashplate as sp
 from swashplate.api.acceptance import Acceptance
 from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
+from swashplate.control.laws.ardupilot.outputs import HELD, LOGGED, output_delays
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.links.ardupilot import sitl, trial
@@ -163,7 +164,8 @@ def truth_of(vehicle: Vehicle, *, name: str, rate: float = 200.0) -> Truth:
     moves = mixed(law.mixer, hover, law.parameters, inputs=flying.input_names)
 
     def truth(axis: str, output: str, omega: np.ndarray) -> np.ndarray:
-        return mixer_response(model, moves[axis], output, omega, late=0.5 / rate, gravity=9.80665)
+        late = (HELD + LOGGED) / rate + output_delays("ardupilot", law.frame, len(flying.input_names), rate)
+        return mixer_response(model, moves[axis], output, omega, late=late, gravity=9.80665)
 
     return truth
 
@@ -178,7 +180,7 @@ def judged_against(
     for axis, seconds in (swept or {"yaw": QUICK["seconds"]}).items():
         named = Chirp.planned(MIXER_AXES[axis].number, 0.1, (0.4, 8.0), record=seconds, fade=1.0)
         chirps[axis] = replace(named, start_hz=bands[named.axis_name][0], stop_hz=bands[named.axis_name][1])
-    return beside_truth(flight, chirps, truth_of(vehicle, name=name), truth_of(own, name=name), rate=100.0)
+    return beside_truth(flight, chirps, truth_of(vehicle, name=name), truth_of(own, name=name), rate=100.0, loop=200.0)
 
 
 @pytest.mark.parametrize("share", [0.75, *(pytest.param(share, marks=pytest.mark.proof) for share in (1.0, 1.3))])
@@ -240,6 +242,7 @@ def test_what_happens_in_the_air_is_a_line(
     [
         ("mute", "no autopilot was heard within 6 s"),
         pytest.param("plane", "MAVLink's type 1 answers", marks=pytest.mark.proof),
+        ("copter", "this is the build for multicopters and coaxials with two motors"),
         pytest.param("old,stubborn", "is version 4.1.7, expected 4.5 or later", marks=pytest.mark.proof),
     ],
 )
@@ -411,7 +414,7 @@ def test_a_sweep_begins_where_its_outputs_are_resolved() -> None:
 def coaxial(out: Path, *, axes: tuple[str, ...], seconds: float = 40.0, faults: str = "") -> Acceptance:
     gains = out.parent / "coax-gains.parm"
     gains.write_text("".join(f"{name},{value}\n" for name, value in COAX_GAINS.items()))
-    os.environ["SWASH_STANDIN"] = faults
+    os.environ["SWASH_STANDIN"] = f"copter,{faults}"
     try:
         return sp.accept_autopilot(
             COAX, BINARY, out=out, name="coax", axes=axes, instance=instance(), defaults=[gains],

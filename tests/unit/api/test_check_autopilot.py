@@ -36,6 +36,8 @@ def right() -> dict[str, float]:
 
 
 def check(stand_in: StandIn, *, listen: float = 0.3, **more: Any) -> Any:
+    if stand_in.type == common.MAV_TYPE_HELICOPTER:  # nothing else was asked for: what flies a coaxial
+        stand_in.type = common.MAV_TYPE_COAXIAL
     with stand_in as there:
         return sp.check_autopilot(COAX, "ardupilot", mavlink=there.address, timeout=5.0, listen=listen, **more)
 
@@ -99,6 +101,18 @@ def test_tuned_gains_are_told_and_are_no_fault() -> None:
     assert [(p.verdict, p.problem) for p in tuned] == [("yours", ""), ("right", "")]
     wrong = compared(expected, ParameterReading({"ATC_RAT_RLL_P": 0.045, "H_SW_TYPE": 1.0}, 2, {0, 1}))
     assert [p.problem for p in wrong] == ["", "H_SW_TYPE is 1, expected 3."]
+
+
+def test_the_build_for_other_frames_is_named_by_its_type(right: dict[str, float]) -> None:
+    found = check(StandIn({k: v for k, v in right.items() if k.startswith("OTHER_")}, type=2))
+    assert not any("MAVLink" in text for text in found.problems)
+    with StandIn({"OTHER": 1.0}, type=common.MAV_TYPE_QUADROTOR) as there:
+        found = sp.check_autopilot(RAPTOR, "ardupilot", name="raptor50", mavlink=there.address, listen=0.3)
+    assert found.problems[0] == (
+        "MAVLink's type 2: this is the build for multicopters and coaxials with two motors (arducopter), expected the "
+        "one for helicopters (arducopter-heli)."
+    )
+    assert not any("parameter H_" in text for text in found.problems), "what follows from it is not told too"
 
 
 @pytest.mark.proof

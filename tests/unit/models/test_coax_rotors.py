@@ -247,6 +247,10 @@ def test_doubts_and_power(coax: Vehicle) -> None:
     sinking = np.array(hover.state)
     sinking[coax.index("w")] = 3.0
     assert "vortex ring" in coax.traits.doubts(coax, sinking, hover.inputs, calm)
+    for name in ("omega_upper", "omega_lower"):  # it settles on the ground: no lift, no wake, no "0.0 m/s"
+        sinking[coax.index(name)] = 1.0
+    sinking[coax.index("w")] = 0.02
+    assert coax.traits.doubts(coax, sinking, hover.inputs, calm) == {}
     steep = coax.with_values({"pitch_upper": 0.5})
     assert "stall upper" in coax.traits.doubts(steep, hover.state, hover.inputs, calm)
 

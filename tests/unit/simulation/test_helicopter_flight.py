@@ -76,6 +76,10 @@ def test_where_the_equations_are_not_to_be_trusted() -> None:
     assert said() == said(speed=10.0) == said(climb=3.0) == ""
     assert "vortex ring" in said(climb=-4.0)
     assert said(climb=-4.0, speed=8.0) == ""
+    flat = trim(RAPTOR)
+    settling, inputs = np.array(flat.state), np.array(flat.inputs)
+    inputs[RAPTOR.input_names.index("theta0")], settling[RAPTOR.index("w")] = 0.0, 0.02
+    assert "vortex ring" not in " ".join(doubts(RAPTOR, settling, inputs, flat.environment))
     heavy = RAPTOR.with_values({"mass": 16.0, "collective_high": 0.4, "tail_high": 0.8})
     at = trim(heavy)
     assert "blades would stall" in " ".join(doubts(heavy, at.state, at.inputs, at.environment))

@@ -98,12 +98,14 @@ class CascadeGains:
     Attributes:
         law: with them, in the mode that holds a place.
         loops: what each is worth.
+        stabilize: roll, pitch and yaw where neither height nor place is held: what a sweep at the mixer measures.
         slowest: the least stable mode of the sampled law on the linear model [1/s].
-        delays: from command to actuator, by input [s].
+        delays: from output to actuator, by input [s]; the law's own (`output_delays`) come to them.
     """
 
     law: ArduPilotLaw
     loops: tuple[LoopWorth, ...]
+    stabilize: tuple[LoopWorth, ...]
     slowest: complex
     delays: Mapping[str, float]
 
@@ -137,15 +139,17 @@ def judge_cascade(vehicle: Vehicle, hover: Trim, law: ArduPilotLaw, *, delays: M
     Raises:
         ControllerError: naming the command that the vehicle turns against.
     """
-    k, late = law.parameters, _row(vehicle, delays)
+    k, late = law.parameters, _row(vehicle, delays) + law.output_delays
     plant = cascade_plant(vehicle, hover, law.mixer, k, rate=law.rate, delays=late)
     refuse_turned_commands(plant.omega, plant.response, commands=COMMANDS, outputs=OUTPUTS, where=vehicle.name)
     whole, inner = feedback(plant.omega, k), feedback(plant.omega, k, place=False)
     commands, leans = broken_at_commands(plant, whole, (0, 1, 2, 3)), broken_at_leans(plant, inner, whole)
     names = ("roll", "pitch", "yaw", "height")
     loops = [*_worth(commands, names), *_worth(leans, ("place right", "place ahead"))]
+    alone = broken_at_commands(plant, feedback(plant.omega, k, height=False, place=False), (0, 1, 2))
     modes = _modes(vehicle, hover, law, "loiter", delays)
-    return CascadeGains(law, tuple(loops), complex(modes[0]) if modes.size else 0j, dict(delays))
+    slowest = complex(modes[0]) if modes.size else 0j
+    return CascadeGains(law, tuple(loops), tuple(_worth(alone, names[:3])), slowest, dict(delays))
 
 
 def cascade_gains(vehicle: Vehicle, hover: Trim, start: ArduPilotLaw, *, delays: Mapping[str, float]) -> CascadeGains:
@@ -162,7 +166,7 @@ def cascade_gains(vehicle: Vehicle, hover: Trim, start: ArduPilotLaw, *, delays:
     """
     if unmoved := refused_by_card(vehicle.card):
         raise ControllerError(f"no gains are given: {unmoved}", where=vehicle.name)
-    late = _row(vehicle, delays)
+    late = _row(vehicle, delays) + start.output_delays
     open_loops = {f"ATC_RAT_{axis}_{name}": 0.0 for axis in AXES for name in "PID"}
     k: dict[str, float] = {**start.parameters, **open_loops}
     plant = cascade_plant(vehicle, hover, start.mixer, k, rate=start.rate, delays=late, omega=COARSE)

@@ -14,7 +14,7 @@ from swashplate.links.ardupilot.sitl import Sitl
 from swashplate.links.ardupilot.trial import Background
 from swashplate.links.mavlink.commanding import Commanding
 from swashplate.links.mavlink.connection import Connection
-from swashplate.links.mavlink.greeting import ARDUPILOT, greet
+from swashplate.links.mavlink.greeting import ARDUPILOT, greet, other_build
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.sensing import Sensing
@@ -59,8 +59,8 @@ def who_it_is(sitl: Sitl, vehicle: Vehicle, mapping: ServoMapping, environment: 
         timeout: wall clock of each step: until its port is open, until it is heard, until it says its version [s].
 
     Raises:
-        LinkError: a binary that cannot be run, ends, opens no port, or is no ArduCopter of version 4.5 or later; a
-            port of the physics that is taken.
+        LinkError: a binary that cannot be run, ends, opens no port, is no ArduCopter of version 4.5 or later, or is
+            its build for other frames; a port of the physics that is taken.
     """
     around = Surroundings(environment)
     still = Immovable(at_rest(vehicle, environment), float(environment.gravity))
@@ -73,7 +73,9 @@ def who_it_is(sitl: Sitl, vehicle: Vehicle, mapping: ServoMapping, environment: 
     ):
         sitl.wait_for_port(timeout)
         with naming_the_end(sitl), Connection(f"tcp:127.0.0.1:{sitl.mavlink_port}", timeout=timeout) as connection:
-            greet(connection, ARDUPILOT, timeout)
+            kind = greet(connection, ARDUPILOT, timeout)
+            if told := other_build(kind, vehicle.traits.servo_layout):
+                raise LinkError(told, where=sitl.binary)
             return f"version {_dotted(_version(Commanding(connection), timeout, sitl))}"
 
 

@@ -54,7 +54,7 @@ def mixed(mixer: Mixer, hover: Trim, parameters: Mapping[str, float], *, inputs:
 
 
 def mixer_response(
-    model: LinearModel, moved: Array, output: str, omega: Array, *, late: float, gravity: float
+    model: LinearModel, moved: Array, output: str, omega: Array, *, late: Array | float, gravity: float
 ) -> Complex:
     """The linearised vehicle's answer to a mixer command, shape (n_f,).
 
@@ -62,11 +62,13 @@ def mixer_response(
         model: about the trim that is flown.
         moved: from `mixed`.
         output: "p", "q", "r", or "az" (specific force at the centre of gravity along body z).
-        omega: frequencies [rad/s]. late: by which the command acts later [s]. gravity: [m/s^2].
+        omega: frequencies [rad/s].
+        late: by which the inputs move later than the command [s], shape (n_inputs,) or one number for all.
+        gravity: [m/s^2].
     """
     place, eye = model.states.index, np.eye(len(model.states))
-    drive = model.B @ moved
-    states = np.array([np.linalg.solve(1j * w * eye - model.A, drive) for w in omega])
+    drives = np.exp(-1j * omega[:, None] * late) * moved @ model.B.T
+    states = np.array([np.linalg.solve(1j * w * eye - model.A, drive) for w, drive in zip(omega, drives, strict=True)])
     if output == "az":
         trim = model.trim.states()
         u, v, phi, theta = (trim[name] for name in ("u", "v", "phi", "theta"))
@@ -75,4 +77,4 @@ def mixer_response(
         answer += gravity * math.cos(theta) * math.sin(phi) * states[:, place("phi")]
     else:
         answer = states[:, place(output)]
-    return np.asarray(answer * np.exp(-1j * omega * late), dtype=np.complex128)
+    return np.asarray(answer, dtype=np.complex128)

@@ -14,6 +14,9 @@ ARDUPILOT, PX4, NO_AUTOPILOT = 3, 12, 8
 _GROUND_STATION = 6
 _ROTORCRAFT = (0, 2, 3, 4, 13, 14, 15, 29, 35)
 """MAV_TYPE that copter firmware has: no frame yet, and 2 to 12 rotors, coaxial, helicopter."""
+_HELICOPTER = 4
+_BUILDS = {True: "helicopters (arducopter-heli)", False: "multicopters and coaxials with two motors (arducopter)"}
+"""ArduCopter's two builds, by whether their type is a helicopter's."""
 
 
 def beat(connection: Connection) -> None:
@@ -47,3 +50,14 @@ def greet(connection: Connection, autopilot: int, timeout: float) -> int:
         channel="--mavlink",
         hint="Is it running, and its physics (swash link) too? A ground station may hold the port; give another one.",
     )
+
+
+def other_build(kind: int, layout: str) -> str:
+    """What is wrong with ArduCopter's type (MAV_TYPE) for a vehicle's `Traits.servo_layout`, in words; "" for nothing.
+
+    Its two builds fly other frames: a helicopter under the multicopters' would only lack its parameters.
+    """
+    found, expected = kind == _HELICOPTER, layout != "two motors"
+    if found == expected:
+        return ""
+    return f"MAVLink's type {kind}: this is the build for {_BUILDS[found]}, expected the one for {_BUILDS[expected]}."

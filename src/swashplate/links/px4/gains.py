@@ -57,7 +57,7 @@ def px4_law(mapping: ServoMapping, vehicle: Vehicle, hover: Trim, *, rate: float
         still = np.zeros(len(vehicle.input_names))
         plant = cascade_plant(vehicle, hover, mixer, k, rate=rate, delays=still, omega=COARSE)
         k |= {f"ATC_RAT_{axis}_FF": 1.0 / largest_rate(plant, "pq"[i], i) for i, axis in enumerate(AXES[:2])}
-    return ArduPilotLaw(vehicle.name, vehicle.card.title, "loiter", k, mixer, len(vehicle.input_names), rate)
+    return ArduPilotLaw(vehicle.name, vehicle.card.title, "loiter", k, mixer, len(vehicle.input_names), rate, "px4")
 
 
 def px4_gains(law: ArduPilotLaw) -> dict[str, float]:

@@ -17,6 +17,8 @@ from swashplate.physics.frames import Vector, local_to_body
 
 _TURNING = 0.5
 """Share of the governed speed below which a rotor carries nothing that could be doubted."""
+_CARRIES = 0.1
+"""Of the weight: a rotor that lifts less has no wake that could come back, and no number of it is told."""
 _ADVANCE = 0.35
 _LOADING = 0.13
 _FLAPPING = 0.21
@@ -73,7 +75,8 @@ def rotor_doubts(
     hover = float(np.sqrt(thrust / (2.0 * environment.air_density * np.pi * par.rotor_radius**2)))
     across = float(np.hypot(air.x, air.y))
     doubts: dict[str, str] = {}
-    if 0.5 * hover < air.z < 2.0 * hover and across < hover:
+    carries = thrust > _CARRIES * par.mass * environment.gravity
+    if carries and 0.5 * hover < air.z < 2.0 * hover and across < hover:
         doubts["vortex ring"] = (
             f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({0.5 * hover:.1f} to "
             f"{2.0 * hover:.1f} m/s below {hover:.1f} m/s of speed), where momentum theory is only a mean"

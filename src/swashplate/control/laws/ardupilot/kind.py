@@ -13,6 +13,7 @@ from swashplate.control.analysis.margins import Margins
 from swashplate.control.kinds import ControllerKind
 from swashplate.control.laws.ardupilot.law import ArduPilotLaw, FlightMode
 from swashplate.control.laws.ardupilot.mixers import FRAMES
+from swashplate.control.laws.ardupilot.outputs import LawFirmware
 from swashplate.control.laws.ardupilot.parameters import DEFAULTS, known
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
@@ -32,6 +33,7 @@ class _LawFile(msgspec.Struct, forbid_unknown_fields=True):
     frame: str
     inputs: int
     rate: float
+    firmware: LawFirmware
     mixer: dict[str, float]
     parameters: dict[str, float]
 
@@ -59,6 +61,7 @@ class ArduPilotKind(ControllerKind[ArduPilotLaw]):
             "frame": controller.frame,
             "inputs": controller.inputs,
             "rate": controller.rate,
+            "firmware": controller.firmware,
             "mixer": {name: float(value) for name, value in controller.mixer._asdict().items()},
             "parameters": {name: float(value) for name, value in controller.parameters.items()},
         }
@@ -79,7 +82,7 @@ class ArduPilotKind(ControllerKind[ArduPilotLaw]):
             raise ControllerError("is no parameter of the law.", where=path, channel=f"parameters.{strange[0]}")
         numbers = known(read.parameters, frame=read.frame)
         mixer = kind(**read.mixer)
-        return ArduPilotLaw(read.vehicle, read.model, read.mode, numbers, mixer, read.inputs, read.rate)
+        return ArduPilotLaw(read.vehicle, read.model, read.mode, numbers, mixer, read.inputs, read.rate, read.firmware)
 
 
 KIND = ArduPilotKind()

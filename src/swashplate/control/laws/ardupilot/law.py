@@ -17,6 +17,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.control.laws.ardupilot.filters import low_pass, notch, one_pole, reached_by
 from swashplate.control.laws.ardupilot.mixers import FRAMES, Mixer, SwashplateMixer
+from swashplate.control.laws.ardupilot.outputs import LOOPS_LATER, WIDEST, LawFirmware, output_delays
 from swashplate.control.laws.ardupilot.parameters import AXES, DEFAULTS, RATE
 from swashplate.engine.symbols import ArrayFunctions, Symbols
 from swashplate.models.vehicle import Vehicle
@@ -33,7 +34,7 @@ GRAVITY = 9.80665
 _MEMORY: Mapping[str, int] = {
     "begun": 1, "gyro": 6, "notch": 12, "climb": 1, "felt": 2, "target": 3, "turning": 3, "wanted": 3, "error": 3,
     "slope": 3, "sum": 3, "cut": 3, "speed_error": 2, "speed_slope": 2, "speed_sum": 2, "climb_error": 1,
-    "climb_sum": 1, "lift_error": 1, "lift_sum": 1, "throttle": 1,
+    "climb_sum": 1, "lift_error": 1, "lift_sum": 1, "throttle": 1, "sent": WIDEST,
 }  # fmt: skip
 """What the law carries, with sizes. Filters of gyros and of vertical acceleration keep two numbers for each stage."""
 _ENDS = np.cumsum(list(_MEMORY.values()))
@@ -63,6 +64,7 @@ class ArduPilotLaw(StepController):
         mixer: from commands to inputs.
         inputs: how many the vehicle has.
         rate: how often it runs [Hz].
+        firmware: whose outputs these are: some leave a loop later (`LOOPS_LATER`).
         settled: commands (roll, pitch, yaw, throttle) and attitude of the hover that it holds already at the start;
             none where it has yet to find them.
     """
@@ -74,6 +76,7 @@ class ArduPilotLaw(StepController):
     mixer: Mixer
     inputs: int
     rate: float = RATE_OF_LOOPS
+    firmware: LawFirmware = "ardupilot"
     settled: tuple[float, ...] = ()
     type: ClassVar[str] = "ardupilot"
 
@@ -89,7 +92,14 @@ class ArduPilotLaw(StepController):
             start[_PLACES["sum"]] = self.settled[:3]
             start[_PLACES["lift_sum"]] = start[_PLACES["throttle"]] = self.settled[3] - self.hover
             start[_PLACES["target"]], start[_PLACES["begun"]] = self.settled[4:], 1.0
+            settled = self.mixer.mix(np.array(self.settled[:4]), dict(self.parameters), np).inputs
+            start[_PLACES["sent"][: len(settled)]] = settled
         return start
+
+    @property
+    def output_delays(self) -> Array:
+        """From the end of a loop to the output [s], shape (inputs,)."""
+        return output_delays(self.firmware, self.frame, self.inputs, self.rate)
 
     @property
     def hover(self) -> float:
@@ -101,6 +111,7 @@ class ArduPilotLaw(StepController):
         """Its numbers as one row."""
         height, place = float(self.mode != "stabilize"), float(self.mode == "loiter")
         numbers = [1.0 / self.rate, height, place, *(self.parameters[name] for name in _NAMES), *self.mixer]
+        numbers += LOOPS_LATER[self.firmware][self.frame]
         return np.array(numbers, dtype=np.float64)
 
     @property
@@ -138,6 +149,7 @@ def ardupilot_step(
     k = {name: gains[head + i] for i, name in enumerate(_NAMES)}
     numbers: Any = [gains[rest + i] for i in range(len(FRAMES[frame]._fields))]
     mixer = FRAMES[frame](*numbers)
+    later = gains[rest + len(numbers) : rest + len(numbers) + inputs]
     m = {name: memory[where] for name, where in _PLACES.items()}
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     heli = issubclass(FRAMES[frame], SwashplateMixer)
@@ -153,8 +165,11 @@ def ardupilot_step(
     commands = _rates(body, rates, k, m, after, dt, xp, heli=heli)
     mixed = mixer.mix(xp.concatenate([commands, throttle]), k, xp)
     after["cut"] = mixed.cut
+    computed = mixed.inputs[:inputs]
+    waits = xp.greater(later, 0.5) & xp.greater(m["begun"], 0.5)
+    after["sent"] = xp.concatenate([computed, xp.zeros(WIDEST - inputs)]) if inputs < WIDEST else computed
     carried = xp.concatenate([xp.atleast_1d(after[name]) for name in _PLACES])
-    return carried, mixed.inputs[:inputs]
+    return carried, xp.where(waits, m["sent"][:inputs], computed)
 
 
 def square_root(error: Scalar, p: Scalar, most: Scalar, xp: ArrayFunctions) -> Any:
