@@ -57,7 +57,7 @@ def other_build(kind: int, layout: str) -> str:
 
     Its two builds fly other frames: a helicopter under the multicopters' would only lack its parameters.
     """
-    found, expected = kind == _HELICOPTER, layout != "two motors"
-    if found == expected:
+    build, expected = kind == _HELICOPTER, layout != "two motors"
+    if build == expected:
         return ""
-    return f"MAVLink's type {kind}: this is the build for {_BUILDS[found]}, expected the one for {_BUILDS[expected]}."
+    return f"MAVLink's type {kind}: this is the build for {_BUILDS[build]}, expected the one for {_BUILDS[expected]}."
