@@ -267,6 +267,8 @@ class _Record:
                 if followed >= _MOSTLY:
                     words = f"'{demand}' moved by itself, and explains {100.0 * followed:.0f} % of it."
                     return Excitation(self.name, name, SWEEP if swept else REFERENCE, words)
+        if swept and self.pure(name):
+            return Excitation(self.name, name, SWEEP, "a sweep is seen in it, and hardly anything else.")
         hands = f"; the sticks explain {100.0 * max(share, 0.0):.0f} % of it" if moved else ""
         words = (
             "a controller's answer: the log holds the set-points of its loop, and neither a sweep nor a stick nor a "

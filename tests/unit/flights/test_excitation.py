@@ -181,3 +181,16 @@ def test_a_programs_sweep_in_calm_air_is_a_sweep(high: float, noise: float) -> N
     columns = {"command": stick, "p": seen, "phi": np.cumsum(rate) * 0.02}
     flight = Flight({"uniform": stream(time, columns, {"command": "1"})}, Provenance("chirp"))
     assert judged(flight, "command", swept=["command"]).kind == "sweep"
+
+
+@pytest.mark.parametrize("pure", [True, False])
+def test_a_sweep_in_the_command_counts_beside_set_points_that_rest_only_where_it_is_pure(
+    flown: dict[str, Flight], pure: bool
+) -> None:
+    """An ArduPlane swept in MANUAL logs its rate demands, which never move."""
+    time = flown["hover"].time("p")
+    tone = 0.15 * chirp(time, 0.3, time[-1], 6.0)
+    answered = flown["hover"].values("mixer_roll") / np.std(flown["hover"].values("mixer_roll"))
+    log = with_channels(flown["hover"], mixer_roll=tone if pure else tone + 0.1 * answered, p_demand=0.0 * time)
+    assert judged(log, swept=["mixer_roll"]).kind == ("sweep" if pure else "controller")
+    assert judged(log).kind == "controller", "nothing was seen in it"
