@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,14 @@ def _collected(path: Path) -> Collected:
     begin = 0
     try:
         # Bags of older ROS 2 carry no definitions; the messages that are read here have not changed since.
-        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
+        with (
+            chdir(
+                path if path.is_dir() else path.parent
+            ),  # SQLite would take ?, # and % of a folder's name for its own
+            AnyReader(
+                [Path() if path.is_dir() else Path(path.name)], default_typestore=get_typestore(Stores.LATEST)
+            ) as bag,
+        ):
             begin = int(bag.start_time)
             for connection in bag.connections:
                 key = (connection.topic, connection.msgtype)

@@ -108,6 +108,15 @@ def test_a_rosbag2_folder_and_its_single_file(tmp_path: Path, plugin: StoragePlu
     _check(read(single))
 
 
+@pytest.mark.parametrize("folder", ["what?mode=memory", "fl%41ig#ht"])
+@pytest.mark.parametrize("bag", [_bag1, _bag2])
+def test_a_folder_of_any_name(bag: Any, folder: str, tmp_path: Path) -> None:
+    """SQLite takes the characters for its own: another file would be read, or none."""
+    (tmp_path / folder).mkdir()
+    (tmp_path / "what").mkdir()
+    _check(read(bag(tmp_path / folder)))
+
+
 def test_other_axes_can_be_given(tmp_path: Path) -> None:
     flight = read(_bag1(tmp_path / "a.bag"), world_axes="north-west-up", body_axes="forward-right-down")
     assert_allclose([flight.values(n)[0] for n in "xyz"], [1.0, -2.0, -3.0])
