@@ -112,9 +112,9 @@ def test_a_rosbag2_folder_and_its_single_file(tmp_path: Path, plugin: StoragePlu
 @pytest.mark.parametrize("bag", [_bag1, _bag2])
 def test_a_folder_of_any_name(bag: Any, folder: str, tmp_path: Path) -> None:
     """SQLite takes the characters for its own: another file would be read, or none."""
-    (tmp_path / folder).mkdir()
-    (tmp_path / "what").mkdir()
-    _check(read(bag(tmp_path / folder)))
+    (tmp_path / "written").mkdir()
+    name = bag(tmp_path / "written" / "a.bag").name
+    _check(read((tmp_path / "written").rename(tmp_path / folder) / name))
 
 
 def test_other_axes_can_be_given(tmp_path: Path) -> None:
