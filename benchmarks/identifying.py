@@ -22,10 +22,10 @@ import swashplate as sp
 from benchmarks.timing import Span
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.time.output_error import OutputError
 
-WARM = {"output-error": 5.0, "prediction-error": 12.0}
+WARM = {"output-error": 5.0, "filter-error": 12.0}
 COLD = 60.0
 FIRST = {
     "identify, cold": 10.0,
@@ -148,9 +148,9 @@ def scipy_least_squares(logged: sp.Flight) -> Span:
     """
     likelihood = OutputError(parameterize(_start(), "full"), records(logged, sp.vehicle("coax")))
     likelihood.refresh(likelihood.row.starts())
-    minimise(likelihood, iterations=2, together=True)
+    minimise(likelihood, Solver(iterations=2, together=True))
     begin = time.process_time()
-    best = minimise(likelihood, together=True)
+    best = minimise(likelihood, Solver(together=True))
     ours = time.process_time() - begin
     likelihood.refresh(best.row)  # both by the weights of the optimum
     white = np.linalg.inv(np.linalg.cholesky(likelihood.covariance)).T
@@ -188,7 +188,7 @@ def beside(rival: str) -> Span:
 
 def reports(logged: sp.Flight) -> list[Span]:
     """The page of a fit and the page of a validation, by the clock, the first of their process."""
-    fit = sp.identify(_start(), logged, free="full", method="prediction-error", keep_unexcited=True)
+    fit = sp.identify(_start(), logged, free="full", method="filter-error", keep_unexcited=True)
     pages = {"an identification": fit, "a validation": sp.validate(fit.model, logged)}
     spans = []
     with tempfile.TemporaryDirectory() as folder:
@@ -201,9 +201,9 @@ def reports(logged: sp.Flight) -> list[Span]:
 
 
 def measure(*, short: bool) -> list[Span]:
-    """The short form fits a short flight by prediction error alone."""
+    """The short form fits a short flight by filter error alone."""
     if short:
-        return [warm("prediction-error", flight(4.0), iterations=1)]
+        return [warm("filter-error", flight(4.0), iterations=1)]
     logged = flight()
     return [
         *first_answers(logged),

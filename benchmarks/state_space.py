@@ -15,7 +15,7 @@ from scipy.linalg import expm
 from benchmarks.timing import Span
 from swashplate.arrays import Array
 from swashplate.flights.flight import Flight, stream
-from swashplate.identification.time.linear_time_fit import fit_in_time
+from swashplate.identification.identify import identify
 from swashplate.models.linear.state_space_file import parse
 
 SECONDS, RATE, WITHIN = 60.0, 100.0, 5.0
@@ -68,7 +68,7 @@ def against_subspaces(*, seconds: float = SECONDS) -> Span:
     t, elevator, measured = record(seconds)
     flight = Flight({"uniform": stream(t, {"w": measured[:, 0], "q": measured[:, 1], "elevator": elevator})})
     begin = time.process_time()
-    fit = fit_in_time(parse(_MODEL), flight, shifts=False, method="filter-error")
+    fit = identify(parse(_MODEL), flight, shifts=False, method="filter-error")
     ours = time.process_time() - begin
     values = {e.name: e.value for e in fit.estimates}
     A = np.array([[values["Zw"], values["Zq"]], [values["Mw"], values["Mq"]]])

@@ -22,7 +22,7 @@ fit = sp.identify(
     coax,
     log("multisine:roll+pitch,0.4-4Hz,8s,0.1", seed=1),
     free=list(TRUTH),
-    method="output-error",  # nothing disturbs this flight; flights in real air take the default, "prediction-error"
+    method="output-error",  # nothing disturbs this flight; flights in real air take the default, "filter-error"
 )
 for name, truth in TRUTH.items():
     e = fit[name]

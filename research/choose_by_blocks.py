@@ -23,14 +23,14 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.multi_step import Horizon, MultiStepErrors
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.estimators import Question
 from swashplate.identification.time.estimates import LAGS, found_at
 from swashplate.identification.time.feedback import excitation, hold_unexcited
+from swashplate.identification.time.filter_error import SETTLING, FilterError
 from swashplate.identification.time.flight_details import AxisExcitation
-from swashplate.identification.time.identify import ITERATIONS, PREDICTION_ERROR
+from swashplate.identification.time.identify import FILTER_ERROR, ITERATIONS
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.identification.time.prediction_error import SETTLING, PredictionError
 from swashplate.models.vehicle import Vehicle
 from swashplate.validation.prediction import predict
 
@@ -77,9 +77,9 @@ def learnt(
     table = parameterize(coax, choice.free)
     if choice.free in HELD:
         table, _ = hold_unexcited(table, axes)
-    likelihood = PREDICTION_ERROR.likelihood_of(table, pieces, choice.asked)
-    assert isinstance(likelihood, PredictionError)
-    optimum = PREDICTION_ERROR.search(likelihood, ITERATIONS, None)
+    likelihood = FILTER_ERROR.likelihood_of(table, pieces, choice.asked)
+    assert isinstance(likelihood, FilterError)
+    optimum = FILTER_ERROR.search(likelihood, Solver(iterations=ITERATIONS))
     rows = {"likelihood": optimum.row}
     lags = round(LAGS / likelihood.model.dt)
     known = found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags).corrected

@@ -87,7 +87,7 @@ def record(of: Flight, *, start: int = 0, stop: int | None = None) -> Record:
 
 
 def fit(
-    *, name: str = "sweep.mat", failed: bool = False, simulated: bool = False, method: str = "prediction-error"
+    *, name: str = "sweep.mat", failed: bool = False, simulated: bool = False, method: str = "filter-error"
 ) -> Result[Any, Any]:
     """A fit of the CoaX to two pieces of a flight."""
     flown = flight(name=name, simulated=simulated)

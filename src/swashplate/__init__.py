@@ -86,8 +86,6 @@ if TYPE_CHECKING:
     from swashplate.identification.responses.frequency_response import FrequencyResponse
     from swashplate.identification.responses.respond import respond
     from swashplate.identification.time.equation_error import equation_error, stepwise
-    from swashplate.identification.time.linear_time_fit import fit_in_time
-    from swashplate.identification.time.vehicle_time_fit import fit_vehicle
     from swashplate.links.live.replay import replay
     from swashplate.models.card import Card, Parameter
     from swashplate.models.catalogue import cards_by_name as vehicles
@@ -158,13 +156,11 @@ __all__ = [
     "export_flight",
     "export_model",
     "fetch_dataset",
-    "fit_in_time",
     "fit_ss",
     "fit_state_space",
     "fit_tf",
     "fit_time",
     "fit_transfer_function",
-    "fit_vehicle",
     "fly_maneuver",
     "handling_qualities",
     "harmonics",

@@ -243,7 +243,7 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
         (("--unit", "x"), ("--unit", "NAME=VALUE")),
         (
             ("--wind", "--method", "output-error"),
-            ("wind", "'output-error' does not know it", "prediction-error"),
+            ("wind", "'output-error' does not know it", "filter-error"),
         ),
         (("--cutoff", "80"), ("80",)),
         (("--cutoff", "0.05"), ("simulated.nc", "10.000 s", "0.05 Hz", "20.000 s")),

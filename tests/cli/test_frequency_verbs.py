@@ -362,7 +362,7 @@ def test_a_model_is_fitted_in_time_and_verified_on_another_log(folder: Path, flo
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "identified in time" in page
     assert "NOT A HOLD-OUT" not in page
-    assert "is no method" in one_message(swash("fit-time", "rotor_body", short, "--method", "magic"))
+    assert "method is 'magic'" in one_message(swash("fit-time", "rotor_body", short, "--method", "magic"))
     assert "is no parameter" in one_message(swash("fit-time", "rotor_body", short, "--start", "Lbb=3"))
 
 

@@ -33,7 +33,7 @@ def _fit(vehicle: Vehicle, flights: list[Flight]) -> Result[Any, Any]:
     one = np.eye(1)
     estimate = Estimate("tau_f_upper", "s", 1.6, 1.3, 0.02, float("nan"))
     return Result(
-        method="prediction-error",
+        method="filter-error",
         solution=vehicle.with_values({"tau_f_upper": 1.3}, status="identified"),
         start=vehicle,
         estimates=(estimate,),

@@ -24,7 +24,7 @@ def test_commands_do_their_linear_algebra_in_one_thread(monkeypatch: pytest.Monk
 
 @pytest.mark.proof
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core only")
-@pytest.mark.parametrize("method", ["output-error", "prediction-error"])
+@pytest.mark.parametrize("method", ["output-error", "filter-error"])
 def test_identify_is_the_same_to_the_bit_on_one_core_and_on_two(method: str, tmp_path: Path) -> None:
     cores = sorted(os.sched_getaffinity(0))[:2]
 

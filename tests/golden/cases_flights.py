@@ -11,7 +11,7 @@ import swashplate as sp
 
 from . import extract
 from .case import Values, apart, case
-from .inner import equation_error, fit_in_time
+from .inner import equation_error
 
 AUGUST, JULY = "coax56/flight_2011-08-01_vertical", "coax56/flight_2011-07-25_hover_crash"
 
@@ -91,13 +91,13 @@ def simulated_output_error(folder: Path) -> Values:
 
 
 @case()
-def simulated_prediction_error(folder: Path) -> Values:
-    return simulated("prediction-error")
+def simulated_filter_error(folder: Path) -> Values:
+    return simulated("filter-error")
 
 
 @case()
-def simulated_prediction_error_with_wind(folder: Path) -> Values:
-    return simulated("prediction-error", wind=True)
+def simulated_filter_error_with_wind(folder: Path) -> Values:
+    return simulated("filter-error", wind=True)
 
 
 @case(data=["fvsysid"])
@@ -110,9 +110,9 @@ def hfb320_filter_error(folder: Path) -> Values:
     seen = dict(zip(names, rows[:, 1:11].T, strict=True))
     flight = hfb320.flight({n: seen[n] for n in (*hfb320.Inputs._fields, *hfb320.OUTPUTS)})
     how = {"free": list(hfb320.START), "outputs": hfb320.OUTPUTS, "environment": hfb320.AIR}
-    found = extract.of_time_fit(sp.fit_vehicle(hfb320.hfb320(), flight, **how))
+    found = extract.of_time_fit(sp.identify(hfb320.hfb320(), flight, **how))
     for method in ("output-error", "prediction-error"):
-        other = extract.of_time_fit(sp.fit_vehicle(hfb320.hfb320(), flight, method=method, iterations=15, **how))
+        other = extract.of_time_fit(sp.identify(hfb320.hfb320(), flight, method=method, iterations=15, **how))
         found |= {f"{method}.{name}": value for name, value in other.items()}
     return found
 
@@ -154,9 +154,10 @@ def unstable_aircraft(folder: Path) -> Values:
     (folder / "unstable.toml").write_text(text, encoding="utf-8")
     model = sp.structure(folder / "unstable.toml")
     found: Values = {}
-    for method in ("output-error", "filter-error", "prediction-error"):
-        one = extract.of_time_fit(fit_in_time(model, flight, shifts=False, method=method))
-        found |= {f"{method}.{name}": value for name, value in one.items()}
+    ways = {"output-error": {}, "filter-error": {}, "lasting-gusts": {"method": "filter-error", "gusts": "lasting"}}
+    for name, how in ways.items():
+        one = extract.of_time_fit(sp.identify(model, flight, shifts=False, **{"method": name, **how}))
+        found |= {f"{name}.{entry}": value for entry, value in one.items()}
     errors = equation_error(az, np.column_stack([w, q, elevator]), ["w", "q", "de"], dt=0.05, band=(0.05, 2.0))
     found |= apart("equation.values", (errors[n] for n in ("w", "q", "de")))
     return found | apart("equation.sigmas", errors.sigmas)

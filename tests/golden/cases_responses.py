@@ -12,7 +12,7 @@ import swashplate as sp
 from . import extract
 from .case import Values, case, named
 from .cases_flights import data
-from .inner import Flight, Provenance, as_state_space, fit_in_time, stream, suggest, suggest_gains, verify_inside
+from .inner import Flight, Provenance, as_state_space, stream, suggest, suggest_gains, verify_inside
 
 MIXER, RATES = ("mixer_roll", "mixer_pitch"), ("p", "q")
 
@@ -36,7 +36,7 @@ def ardupilot_rates(folder: Path) -> Values:
     for s in suggest_gains(fit.solution):
         found |= {f"gain.{name}": float(value) for name, value in s.parameters.items()}
     found |= named("verify", extract.of_verification(sp.verify(fit.solution, unseen)))
-    in_time = fit_in_time(fit.solution, unseen, iterations=20)
+    in_time = sp.identify(fit.solution, unseen, iterations=20)
     return found | named("time", extract.of_time_fit(in_time))
 
 

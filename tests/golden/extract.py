@@ -34,7 +34,7 @@ def swash_json(*arguments: str | Path, code: int = 0) -> Any:
 
 
 def of_fit(fit: Any) -> Values:
-    """A fit of a vehicle by prediction error or output error."""
+    """A fit of a vehicle by filter error or output error."""
     found: Values = {
         "converged": bool(fit.converged),
         "failed": bool(fit.failed),

@@ -7,8 +7,8 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.frequency.transfer_function_fit import as_state_space
 from swashplate.identification.frequency.transfer_function_forms import suggest
+from swashplate.identification.identify import identify
 from swashplate.identification.time.equation_error import equation_error
-from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.validation.verify import verify_inside
 
 __all__ = [
@@ -16,7 +16,7 @@ __all__ = [
     "Provenance",
     "as_state_space",
     "equation_error",
-    "fit_in_time",
+    "identify",
     "stream",
     "suggest",
     "suggest_gains",

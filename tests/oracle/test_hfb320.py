@@ -33,10 +33,9 @@ from hfb320 import (
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Result
+from swashplate.identification.identify import identify
 from swashplate.identification.time.equation_error import equation_error
-from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors
-from swashplate.identification.time.vehicle_time_fit import fit_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse
 from swashplate.physics.backend import FloatBackend
@@ -155,7 +154,7 @@ def test_published_numbers_give_the_published_innovations(hfb: dict[str, np.ndar
     K = solve_continuous_are(A.T, C.T, np.diag(PUBLISHED_GUSTS) ** 2, 0.1 * R) @ C.T @ np.linalg.inv(R)
     table = parameterize(aeroplane, list(PUBLISHED))
     own = records(flight({n: hfb[n] for n in (*Inputs._fields, *OUTPUTS)}), aeroplane, outputs=OUTPUTS)
-    likelihood = VehicleErrors(table, own, method="prediction-error", environment=AIR, shifts=False, biases=())
+    likelihood = VehicleErrors(table, own, gain="free", environment=AIR, shifts=False, biases=())
     likelihood.refresh(np.array([*PUBLISHED.values(), *FIRST, *K.ravel()]) / likelihood.row.scale)
     np.testing.assert_allclose(np.diag(likelihood.covariance), PUBLISHED_VARIANCES, rtol=0.005)  # worst: 0.3 %
 
@@ -168,7 +167,7 @@ def test_hfb_320_by_filter_error_is_the_published(hfb: dict[str, np.ndarray]) ->
     gain may pass one is active.
     """
     columns = {n: hfb[n] for n in (*Inputs._fields, *OUTPUTS)}
-    fit = fit_vehicle(hfb320(), flight(columns), free=list(START), outputs=OUTPUTS, environment=AIR)
+    fit = identify(hfb320(), flight(columns), free=list(START), outputs=OUTPUTS, environment=AIR)
     assert fit.converged
     for name in PUBLISHED:
         assert abs(off(fit, name)) < (1.4 if name in ("Cma", "Cmde") else 0.6), fit
@@ -187,7 +186,7 @@ def test_hfb_320_linearised_is_near_the_published(hfb: dict[str, np.ndarray]) ->
     """
     aircraft = hfb_model(hfb)
     columns = {n: hfb[n] - hfb[n].mean() for n in (*aircraft.inputs, *aircraft.outputs)}
-    fit = fit_in_time(aircraft, flight(columns), biases=["ax", "az"], method="filter-error")
+    fit = identify(aircraft, flight(columns), biases=["ax", "az"], method="filter-error")
     assert fit.converged
     for name in START:
         if name[2] != "0":
@@ -195,5 +194,5 @@ def test_hfb_320_linearised_is_near_the_published(hfb: dict[str, np.ndarray]) ->
     assert fit["CLa"].value == pytest.approx(PUBLISHED["CLa"], rel=0.01)
     assert fit["Cmq"].value == pytest.approx(PUBLISHED["Cmq"], rel=0.06)
     assert fit["CDa"].value == pytest.approx(PUBLISHED["CDa"], rel=0.03)
-    naive = fit_in_time(aircraft, flight(columns), biases=["ax", "az"], iterations=25)
+    naive = identify(aircraft, flight(columns), biases=["ax", "az"], iterations=25)
     assert abs(naive["CLa"].value / PUBLISHED["CLa"] - 1.0) > 0.2

@@ -10,9 +10,9 @@ import pytest
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight, stream
+from swashplate.identification.identify import identify
 from swashplate.identification.time.equation_error import equation_error
 from swashplate.identification.time.linear_simulation import delayed
-from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse, structure
 from swashplate.simulation.discretisation import first_order_hold
@@ -40,7 +40,7 @@ def test_unstable_aircraft_is_the_truth_within_a_percent(shared_data: Path) -> N
         {"U0": 44.5695, "Zq": -1.4768, "Zw": -1.0, "Zde": -5.0, "Mw": 0.1, "Mq": -3.0, "Mde": -10.0},
     )
     held = {name: aircraft.parameters[name].value for name in ("U0", "Zq")}
-    fit = fit_in_time(aircraft.with_values(held, free=False), flight, shifts=False)
+    fit = identify(aircraft.with_values(held, free=False), flight, shifts=False)
     text = (shared_data / "fvsysid" / "unstable_aircraft_table9_1.csv").read_text(encoding="utf-8")
     table = {r["method"]: r for r in csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))}
     for name in ("Zw", "Mw", "Mq"):
@@ -83,18 +83,18 @@ def test_aircraft_in_turbulence_comes_back_with_its_bounds(method: str, shared_d
     # With all his outputs the accelerations tell everything; gusts are no errors to the innovations.
     accelerations = '[outputs.pdot]\nrates = {p = "1"}\n[outputs.rdot]\nrates = {r = "1"}\n'
     every = aircraft(accelerations + f"[outputs.ay]\nof = {row('Y')}\n", "LNY")
-    found = fit_in_time(every, flight, biases=["ay"], method="prediction-error")
+    found = identify(every, flight, biases=["ay"], method="prediction-error")
     assert found.converged
     for name, value in truth.items():
         assert found[name].value == pytest.approx(value, rel=1e-3), name
     # By the rates alone, which the gusts move: bounds hold where gusts are in the model, and nowhere else.
-    fit = fit_in_time(aircraft("", "LN"), flight, method=method)
+    fit = identify(aircraft("", "LN"), flight, method=method)
     off = np.array([(p.value - truth[p.name]) / p.sigma for p in fit.estimates])
     assert fit.converged
     assert np.sqrt(np.mean(off**2)) < 1.3  # measured: 1.0 and 0.9
     assert np.max(np.abs(off)) < 3.0
     assert fit["Lp"].value == pytest.approx(truth["Lp"], rel=0.2)
-    naive = fit_in_time(aircraft("", "LN"), flight, iterations=25)
+    naive = identify(aircraft("", "LN"), flight, iterations=25)
     off = np.array([(p.value - truth[p.name]) / p.sigma for p in naive.estimates])
     assert np.max(np.abs(off)) > 8.0
 
@@ -112,7 +112,7 @@ def test_delays_and_heave_come_back_with_their_bounds() -> None:
     c, d = truth.explicit()[2:]
     az = (w @ c.T + late @ d.T)[:, 0] + 0.05 * random.standard_normal(time.size)
     flight = Flight({"uniform": stream(time, {"mixer_collective": u, "az": az}, {"mixer_collective": "1"})})
-    fit = fit_in_time(structure("heave"), flight, shifts=False)
+    fit = identify(structure("heave"), flight, shifts=False)
     for name, value in (("Zw", -2.25), ("Zcol", -27.43), ("tau_collective", 0.0527)):
         assert abs(fit[name].value - value) < 3.0 * fit[name].sigma
         assert fit[name].sigma < 0.03 * abs(value)
@@ -131,21 +131,21 @@ def test_gusts_need_the_innovations() -> None:
         {"Lp": -2.0, "Lstick": 1.0},
     )  # fmt: skip
     flight = Flight({"uniform": stream(np.arange(3000) * 0.01, {"p": y, "stick": u}, {"stick": "1"})})
-    found = fit_in_time(aircraft, flight, shifts=False, method="prediction-error")
+    found = identify(aircraft, flight, shifts=False, method="prediction-error")
     assert found.converged
     for name, value in (("Lp", -1.0), ("Lstick", 2.0)):
         assert abs(found[name].value - value) < 3.0 * found[name].sigma, found
-    naive = fit_in_time(aircraft, flight, shifts=False)
+    naive = identify(aircraft, flight, shifts=False)
     assert abs(naive["Lp"].value + 1.0) > 4.0 * naive["Lp"].sigma  # its bound knows nothing of gusts
 
 
 def test_what_the_fit_in_time_cannot_do_is_said() -> None:
     nothing = np.zeros(100)
     flight = Flight({"uniform": stream(np.arange(100) * 0.01, {"mixer_collective": nothing, "az": nothing})})
-    with pytest.raises(IdentificationError, match="is no method"):
-        fit_in_time(structure("heave"), flight, method="magic")
+    with pytest.raises(IdentificationError, match="method is 'magic'"):
+        identify(structure("heave"), flight, method="magic")
     with pytest.raises(IdentificationError, match="is no output of 'heave'"):
-        fit_in_time(structure("heave"), flight, biases=["p"])
+        identify(structure("heave"), flight, biases=["p"])
     fixed = structure("heave").with_values({"Zw": -1.0, "Zcol": -20.0, "tau_collective": 0.0}, free=False)
     with pytest.raises(IdentificationError, match="no free parameter"):
-        fit_in_time(fixed, flight)
+        identify(fixed, flight)

@@ -16,7 +16,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.belonging import unrelated
-from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.filter_error import FilterError
 
 NAME = "nanobench/B2_circle_fast_rep2"
 
@@ -69,7 +69,7 @@ def test_commands_of_another_time_are_told_from_those_of_the_flight(shared_data:
     assert pieces[0].output_names[-3:] == ("p", "q", "r")  # its gyroscope is read
 
     def cost(asked: Sequence[Record]) -> float:
-        likelihood = PredictionError(Parameterization(vehicle, ()), asked)
+        likelihood = FilterError(Parameterization(vehicle, ()), asked)
         return likelihood.cost(likelihood.row.starts())
 
     assert unrelated(cost, pieces) == ""

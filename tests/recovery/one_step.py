@@ -14,7 +14,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.identification.core import accuracy
 from swashplate.identification.time.estimates import LAGS
-from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.filter_error import FilterError
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Step:
         return np.asarray(self.error / self.sigma)
 
 
-def one_step(likelihood: PredictionError, truth: Mapping[str, float], noise: Mapping[str, float]) -> Step:
+def one_step(likelihood: FilterError, truth: Mapping[str, float], noise: Mapping[str, float]) -> Step:
     """A step from the truth.
 
     Args:

@@ -1,6 +1,6 @@
 """A hold that is flown from camera readings: those that the log holds, or those of cameras of its own.
 
-Bounds of a prediction error hold in a closed loop where the commands are functions of the readings that the filter has
+Bounds of filter error hold in a closed loop where the commands are functions of the readings that the filter has
 (Ljung 1999, sec. 13.4; Soederstroem and Stoica 1989, ch. 10). A real aircraft is flown so: its log holds what its
 controller saw. A command that is made of true states tells of them what no reading does.
 """

@@ -18,7 +18,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
-from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.record import monitored
 
@@ -94,7 +94,7 @@ def errors(name: str, kind: str) -> Errors:
             noises.append([max(float(x), 1e-12) for x in fit.noise])
         noise = dict(zip(Noise._fields, np.exp(np.mean(np.log(noises), axis=0)), strict=True))
         made = records([monitored(one, vehicle) for one in logged], vehicle)
-        likelihood = PredictionError(parameterize(vehicle, unknown), made, noise=Noise())
+        likelihood = FilterError(parameterize(vehicle, unknown), made, noise=Noise())
         steps.append(one_step(likelihood, values, noise).error / [values[n] for n in unknown])
     return Errors(np.array(steps), np.array(fits))
 

@@ -62,12 +62,12 @@ def test_hub_spring_blades_and_wake_distortion_come_back_by_output_error(tmp_pat
 
 
 @pytest.mark.proof
-def test_they_come_back_by_prediction_error_and_the_model_predicts_another_flight(tmp_path: Path) -> None:
+def test_they_come_back_by_filter_error_and_the_model_predicts_another_flight(tmp_path: Path) -> None:
     """The default method; compiling its derivatives for a helicopter takes minutes.
 
     The rival of the validation is the card that the model came from, without being named.
     """
-    found = _recovered(tmp_path, "prediction-error", free="rotor", seconds=15)
+    found = _recovered(tmp_path, "filter-error", free="rotor", seconds=15)
     assert found["hub_stiffness"] == pytest.approx(35.0, rel=0.02)
     assert found["blade_inertia"] == pytest.approx(0.023, rel=0.02)
     assert found["wake_distortion"] == pytest.approx(1.0, abs=0.05)

@@ -13,11 +13,11 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record, records
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.time import identify
 from swashplate.identification.time.feedback import excitation
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.kinematics import measured_states
-from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.identification.time.residual_fit import LinearResidual, fit_residual
 from swashplate.models.residual import with_residual
 from swashplate.models.vehicle import Vehicle
@@ -57,8 +57,8 @@ def test_a_known_residual_is_found() -> None:
 
 def told(vehicle: Vehicle, pieces: list[Record], *, judged: bool) -> LinearResidual:
     """The residual of a flight by the likelihood's noise and constants, perhaps with a look at what moves its axes."""
-    likelihood = PredictionError(Parameterization(vehicle, ()), pieces)
-    row = minimise(likelihood, iterations=30).row
+    likelihood = FilterError(Parameterization(vehicle, ()), pieces)
+    row = minimise(likelihood, Solver(iterations=30)).row
     nuisances = [Nuisance(*numbers.nuisance.tolist()) for numbers in likelihood.numbers(row)]
     axes = [axis for piece in pieces for axis in excitation(vehicle, piece, measured_states(piece, Nuisance()))]
     return fit_residual(vehicle, pieces, nuisances, likelihood.noise_of(row), axes=axes if judged else ())

@@ -76,14 +76,14 @@ def test_many_seeds_scatter_as_predicted() -> None:
 def in_gusts(sigma: float, loop: str) -> tuple[list[Recovery], list[Recovery]]:
     """Whole fits of a few seeds, and one step from the truth for all: to first order where a fit would end."""
     flights = [flown_in_gusts(seed, sigma=sigma, controller=LOOPS[loop](seed)) for seed in range(GUSTY)]
-    fits = [recover(flights[seed], seed=seed, method="prediction-error", wind=True) for seed in range(WHOLE)]
+    fits = [recover(flights[seed], seed=seed, method="filter-error", wind=True) for seed in range(WHOLE)]
     noise = {name: float(np.exp(np.mean([np.log(fit.noise[name]) for fit in fits]))) for name in FOUND}
     noise |= {"wind": float(np.sqrt(2.0) * sigma), "tau_wind": 1.0}
     return fits, [step_from_truth(flight, seed=seed, noise=noise) for seed, flight in enumerate(flights)]
 
 
 @pytest.mark.proof
-def test_prediction_error_scatters_as_predicted_in_gusts() -> None:
+def test_filter_error_scatters_as_predicted_in_gusts() -> None:
     """All conditions together hold what is promised; the page shows each by itself."""
     fits: list[Recovery] = []
     steps: dict[str, list[Recovery]] = {loop: [] for loop in LOOPS}
@@ -121,7 +121,7 @@ def test_prediction_error_scatters_as_predicted_in_gusts() -> None:
         "recovery_gusts",
         f"Simulate, identify, recover in gusts of {GUSTS[0]} to {GUSTS[-1]} m/s: to first order, {len(together)} seeds",
         f"The usual sensors on '{MANEUVER}' in horizontal gusts, roll and pitch in an open loop and under a "
-        "controller that sees what is logged; prediction error with a wind; one Gauss-Newton step from the truth. "
+        "controller that sees what is logged; filter error with a wind; one Gauss-Newton step from the truth. "
         f"{len(fits)} whole fits from starts a quarter to a half off end {np.mean(apart):.2f} sigmas from that step on "
         f"average, {np.max(apart):.2f} at most; {100.0 * inside(fits):.1f} % of their estimates lie within two sigmas.",
         (0.92, 0.98),

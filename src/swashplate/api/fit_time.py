@@ -10,7 +10,7 @@ from swashplate.api.saying import Say, silent
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
 from swashplate.identification.core import stopping
-from swashplate.identification.time.linear_time_fit import fit_in_time
+from swashplate.identification.identify import identify
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.validation.verify import verify
 
@@ -26,6 +26,7 @@ def fit_time(
     start: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     iterations: int = 80,
+    gusts: str | None = None,
     horizon: Sequence[float] | None = None,
     hold_out: Flight | Iterable[Flight] = (),
     rate: float = 100.0,
@@ -38,11 +39,12 @@ def fit_time(
     Args:
         model: a file with start values, a ready structure's name, or a linear model.
         flights: as logged.
-        method: "output-error"; "filter-error" or "prediction-error" in gusts.
+        method: "output-error"; in gusts "filter-error" (a gain made of the noise) or "prediction-error" (a free gain).
         outputs: channels to fit; all of the model's where None.
         biases: outputs with a constant of their own in each record. shifts: constants in the states' rates.
         start: start values by name. fixed: values of parameters that are held.
         iterations: at most this many.
+        gusts: "white" (None) or "lasting", of filter error: see `identify`.
         horizon: (FIRST, LAST) seconds ahead of errors to make small after maximum likelihood, see `identify`.
         hold_out: flights as logged, to verify on; without them the records of the fit are shown, and marked as such.
         rate, cutoff, names: how flights are brought to one rate, see `uniform_records`.
@@ -59,7 +61,7 @@ def fit_time(
     records = uniform_records(flights, channels, rate=rate, cutoff=cutoff, names=names)
     say("fitting")
     with stopping.kept():
-        fit = fit_in_time(
+        fit = identify(
             begun,
             records,
             outputs=wanted,
@@ -67,6 +69,7 @@ def fit_time(
             biases=biases,
             method=method,
             iterations=iterations,
+            gusts=gusts,
             horizon=horizon,
             progress=lambda i, cost: say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
         )

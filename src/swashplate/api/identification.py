@@ -31,7 +31,7 @@ from swashplate.validation.controller_law import check_closed
 from swashplate.validation.validation import Validation
 from swashplate.validation.verb import validate
 
-TRACKED = ("prediction-error", "output-error")
+TRACKED = ("filter-error", "output-error")
 """Methods that are checked for a tracked pose before anything is computed."""
 
 
@@ -93,7 +93,7 @@ def identify_and_validate(
     *,
     hold_out: Flight | Iterable[Flight] = (),
     free: str | Sequence[str | Free] = "full",
-    method: str = "prediction-error",
+    method: str = "filter-error",
     outputs: Sequence[str] | None = None,
     ties: Sequence[str] = (),
     fixed: Mapping[str, float] | None = None,

@@ -17,7 +17,11 @@ def fit_time(
     log: Annotated[list[str], typer.Argument(metavar="LOG...", help="Flights; FILE@5-30 takes seconds 5 to 30.")],
     out: options.OutFolder = None,
     method: Annotated[
-        str, typer.Option("--method", help="output-error; filter-error or prediction-error in gusts.")
+        str,
+        typer.Option(
+            "--method",
+            help="output-error; in gusts filter-error (gain of the noise) or prediction-error (free gain).",
+        ),
     ] = "output-error",
     outputs: Annotated[
         str | None,
@@ -30,6 +34,9 @@ def fit_time(
     start: flying.Start = None,
     fix: flying.Fix = None,
     iterations: Annotated[int, typer.Option("--iterations", help="Largest number of iterations.", min=1)] = 80,
+    gusts: Annotated[
+        str | None, typer.Option("--gusts", help="Of filter-error: white (usual) or lasting, in the air of u, v, w.")
+    ] = None,
     horizon: options.HorizonAhead = None,
     hold_out: options.HoldOut = None,
     rate: options.Rate = 100.0,
@@ -64,6 +71,7 @@ def fit_time(
             start=first,
             fixed=held,
             iterations=iterations,
+            gusts=gusts,
             horizon=options.seconds_ahead(horizon),
             hold_out=read_all(hold_out, how=how),
             rate=rate,

@@ -28,9 +28,9 @@ def identify(
         str,
         typer.Option(
             "--method",
-            help="prediction-error, output-error, or another package's.",
+            help="filter-error, output-error, prediction-error, or another package's.",
         ),
-    ] = "prediction-error",
+    ] = "filter-error",
     outputs: Annotated[
         str | None,
         typer.Option("--outputs", help="Channels to fit, separated by commas; the method's own choice by default."),

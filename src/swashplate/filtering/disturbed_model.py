@@ -1,4 +1,4 @@
-"""A vehicle in disturbed air, seen by sensors: the model whose one-step predictions prediction error compares.
+"""A vehicle in disturbed air, seen by sensors: the model whose one-step predictions filter error compares.
 
 The vehicle's own states are joined by two disturbances on each of the six accelerations: a gust (Ornstein-Uhlenbeck,
 it fades) and a drift (random walk: trims, battery, servo zeros). Where asked, a horizontal wind (Ornstein-Uhlenbeck

@@ -1,14 +1,16 @@
 """Estimators: ways from data to a `Result`, of which `identify` takes the one that suits model and data.
 
-A new one is a file with an object of the protocol `Estimator` and a line in `ESTIMATORS` (or an entry point of the
-group `swashplate.estimators` in another package).
+A method's name says where the gain that corrects the states along a record comes from (`GAINS`), for every model; what
+else there is (errors ahead by `horizon`, wind, a residual, constants of records) is asked for beside it. A new one is a
+file with an object of the protocol `Estimator` and a line in `ESTIMATORS` (or an entry point of the group
+`swashplate.estimators` in another package).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
@@ -22,6 +24,13 @@ from swashplate.physics.environment import Environment
 from swashplate.registry import Registry
 
 Data = tuple[Flight, ...] | FrequencyResponse
+
+Gain = Literal["none", "from the noise", "free"]
+
+GAINS: Mapping[str, Gain] = {"output-error": "none", "filter-error": "from the noise", "prediction-error": "free"}
+"""Where the gain of each method in time comes from, in the field's words (Jategaonkar 2015, ch. 4 and 5; Ljung 1999,
+sec. 7.3): output error corrects nothing, filter error takes the Kalman gain of the noise that it estimates, prediction
+error has the innovations form, whose gain is free."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +64,7 @@ class Question:
     environment: Environment | None = None
     shifts: bool | None = None
     biases: Sequence[str] = ()
+    gusts: str | None = None
     horizon: Sequence[float] | None = None
     residual: bool = False
     progress: Callable[[int, float], None] | None = None
@@ -89,14 +99,16 @@ ESTIMATORS: Registry[Estimator] = Registry(
     "estimators",
     what="method of identification",
     own={
-        "prediction-error": "swashplate.identification.time.identify:PREDICTION_ERROR",
+        "filter-error": "swashplate.identification.time.identify:FILTER_ERROR",
         "output-error": "swashplate.identification.time.identify:OUTPUT_ERROR",
-        "filter-error/vehicle": "swashplate.identification.time.vehicle_time_fit:FILTER_ERROR",
-        "prediction-error/vehicle": "swashplate.identification.time.vehicle_time_fit:PREDICTION_ERROR",
-        "output-error/vehicle": "swashplate.identification.time.vehicle_time_fit:OUTPUT_ERROR",
-        "output-error/linear": "swashplate.identification.time.linear_time_fit:OUTPUT_ERROR",
-        "filter-error/linear": "swashplate.identification.time.linear_time_fit:FILTER_ERROR",
-        "prediction-error/linear": "swashplate.identification.time.linear_time_fit:PREDICTION_ERROR",
+        **{
+            f"{method}/vehicle": f"swashplate.identification.time.vehicle_problem:{method.replace('-', '_').upper()}"
+            for method in ("filter-error", "prediction-error", "output-error")
+        },
+        **{
+            f"{method}/linear": f"swashplate.identification.time.linear_problem:{method.replace('-', '_').upper()}"
+            for method in GAINS
+        },
         "frequency-responses": "swashplate.identification.frequency.state_space_fit:FREQUENCY_RESPONSES",
     },
 )

@@ -36,6 +36,7 @@ def identify(
     environment: Environment | None = None,
     shifts: bool | None = None,
     biases: Sequence[str] = (),
+    gusts: str | None = None,
     horizon: Sequence[float] | None = None,
     residual: bool = False,
     progress: Callable[[int, float], None] | None = None,
@@ -48,10 +49,11 @@ def identify(
             responses, for a state-space model.
         free: "full", "flight" (the paper's six) or names; "full" where nothing is said and the vehicle has that choice.
             A state-space model says itself what is free.
-        method: one of `ESTIMATORS`; None takes the first that suits model and data. For helicopters with their pose
-            tracked "prediction-error" (flights in disturbed air or under feedback) or "output-error" (undisturbed
-            open-loop flights and simulations); for any other equations and for state-space models "filter-error",
-            "prediction-error" or "output-error".
+        method: one of `ESTIMATORS`; None takes the first that suits model and data. "filter-error" (disturbed air, or
+            feedback) has a Kalman gain made of the noise that it estimates: gusts that last for helicopters with their
+            pose tracked, white noise on every state's rate for other equations. "prediction-error" has a free gain:
+            any stationary gust, for long records. "output-error" has none: undisturbed open-loop flights and
+            simulations.
         ties: "name = expression" each.
         fixed: values of parameters that are not to move.
         priors: mean and standard deviation by name.
@@ -59,15 +61,17 @@ def identify(
         outputs: measured channels.
         iterations: at most this many.
         keep_unexcited: True also frees parameters of axes that the flights do not move independently.
-        wind: True estimates a horizontal wind that acts through the equations (prediction error only): for flights
-            outdoors or in strong gusts.
+        wind: True estimates a horizontal wind that acts through the equations (filter error of tracked helicopters
+            only): for flights outdoors or in strong gusts.
         rotor_line: signed frequency [Hz] of a rotor's line in what is measured, as `rotor_speed` tells it: its
-            oscillation, of wandering phase, is then part of the sensors' noise (prediction error only).
+            oscillation, of wandering phase, is then part of the sensors' noise (as `wind`).
         leave_out: stamps (start, stop) [s] of stretches that the filter passes and nothing is learnt from, as where the
-            aircraft was touched (`Contact.intervals`; prediction error only).
+            aircraft was touched (`Contact.intervals`; as `wind`).
         environment: wind, density and gravity, for equations of your own.
         shifts: constants in the states' rates, per record (None: for state-space models alone).
         biases: outputs with a constant of their own, per record.
+        gusts: of filter error for state-space models, "white" (None) or "lasting", which move the air that the states
+            u, v, w fly through.
         horizon: (FIRST, LAST) in seconds: after maximum likelihood, make errors FIRST, 2 FIRST, ... LAST seconds ahead
             small, predicted from the filter's states; for methods with a filter (`core.multi_step`). Bounds are those
             of this criterion, corrected for predictions that overlap.
@@ -107,6 +111,7 @@ def identify(
         environment=environment,
         shifts=shifts,
         biases=tuple(biases),
+        gusts=gusts,
         horizon=None if horizon is None else tuple(horizon),
         residual=residual,
         progress=progress,

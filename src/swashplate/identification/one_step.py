@@ -17,8 +17,8 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.result import Result, bounds_of
-from swashplate.identification.core.time_fit import LAGS
 from swashplate.identification.effect_test import MOVED, EffectTest, chance_of, holm
+from swashplate.identification.time.record_fit import LAGS
 from swashplate.models.choices import PhysicalEffect
 
 _SINGULAR = 1e14
@@ -83,7 +83,7 @@ def not_judged(fit: Result[Any, Any], effects: Sequence[PhysicalEffect] | None =
     held = [effect.name for effect in effects if not any(name in fit.names for name in effect.without)]
     if not held:
         return ""
-    return f"Held and not judged here: {', '.join(held)} (only a prediction-error fit judges them)."
+    return f"Held and not judged here: {', '.join(held)} (only a filter-error fit judges them)."
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,8 @@ def _setting(name: str) -> str:
 def method_words(method: str) -> str:
     """A method's name for a sentence."""
     return {
-        "prediction-error": "prediction error (maximum likelihood with process noise)",
+        "filter-error": "filter error (maximum likelihood with process noise)",
+        "prediction-error": "prediction error (maximum likelihood with a free gain)",
         "output-error": "output error (maximum likelihood without process noise)",
     }.get(method, method)
 

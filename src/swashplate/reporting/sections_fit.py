@@ -12,6 +12,7 @@ from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.result import Estimate, Result
+from swashplate.identification.estimators import GAINS
 from swashplate.identification.one_step import in_words, not_judged, one_step_effects
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.reporting.figures_fit import (
@@ -139,7 +140,7 @@ def _remarks(fit: Result[Any, Any], e: Estimate) -> tuple[str, bool, str]:
 
 def comparison(fit: Result[Any, Any]) -> Section:
     """Flight against model for every channel, one pair of figures per flight."""
-    one_step = fit.method == "prediction-error"
+    one_step = GAINS.get(fit.method, "none") != "none"
     words = "one-step prediction" if one_step else "simulation on the recorded inputs"
     intro = (
         "Each model sample was predicted one sample ahead from everything measured before it, so the lines should "

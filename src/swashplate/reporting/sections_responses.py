@@ -11,7 +11,6 @@ from swashplate.arrays import Complex
 from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.control.analysis.rate_gain_names import ROTORFLIGHT, gain_text
 from swashplate.identification.core.result import Estimate, Result
-from swashplate.identification.core.time_fit import TimeDetails
 from swashplate.identification.frequency.handling import Handling
 from swashplate.identification.frequency.handling_readings import handling_lines
 from swashplate.identification.frequency.mode_accuracy import ModeAccuracy
@@ -24,6 +23,7 @@ from swashplate.identification.frequency.transfer_function_fit import TransferFu
 from swashplate.identification.frequency.transfer_function_forms import TriedStructure
 from swashplate.identification.frequency.unnoticeable_dynamics import mismatch
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.time.record_fit import TimeDetails
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.reporting.figures.bode_matrix import of_fit, of_responses
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues

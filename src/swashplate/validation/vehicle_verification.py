@@ -15,7 +15,7 @@ from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.schema import channel
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import records
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.core.sources import sources_of
 from swashplate.identification.responses.response_warnings import damaged
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
@@ -60,13 +60,13 @@ def verify_vehicle(
     likelihood = VehicleErrors(
         Parameterization(vehicle, ()),
         pieces,
-        method="output-error",
+        gain="none",
         environment=environment_of(vehicle, environment),
         shifts=shifts,
         # A bias of a state is a shift of where it starts.
         biases=tuple(name for name in shared if name not in vehicle.state_names),
     )
-    optimum = minimise(likelihood, tolerance=0.02)
+    optimum = minimise(likelihood, Solver(tolerance=0.02))
     solved = dict(zip(likelihood.row.names, map(float, optimum.row * likelihood.row.scale), strict=True))
     traces = tuple(
         Trace(

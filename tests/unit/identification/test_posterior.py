@@ -17,8 +17,8 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.core import nuts
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import POSE, records
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.output_error import OutputError
-from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.models.linear.state_space_file import parse
 
 
@@ -44,7 +44,7 @@ def test_the_slope_that_nuts_follows_is_that_of_the_cost(method: str, model: Any
     np.testing.assert_allclose(gradient, sides, rtol=1e-5, atol=1e-5 * np.max(np.abs(gradient)))
 
 
-@pytest.mark.parametrize("kind", [PredictionError, OutputError])
+@pytest.mark.parametrize("kind", [FilterError, OutputError])
 def test_the_slope_of_a_tracked_flight_is_its_cost_and_gradient(kind: Any) -> None:
     coax = sp.vehicle("coax")
     likelihood = kind(

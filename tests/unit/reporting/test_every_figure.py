@@ -96,7 +96,6 @@ WITHOUT = {
     "StateSpaceModel": "the result shows it",
     "Structures": "a list of names",
     "Synchronisation": "one number and the two flights, which show themselves",
-    "TimeDetails": "the result shows them",
     "TransferFunctionDetails": "the result shows them",
     "TransferFunctions": "the result shows it",
     "NeededExcitation": "a handful of numbers",

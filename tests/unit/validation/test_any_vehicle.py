@@ -26,7 +26,7 @@ def _flight() -> Flight:
 
 @lru_cache(maxsize=1)
 def _fit() -> Result[Any, Any]:
-    return sp.fit_vehicle(rolling(), _flight(), free=list(TRUTH), outputs=OUTPUTS, biases=["ay"])
+    return sp.identify(rolling(), _flight(), free=list(TRUTH), outputs=OUTPUTS, biases=["ay"])
 
 
 def test_its_fit_has_both_bounds_and_says_what_it_cannot_see() -> None:
@@ -73,7 +73,7 @@ def test_identify_takes_it_and_says_what_it_does_not_know() -> None:
         sp.identify(rolling(), _flight())
     with pytest.raises(IdentificationError, match="wind: the method 'filter-error' does not know it"):
         sp.identify(rolling(), _flight(), free=list(TRUTH), wind=True)
-    with pytest.raises(IdentificationError, match="method is 'nelder-mead', expected one of prediction-error"):
+    with pytest.raises(IdentificationError, match="method is 'nelder-mead', expected one of filter-error"):
         sp.identify(rolling(), _flight(), free=list(TRUTH), method="nelder-mead")
 
 

@@ -32,7 +32,7 @@ class Comparison:
     Attributes:
         record: the record.
         counted: which samples the cost counted, shape (n,).
-        model: model outputs, shape (n, n_outputs): one-step predictions (prediction error) or simulation.
+        model: model outputs, shape (n, n_outputs): one-step predictions (of a filter) or simulation.
         sigma: standard deviation of the model's output error, shape (n_outputs,).
         states: estimated body states (n, 12) in the order x y z u v w phi theta psi p q r; (n, 0) where the method
             does not tell.

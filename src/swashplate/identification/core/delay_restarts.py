@@ -12,7 +12,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.identification.core import stopping
-from swashplate.identification.core.scoring import Likelihood, Optimum, Progress, minimise
+from swashplate.identification.core.scoring import Likelihood, Optimum, Solver, minimise
 
 _FARTHEST, _STEP, _APART = 3.0, 0.2, 0.6
 """The delays tried, and how far from the one found, in scaled units of 50 ms."""
@@ -21,33 +21,19 @@ _PROMISING = 50.0
 """Log-units that another delay may lie above the optimum before anything else has settled around it."""
 
 
-def minimise_over_valleys(
-    likelihood: Likelihood,
-    *,
-    iterations: int = 60,
-    tolerance: float = 0.05,
-    together: bool = False,
-    progress: Progress | None = None,
-) -> Optimum:
+def minimise_over_valleys(likelihood: Likelihood, solver: Solver | None = None) -> Optimum:
     """`minimise`, and again from the best other value of every kinked entry where that is promising.
 
     Returns:
         The lowest optimum; its history is that of the search that led to it, after those that it beat.
     """
-    best = minimise(likelihood, iterations=iterations, tolerance=tolerance, together=together, progress=progress)
+    solver = solver or Solver()
+    best = minimise(likelihood, solver)
     for place in np.flatnonzero(likelihood.row.column("kinked") > 0.0):
         start = None if stopping.asked() else _elsewhere(likelihood, best, int(place))
         if start is None:
             continue
-        done = len(best.history)
-
-        def later(iteration: int, cost: float, done: int = done) -> None:
-            if progress is not None:
-                progress(done + iteration, cost)
-
-        other = minimise(
-            likelihood, start=start, iterations=iterations, tolerance=tolerance, together=together, progress=later
-        )
+        other = minimise(likelihood, solver.after(len(best.history)), start=start)
         if other.cost < best.cost:
             best = replace(other, history=best.history + other.history)
     likelihood.refresh(best.row)

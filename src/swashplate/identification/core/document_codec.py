@@ -29,7 +29,7 @@ PARTS: Registry[type] = Registry(
         "record": "swashplate.identification.core.comparison:Comparison",
         "response": "swashplate.identification.frequency.response_cost:ResponseComparison",
         "flight": "swashplate.identification.time.flight_details:FlightDetails",
-        "records in time": "swashplate.identification.core.time_fit:TimeDetails",
+        "records in time": "swashplate.identification.time.record_fit:TimeDetails",
         "state-space responses": "swashplate.identification.frequency.state_space_result:StateSpaceDetails",
         "transfer functions": "swashplate.identification.frequency.transfer_function_fit:TransferFunctionDetails",
         "bench": "swashplate.bench.result:BenchDetails",

@@ -1,12 +1,9 @@
-"""Fisher scoring with bounds: one optimizer for every likelihood here.
-
-How far a step goes is said by `damped_steps`, or, where variances are among the entries, by `variance_steps`.
-"""
+"""Fisher scoring with bounds: one solver for every likelihood here."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -41,6 +38,18 @@ class Likelihood(Protocol):
         ...
 
 
+class Steps(Protocol):
+    """From one point of a search to the next."""
+
+    def onward(self, at: Point) -> tuple[float, Array] | None:
+        """The next row with its cost; None where nothing goes down."""
+        ...
+
+    def settled(self, gained: float, tolerance: float) -> bool:
+        """Whether the last step gained too little to go on for."""
+        ...
+
+
 @dataclass(frozen=True)
 class Optimum:
     """Where the scoring ended.
@@ -62,21 +71,11 @@ class Optimum:
     at_bound: tuple[str, ...]
 
 
-def minimise(
-    likelihood: Likelihood,
-    *,
-    start: Array | None = None,
-    iterations: int = 60,
-    tolerance: float = 0.05,
-    together: bool = False,
-    around: bool = False,
-    progress: Progress | None = None,
-) -> Optimum:
-    """The row of the highest posterior probability.
+@dataclass(frozen=True)
+class Solver:
+    """How the row of the highest posterior probability is searched.
 
-    Args:
-        likelihood: what to minimise, with the row's priors added.
-        start: scaled first guess (None: the entries' starts).
+    Attributes:
         iterations: at most this many.
         tolerance: a gain in log-likelihood that is too small to go on for.
         together: shorten a step that is too long always as a whole: half the iterations where many short shots make a
@@ -84,10 +83,38 @@ def minimise(
         around: where entries want to go too far, hold them at their reach and let the others go where that leads: for
             many parameters of which some hardly show, and would shorten every step. Like `together` of damped steps.
         progress: told about every iteration.
+    """
+
+    iterations: int = 60
+    tolerance: float = 0.05
+    together: bool = False
+    around: bool = False
+    progress: Progress | None = None
+
+    def after(self, done: int) -> Solver:
+        """The same, which counts its iterations on from so many."""
+        told = self.progress
+        return replace(self, progress=told and (lambda iteration, cost: told(done + iteration, cost)))
+
+    def steps(self, row: Row, cost: Callable[[Array], float]) -> Steps:
+        """How far each step goes: `variance_steps` where variances are among the entries, else `damped_steps`."""
+        if any(entry.variance for entry in row.entries):
+            return VarianceSteps(row, cost)
+        return DampedSteps(row, cost, together=self.together, around=self.around)
+
+
+def minimise(likelihood: Likelihood, solver: Solver | None = None, *, start: Array | None = None) -> Optimum:
+    """The row of the highest posterior probability.
+
+    Args:
+        likelihood: what to minimise, with the row's priors added.
+        solver: how; None: as usual.
+        start: scaled first guess (None: the entries' starts).
 
     Raises:
         IdentificationError: where the first guess already diverges.
     """
+    solver = solver or Solver()
     row_of = likelihood.row
     low, high = row_of.bounds()
     row = np.clip(row_of.starts() if start is None else np.array(start, dtype=np.float64), low, high)
@@ -106,12 +133,8 @@ def minimise(
     def cost(tried: Array) -> float:
         return likelihood.cost(tried) + row_of.prior(tried)[0]
 
-    steps: DampedSteps | VarianceSteps
-    if any(entry.variance for entry in row_of.entries):
-        steps = VarianceSteps(row_of, cost)
-    else:
-        steps = DampedSteps(row_of, cost, together=together, around=around)
-    for iteration in range(iterations):
+    steps = solver.steps(row_of, cost)
+    for iteration in range(solver.iterations):
         if stopping.asked():
             break
         try:
@@ -123,13 +146,13 @@ def minimise(
             at = _point(likelihood, onward[1])
             history.append(at.cost)
             stopping.counted()
-            if progress is not None:
-                progress(iteration + 1, at.cost)
+            if solver.progress is not None:
+                solver.progress(iteration + 1, at.cost)
         except stopping.INTERRUPTS as interrupt:
             stopping.keep(interrupt)
             likelihood.refresh(at.row)
             break
-        if steps.settled(gained, tolerance):
+        if steps.settled(gained, solver.tolerance):
             converged = True
             break
     touching = (at.row <= low + 1e-9) | (at.row >= high - 1e-9)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.scoring import Optimum, minimise
+from swashplate.identification.core.scoring import Optimum, Progress, Solver, minimise
 from swashplate.identification.frequency.response_cost import (
     ACCEPTABLE,
     Answer,
@@ -205,9 +204,12 @@ def best_below(
     return replace(end, history=(*alone.history, *end.history[1:])), cost, kept
 
 
-def _down(cost: ResponseCost, **how: Any) -> Optimum:
+def _down(
+    cost: ResponseCost, *, start: Array, tolerance: float, iterations: int, progress: Progress | None = None
+) -> Optimum:
     """Downhill from a row; derivatives that hardly show must not shorten the steps of the others."""
-    return minimise(cost, around=True, **how)
+    solver = Solver(tolerance=tolerance, iterations=iterations, around=True, progress=progress)
+    return minimise(cost, solver, start=start)
 
 
 def _seen(cost: ResponseCost, end: Optimum) -> float:

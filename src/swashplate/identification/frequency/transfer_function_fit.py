@@ -16,7 +16,7 @@ from swashplate.flights.schema import channel
 from swashplate.identification.core.accuracy import sign_words
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.result import Estimate, Result
-from swashplate.identification.core.scoring import Optimum, minimise
+from swashplate.identification.core.scoring import Optimum, Solver, minimise
 from swashplate.identification.core.sources import scale_words
 from swashplate.identification.frequency.fit_accuracy import accuracy_of_fit
 from swashplate.identification.frequency.response_cost import (
@@ -209,11 +209,11 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
         row = Row(tuple(_entry(name, numbers[name], targets) for name in free))
         cost = ResponseCost(row, targets, evaluate)
         if np.isfinite(cost.cost(row.starts())):
-            rough.append((minimise(cost, tolerance=1e-2, iterations=_ROUGH), cost))
+            rough.append((minimise(cost, Solver(tolerance=1e-2, iterations=_ROUGH)), cost))
     if not rough:
         raise IdentificationError("no starting point of the transfer function gives finite responses.")
     rough.sort(key=lambda end: end[0].cost)
-    ends = [(minimise(c, start=o.row, tolerance=1e-5, iterations=80), c) for o, c in rough[:_FOLLOWED]]
+    ends = [(minimise(c, Solver(tolerance=1e-5, iterations=80), start=o.row), c) for o, c in rough[:_FOLLOWED]]
     optimum, cost = min(ends, key=lambda end: end[0].cost)
     fitted = dict(zip(free, optimum.row * cost.row.scale, strict=True))
     values = spread | fitted

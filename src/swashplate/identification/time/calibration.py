@@ -9,9 +9,9 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Parameterization, trim_of_record
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.core.spans import CALIBRATION
-from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle
 
@@ -52,6 +52,6 @@ def calibrate(
     further = vehicle.card.observer.get("trims", {}) if trims is None else trims
     table = Parameterization(vehicle, (), of_records=tuple(trim_of_record(n, sigma) for n, sigma in further.items()))
     piece = first_part(record, seconds)
-    likelihood = PredictionError(table, [piece], noise=noise, estimate_noise=False, nuisance=prior)
-    calibrated = likelihood.numbers(minimise(likelihood, iterations=30).row)[0]
+    likelihood = FilterError(table, [piece], noise=noise, estimate_noise=False, nuisance=prior)
+    calibrated = likelihood.numbers(minimise(likelihood, Solver(iterations=30)).row)[0]
     return Nuisance(*calibrated.nuisance.tolist())

@@ -16,9 +16,6 @@ from swashplate.identification.core.result import Constant, Estimate
 from swashplate.identification.core.scoring import Likelihood, Optimum
 from swashplate.models.vehicle import Vehicle
 
-LAGS = 1.0
-"""Seconds of residual correlation that the corrected bound allows for."""
-
 _UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad", **dict.fromkeys(PUSHES[:3], "m/s^2")}
 _UNITS |= dict.fromkeys(PUSHES[3:], "rad/s^2")
 """Units of what belongs to a record, by its name or the first word of that."""

@@ -39,9 +39,9 @@ from swashplate.identification.time.beginning import (
     starting_rows,
     starting_samples,
 )
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.innovations import Filtered, RecordRun
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.identification.time.start_states import measured_start, slopes_ahead
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
@@ -72,12 +72,12 @@ class Followed(NamedTuple):
     states: FilterState
 
 
-class FollowingError(PredictionError):
-    """`PredictionError` with a gain that follows: some ten times the work, for wind; arguments are the same."""
+class FollowingError(FilterError):
+    """`FilterError` with a gain that follows: some ten times the work, for wind; arguments are the same."""
 
     def __init__(self, table: Parameterization, pieces: Sequence[Record], *, noise: Noise) -> None:
         super().__init__(table, pieces, noise=noise)
-        self._constant = PredictionError(table, pieces, noise=noise)
+        self._constant = FilterError(table, pieces, noise=noise)
         self._judgement: tuple[bytes, tuple[float, list[tuple[Array, Array, Array]]]] | None = None
         measured = [piece.measured for piece in pieces]
         self.counted = tuple(counted & seen for counted, seen in zip(self.counted, measured, strict=True))
@@ -86,7 +86,7 @@ class FollowingError(PredictionError):
         )
 
     @property
-    def constant(self) -> PredictionError:
+    def constant(self) -> FilterError:
         """The likelihood of the same row with a constant gain."""
         return self._constant
 
@@ -118,7 +118,7 @@ class FollowingError(PredictionError):
         gradient, information = np.zeros(len(row)), np.zeros((len(row), len(row)))
         for white, moved, by_covariance in judged:
             weight = robust.weights(white)
-            turned = np.tril(by_covariance) * (1.0 - 0.5 * np.eye(white.shape[1]))  # as in PredictionError
+            turned = np.tril(by_covariance) * (1.0 - 0.5 * np.eye(white.shape[1]))  # as in FilterError
             flat, covariance = moved.reshape(len(row), -1), by_covariance.reshape(len(row), -1)
             gradient += flat @ (white * weight).ravel() + 0.5 * np.trace(by_covariance, axis1=2, axis2=3).sum(axis=1)
             gradient -= np.einsum("pnij,ni,nj->p", turned, white * weight, white, optimize=True)
@@ -150,7 +150,7 @@ class FollowingError(PredictionError):
         )
 
     def _judged(self, row: Array) -> tuple[float, list[tuple[Array, Array, Array]]]:
-        """Cost and what `_whitened` says at a row; that of the last one is kept, as in PredictionError."""
+        """Cost and what `_whitened` says at a row; that of the last one is kept, as in FilterError."""
         asked = np.asarray(row, dtype=np.float64).tobytes()
         if self._judgement is None or self._judgement[0] != asked:
             runs = self._followed([row, *(row + step for step in _STEP * np.eye(len(row)))])

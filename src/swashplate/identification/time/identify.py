@@ -26,20 +26,21 @@ from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepE
 from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import APART, Estimate, Fitted, Result, correlation_of
-from swashplate.identification.core.scoring import Optimum, Progress, minimise
+from swashplate.identification.core.scoring import Optimum, Solver, minimise
 from swashplate.identification.core.sources import scale_words, sources_of
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time import feedback
 from swashplate.identification.time.belonging import unrelated
-from swashplate.identification.time.estimates import LAGS, Found, constants, estimates_of, found_at
+from swashplate.identification.time.estimates import Found, constants, estimates_of, found_at
+from swashplate.identification.time.filter_error import SETTLING, FilterError
 from swashplate.identification.time.flight_details import FlightDetails, moving_air
 from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.linear_residual import LinearResidual
 from swashplate.identification.time.noise_entries import in_wind, with_line
 from swashplate.identification.time.output_error import OutputError
-from swashplate.identification.time.prediction_error import SETTLING, PredictionError
+from swashplate.identification.time.record_fit import LAGS
 from swashplate.identification.time.residual_fit import fit_residual
 from swashplate.identification.time.residual_joint import begun, begun_where_it_ended, beside_physics, moved
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -56,7 +57,7 @@ _FOLLOWING = 0.2
 _BEGIN = 1.0
 """The same for a search that another goes on from."""
 
-FlightLikelihood = PredictionError | OutputError
+FlightLikelihood = FilterError | OutputError
 L = TypeVar("L", bound=FlightLikelihood)
 
 
@@ -93,17 +94,17 @@ def identify_flight(
         axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
     )
     notes = [] if axes else [feedback.UNJUDGED]
-    if by.method == "prediction-error" and not question.keep_unexcited:
+    if by.method == "filter-error" and not question.keep_unexcited:
         table, held = feedback.hold_unexcited(table, axes)
         notes += held
     likelihood = by.likelihood_of(table, pieces, question)
     where = ", ".join(piece.name for piece in pieces)
     likelihood.refresh(likelihood.row.starts())
     accuracy.refuse_unseen(likelihood.row, likelihood.constant.scores(likelihood.row.starts())[2], where=where)
-    optimum = by.search(likelihood, _most(question), question.progress)
+    optimum = by.search(likelihood, _solver(question))
     best, row = by.conclude(table, likelihood, optimum, question)
     residual, began, k = None, vehicle, len(table.free)
-    if isinstance(likelihood, PredictionError) and question.residual and not estimates_of(best, vehicle)[1]:
+    if isinstance(likelihood, FilterError) and question.residual and not estimates_of(best, vehicle)[1]:
         each = [Nuisance(*numbers) for numbers in np.array(likelihood.nuisances_of(row)).T.tolist()]
         physics, air = best.table.without(best.optimum.at_bound), likelihood.noise_of(row)
         residual = fit_residual(best.vehicle, pieces, each, air, horizon=horizon, axes=axes, physics=physics)
@@ -130,7 +131,7 @@ def identify_flight(
     nuisance = mean_nuisance(nuisances)
     identified = _identified(best, noise, nuisance, began, every, pieces, by.method)
     identified = feedback.mark_unmoved(identified, [item.name for item in table.free], axes)
-    done = "filter by" if isinstance(likelihood, PredictionError) else "simulated by"
+    done = "filter by" if isinstance(likelihood, FilterError) else "simulated by"
     settings: dict[str, Any] = {done: likelihood.compiled_by}
     if residual is not None:
         if residual.kept and horizon is not None:
@@ -206,14 +207,14 @@ class FlightEstimator(Generic[L]):
         method: its name.
         takes: names of the fields of a question that it answers.
         likelihood_of: makes the likelihood of records.
-        search: finds its optimum, in so many iterations at most.
+        search: finds its optimum.
         conclude: what the optimum says, and the likelihood's whole row there.
     """
 
     method: str
     takes: frozenset[str]
     likelihood_of: Callable[[Parameterization, Sequence[Record], Question], L]
-    search: Callable[[L, int, Progress | None], Optimum]
+    search: Callable[[L, Solver], Optimum]
     conclude: Callable[[Parameterization, L, Optimum, Question], tuple[Found, Array]]
 
     def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
@@ -229,10 +230,10 @@ class FlightEstimator(Generic[L]):
         return identify_flight(model, data, question, by=self)
 
 
-def _prediction_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> PredictionError:
+def _filter_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> FilterError:
     noise = in_wind(pieces) if question.wind else Noise()
     noise = noise if question.rotor_line is None else with_line(noise, question.rotor_line, pieces)
-    return FollowingError(table, pieces, noise=noise) if question.wind else PredictionError(table, pieces, noise=noise)
+    return FollowingError(table, pieces, noise=noise) if question.wind else FilterError(table, pieces, noise=noise)
 
 
 def _output_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> OutputError:
@@ -240,35 +241,29 @@ def _output_error(table: Parameterization, pieces: Sequence[Record], question: Q
     return OutputError(table, pieces)
 
 
-def _scoring(likelihood: PredictionError, iterations: int, progress: Progress | None) -> Optimum:
+def _scoring(likelihood: FilterError, solver: Solver) -> Optimum:
     quick = likelihood.constant
     if quick is likelihood:
-        return minimise_over_valleys(likelihood, iterations=iterations, progress=progress)
-    first = minimise_over_valleys(quick, iterations=iterations, tolerance=_BEGIN, progress=progress)
-    done = len(first.history) - 1
-    last = minimise(
-        likelihood, start=first.row, iterations=iterations, tolerance=_FOLLOWING, progress=_after(done, progress)
-    )
+        return minimise_over_valleys(likelihood, solver)
+    first = minimise_over_valleys(quick, replace(solver, tolerance=_BEGIN))
+    after = replace(solver, tolerance=_FOLLOWING).after(len(first.history) - 1)
+    last = minimise(likelihood, after, start=first.row)
     return replace(last, history=(*first.history, *last.history[1:]))
 
 
-def _after(done: int, progress: Progress | None) -> Progress | None:
-    return progress and (lambda iteration, cost: progress(done + iteration, cost))
-
-
-def _scoring_together(likelihood: OutputError, iterations: int, progress: Progress | None) -> Optimum:
-    return minimise_over_valleys(likelihood, iterations=iterations, together=True, progress=progress)
+def _scoring_together(likelihood: OutputError, solver: Solver) -> Optimum:
+    return minimise_over_valleys(likelihood, replace(solver, together=True))
 
 
 def _together(
-    by: FlightEstimator[L], alone: PredictionError, row: Array, residual: LinearResidual, question: Question
+    by: FlightEstimator[L], alone: FilterError, row: Array, residual: LinearResidual, question: Question
 ) -> tuple[L, Found, Array]:
     """The search that goes on with physics and residual free."""
     table = beside_physics(alone.table, residual)
     likelihood = by.likelihood_of(table, alone.pieces, question)
     start = begun_where_it_ended(likelihood.row, alone.row, row, residual)
     likelihood.refresh(start)
-    optimum = minimise(likelihood, start=start, iterations=_most(question), progress=question.progress)
+    optimum = minimise(likelihood, _solver(question), start=start)
     return likelihood, *by.conclude(table, likelihood, optimum, question)
 
 
@@ -276,8 +271,9 @@ def _horizon(question: Question) -> Horizon | None:
     return None if question.horizon is None else Horizon.of(question.horizon)
 
 
-def _most(question: Question) -> int:
-    return ITERATIONS if question.iterations is None else question.iterations
+def _solver(question: Question) -> Solver:
+    most = ITERATIONS if question.iterations is None else question.iterations
+    return Solver(iterations=most, progress=question.progress)
 
 
 def _found(
@@ -290,7 +286,7 @@ def _found(
 
 
 def _found_ahead(
-    table: Parameterization, likelihood: PredictionError, optimum: Optimum, question: Question
+    table: Parameterization, likelihood: FilterError, optimum: Optimum, question: Question
 ) -> tuple[Found, Array]:
     """What the search says, or the search for small errors ahead that follows it."""
     first, row = _found(table, likelihood, optimum, question)
@@ -300,17 +296,17 @@ def _found_ahead(
     criterion = MultiStepErrors(
         likelihood, row, likelihood.pieces, horizon=horizon, settling=SETTLING, known=first.corrected
     )
-    ahead = minimise(criterion, start=criterion.start, iterations=_most(question), progress=question.progress)
+    ahead = minimise(criterion, _solver(question), start=criterion.start)
     ahead = replace(ahead, converged=ahead.converged and optimum.converged)
     best = found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags)
     return replace(best, corrected=TWICE * best.corrected), criterion.whole(ahead.row)
 
 
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
-PREDICTION_ERROR = FlightEstimator(
-    "prediction-error",
+FILTER_ERROR = FlightEstimator(
+    "filter-error",
     _TAKES | {"keep_unexcited", "wind", "rotor_line", "leave_out", "horizon", "residual"},
-    _prediction_error,
+    _filter_error,
     _scoring,
     _found_ahead,
 )

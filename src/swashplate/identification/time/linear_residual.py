@@ -13,8 +13,8 @@ from swashplate.filtering.disturbances import DISTURBED, Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import trim_of_record
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.innovations import Filtered
-from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.models.choices import Free
 from swashplate.models.residual import HEADING, ROWS, coefficients, counted_from, heading_counted
 from swashplate.models.vehicle import Vehicle
@@ -108,12 +108,12 @@ def kept(nuisance: Nuisance) -> tuple[Free, ...]:
     )
 
 
-def ran(likelihood: PredictionError) -> Filtered:
+def ran(likelihood: FilterError) -> Filtered:
     """The filter along a block, without a residual."""
     return likelihood.runs(likelihood.row.starts())[0]
 
 
-def seen_along(likelihoods: Sequence[PredictionError]) -> tuple[dict[str, Array], dict[str, Array]]:
+def seen_along(likelihoods: Sequence[FilterError]) -> tuple[dict[str, Array], dict[str, Array]]:
     """By name: what the coefficients multiply, and the disturbances that the filter saw, along all blocks."""
     columns: list[dict[str, Array]] = []
     seen: list[Array] = []
@@ -129,7 +129,7 @@ def seen_along(likelihoods: Sequence[PredictionError]) -> tuple[dict[str, Array]
     return joined, dict(zip(DISTURBED, np.concatenate(seen).T, strict=True))
 
 
-def accelerations_along(likelihoods: Sequence[PredictionError]) -> dict[str, Array]:
+def accelerations_along(likelihoods: Sequence[FilterError]) -> dict[str, Array]:
     """Rates of the disturbed states along the filtered motion, by name."""
     made = []
     for likelihood in likelihoods:

@@ -1,4 +1,4 @@
-"""The noise numbers of a fit by prediction errors: which are estimated, their first guesses and their priors."""
+"""The noise numbers of a fit by filter error: which are estimated, their first guesses and their priors."""
 
 from __future__ import annotations
 

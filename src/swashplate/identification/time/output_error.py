@@ -22,8 +22,8 @@ from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record, logs
 from swashplate.identification.time.beginning import FirstMotion
+from swashplate.identification.time.filter_error import parameter_entries
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.prediction_error import parameter_entries
 from swashplate.identification.time.record_filter import record_filter
 from swashplate.identification.time.shooting import FlownWindow, Shooting, ShootingPlan, Window
 from swashplate.identification.time.start_states import slopes

@@ -26,6 +26,7 @@ from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.spans import CALIBRATION
 from swashplate.identification.time.calibration import as_begun, calibrate
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.linear_residual import (
     LinearResidual,
     accelerations_along,
@@ -36,7 +37,6 @@ from swashplate.identification.time.linear_residual import (
     units_of,
     with_coefficients,
 )
-from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.identification.time.residual_strength import (
     BLOCK,
     LeftOutBlock,
@@ -85,7 +85,7 @@ class FlightAhead:
         names = coefficients(vehicle)
         bare = as_begun(vehicle.with_values(dict.fromkeys(names, 0.0)), record)
         table = Parameterization(bare, tuple(Free(name, 1.0) for name in names), of_records=kept(own))
-        self.likelihood = PredictionError(table, [record], noise=noise, estimate_noise=False, nuisance=own)
+        self.likelihood = FilterError(table, [record], noise=noise, estimate_noise=False, nuisance=own)
         self._steps = np.array(horizon.samples(record.dt))
         starts = np.arange(round(CALIBRATION / record.dt), record.time.size - self._steps[-1] - 1, self._steps[0])
         n = int(len(starts) * self._steps[0] * record.dt // BLOCK)

@@ -27,6 +27,7 @@ from swashplate.identification.core.multi_step import Horizon
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.feedback import by_itself
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.linear_residual import (
     LinearResidual,
@@ -38,7 +39,6 @@ from swashplate.identification.time.linear_residual import (
     units_of,
     with_coefficients,
 )
-from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.identification.time.residual_ahead import fit_ahead
 from swashplate.identification.time.residual_strength import (
     BLOCK,
@@ -102,7 +102,7 @@ def fit_residual(
         prior_card=physics.prior_card if physics else None,
     )
     likelihoods = [
-        PredictionError(
+        FilterError(
             replace(table, of_records=kept(nuisance)), [block], noise=noise, estimate_noise=False, nuisance=nuisance
         )
         for block, nuisance in cut
@@ -154,7 +154,7 @@ def _blocks(piece: Record) -> list[Record]:
     ]
 
 
-def _one_step(likelihoods: Sequence[PredictionError], size: Array) -> list[LeftOutBlock]:
+def _one_step(likelihoods: Sequence[FilterError], size: Array) -> list[LeftOutBlock]:
     """Innovations, linear in accelerations as small as these, and in the physics."""
     made = []
     for likelihood in likelihoods:
@@ -166,13 +166,13 @@ def _one_step(likelihoods: Sequence[PredictionError], size: Array) -> list[LeftO
     return made
 
 
-def _priors(likelihood: PredictionError, k: int) -> Physics:
+def _priors(likelihood: FilterError, k: int) -> Physics:
     """Of the first k parameters of a row, where they stand."""
     _, pull, information = likelihood.row.prior(likelihood.row.starts())
     return Physics(pull[:k], information[:k, :k])
 
 
-def _cost(likelihood: PredictionError, away: Array) -> float:
+def _cost(likelihood: FilterError, away: Array) -> float:
     """Cost of the innovations with physics moved, and at coefficients, whose scale in the row is one."""
     row = likelihood.row.starts()
     row[likelihood.row.places("parameter")] += away

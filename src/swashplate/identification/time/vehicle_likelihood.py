@@ -22,7 +22,8 @@ from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.time_likelihood import NOTHING, Moved, TimeErrors, gain_entries, gust_entries
-from swashplate.identification.time.prediction_error import parameter_entries
+from swashplate.identification.estimators import Gain
+from swashplate.identification.time.filter_error import parameter_entries
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
@@ -56,8 +57,8 @@ class VehicleErrors(TimeErrors):
     Args:
         table: free parameters and ties.
         records: with what `measurable` names as outputs.
-        method: "output-error", "filter-error" (a Kalman gain from the intensities of white noise on every state's rate;
-            innovations count by their variances, as in Jategaonkar's program) or "prediction-error" (a free gain).
+        gain: "none", "from the noise" (of white noise on every state's rate; innovations count by their variances, as
+            in Jategaonkar's program) or "free".
         environment: wind, density and gravity; the records have the voltage.
         shifts, biases: see `TimeErrors`.
 
@@ -70,14 +71,14 @@ class VehicleErrors(TimeErrors):
         table: Parameterization,
         records: Sequence[Record],
         *,
-        method: str,
+        gain: Gain,
         environment: Environment,
         shifts: bool,
         biases: Sequence[str],
     ) -> None:
         vehicle, outputs = table.vehicle, records[0].output_names
         check_predicted(vehicle, outputs)
-        self.table, self.method = table, method
+        self.table, self.gain = table, gain
         super().__init__(
             parameter_entries(table),
             states=vehicle.state_names,
@@ -94,13 +95,13 @@ class VehicleErrors(TimeErrors):
 
     def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
         states = self.table.vehicle.state_names
-        if self.method == "filter-error":
+        if self.gain == "from the noise":
             return gust_entries(states, size)
-        return gain_entries(states, size, spread) if self.method == "prediction-error" else []
+        return gain_entries(states, size, spread) if self.gain == "free" else []
 
     def _covariance(self, errors: Array) -> Array:
         whole = super()._covariance(errors)
-        return np.diag(np.diag(whole)) if self.method == "filter-error" else whole
+        return np.diag(np.diag(whole)) if self.gain == "from the noise" else whole
 
     def _plain(self, row: Array) -> Array:
         every = range(len(self.records))
@@ -134,7 +135,7 @@ class VehicleErrors(TimeErrors):
             p[1:, : len(card)] = directions[:, :free] @ layout.moved(card, plain[:free])
         start, shift = (at([f"{what} {s}[{number}]" for s in states]) for what in ("start", "shift"))
         bias = at([f"bias {o}[{number}]" for o in self.outputs])
-        if self.method == "filter-error":
+        if self.gain == "from the noise":
             gain = self._kalman(number, start, p, at([f"gust {s}" for s in states]))
         else:  # zeros for output error
             gain = at([f"gain {s}/{o}" for s in states for o in self.outputs])

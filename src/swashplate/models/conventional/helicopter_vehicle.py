@@ -40,7 +40,7 @@ from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 _XP = FloatBackend()
 _RECORDED = ("--free", "rotor", "--method", "output-error", "--rate", "50")
 """What turns the rotor's answer to a stick, at half the rate: a minute of one processor (measured: 45 s for 20 s of
-flight; prediction error at full rate took 160 s and had not settled)."""
+flight; filter error at full rate took 160 s and had not settled)."""
 
 
 def picture(vehicle: Vehicle) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import pytest
 
 from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 
 PERIOD, DEEPEST = 1.2, 2.0
 
@@ -48,7 +48,7 @@ class Waves:
 def test_the_deeper_valley_is_found_and_its_way_is_told() -> None:
     told: list[int] = []
     alone = minimise(Waves(5.0))
-    found = minimise_over_valleys(Waves(5.0), progress=lambda iteration, cost: told.append(iteration))
+    found = minimise_over_valleys(Waves(5.0), Solver(progress=lambda iteration, cost: told.append(iteration)))
     assert alone.row[1] == pytest.approx(DEEPEST - PERIOD, abs=0.3)  # one wave too early
     np.testing.assert_allclose(found.row, DEEPEST, atol=0.05)
     assert found.cost < alone.cost

@@ -27,7 +27,7 @@ from swashplate.identification.core.low_passed import (
 )
 from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Result
-from swashplate.identification.time.linear_time_fit import fit_in_time
+from swashplate.identification.identify import identify
 from swashplate.models.linear.state_space_file import structure
 
 RAW = Provenance(source="a.csv")
@@ -52,7 +52,7 @@ def test_conditioning_filters_nothing_that_was_not_asked_for() -> None:
     assert "lowpass" not in steps
 
 
-@pytest.mark.parametrize("method", ["prediction-error", "output-error"])
+@pytest.mark.parametrize("method", ["filter-error", "output-error"])
 def test_a_fit_of_a_low_passed_flight_is_refused(method: str) -> None:
     with pytest.raises(FlightError, match=r"low-pass at 15 Hz \(order 4\).*cutoff=0.*at most 37.5 Hz"):
         sp.identify(sp.vehicle("coax"), _measured(15.0), method=method)
@@ -61,9 +61,9 @@ def test_a_fit_of_a_low_passed_flight_is_refused(method: str) -> None:
 def test_the_other_fits_in_time_refuse_it_too() -> None:
     flight = _measured(15.0)
     with pytest.raises(FlightError, match="low-pass at 15 Hz"):
-        sp.fit_vehicle(sp.vehicle("coax"), flight, free=["tau_f_upper"], outputs=["p"])
+        sp.identify(sp.vehicle("coax"), flight, free=["tau_f_upper"], outputs=["p"])
     with pytest.raises(FlightError, match="low-pass at 15 Hz"):
-        fit_in_time(structure("rotor_body"), flight)
+        identify(structure("rotor_body"), flight)
 
 
 def test_a_low_pass_at_the_rate_that_is_left_is_no_harm() -> None:

@@ -13,11 +13,10 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.core.multi_step import Horizon, MultiStepErrors
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.core.time_likelihood import TimeErrors
-from swashplate.identification.time.linear_time_fit import fit_in_time
+from swashplate.identification.identify import identify
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors
-from swashplate.identification.time.vehicle_time_fit import fit_vehicle
 from swashplate.models.linear.state_space_file import parse
 from swashplate.physics.environment import Environment
 
@@ -40,7 +39,7 @@ def _filter_error() -> TimeErrors:
     table = parameterize(rolling(), list(TRUTH))
     pieces = records([gusty()], rolling(), outputs=OUTPUTS)
     how = {"environment": Environment(), "shifts": True, "biases": ("ay",)}
-    return VehicleErrors(table, pieces, method="filter-error", **how)
+    return VehicleErrors(table, pieces, gain="from the noise", **how)
 
 
 def _criterion(*, sigma: float | None = None) -> MultiStepErrors:
@@ -67,7 +66,7 @@ def test_gradient_and_slopes_are_those_of_the_cost(sigma: float | None) -> None:
 def test_what_the_likelihood_knows_stays() -> None:
     """Known well, the row hardly moves; known as well as by the priors alone, it moves as if nothing were known."""
     alone, firmly, hardly = (
-        minimise(c, start=c.start, iterations=5).row - c.start
+        minimise(c, Solver(iterations=5), start=c.start).row - c.start
         for c in (_criterion(), _criterion(sigma=1e-4), _criterion(sigma=1e6))
     )
     assert np.abs(alone).max() > 0.05
@@ -94,10 +93,10 @@ def test_one_step_ahead_is_the_innovation() -> None:
 @pytest.mark.proof
 def test_a_linear_vehicle_is_fitted_ahead_as_the_linear_model() -> None:
     flown = gusty()
-    found = fit_vehicle(rolling(), flown, free=list(TRUTH), outputs=OUTPUTS, biases=["ay"], horizon=FURTHER)
+    found = identify(rolling(), flown, free=list(TRUTH), outputs=OUTPUTS, biases=["ay"], horizon=FURTHER)
     how = {"method": "filter-error", "shifts": False, "biases": ["ay"]}
-    other = fit_in_time(parse(SAME), flown, horizon=FURTHER, **how)
-    once = fit_in_time(parse(SAME), flown, **how)
+    other = identify(parse(SAME), flown, horizon=FURTHER, **how)
+    once = identify(parse(SAME), flown, **how)
     assert found.converged
     assert found.settings["horizon"] == list(FURTHER)
     assert "horizon" not in once.settings
@@ -113,7 +112,7 @@ def test_bounds_of_errors_ahead_cover_the_truth_in_some_seeds() -> None:
     """Overlapping predictions are no independent ones: the corrected bound knows, the plain one does not."""
     apart, plainly = [], []
     for seed in range(10):
-        fit = fit_in_time(
+        fit = identify(
             parse(SAME), gusty(seed), outputs=("p",), method="filter-error", shifts=False, horizon=(0.1, 0.5)
         )
         assert fit.converged
@@ -126,7 +125,7 @@ def test_bounds_of_errors_ahead_cover_the_truth_in_some_seeds() -> None:
 
 def test_the_search_makes_errors_ahead_smaller_and_backs_out_of_divergence() -> None:
     criterion = _criterion()
-    found = minimise(criterion, start=criterion.start, iterations=5)
+    found = minimise(criterion, Solver(iterations=5), start=criterion.start)
     assert found.history[-1] < 0.8 * found.history[0]
     wild = criterion.start.copy()
     wild[criterion.row.names.index("tau")] *= -1e-4  # unstable beyond any number
@@ -136,8 +135,8 @@ def test_the_search_makes_errors_ahead_smaller_and_backs_out_of_divergence() -> 
 def test_what_cannot_be_predicted_is_refused() -> None:
     flown, free = gusty(), list(TRUTH)
     with pytest.raises(IdentificationError, match="output error has no filter"):
-        fit_vehicle(rolling(), flown, free=free, outputs=["p"], method="output-error", horizon=AHEAD)
-    with pytest.raises(IdentificationError, match="choose method filter-error or prediction-error") as told:
+        identify(rolling(), flown, free=free, outputs=["p"], method="output-error", horizon=AHEAD)
+    with pytest.raises(IdentificationError, match="Choose method filter-error or prediction-error") as told:
         sp.identify(parse(SAME), flown, method="output-error", horizon=AHEAD)
     assert told.value.channel == "horizon"
     base = _filter_error()

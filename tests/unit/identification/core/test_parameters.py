@@ -8,7 +8,7 @@ import pytest
 from swashplate.errors import ExpressionError, IdentificationError
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Free, Parameterization, parameterize
-from swashplate.identification.time.prediction_error import parameter_entries
+from swashplate.identification.time.filter_error import parameter_entries
 from swashplate.models.catalogue import vehicle
 from swashplate.models.coax_choices import CHOICES
 from swashplate.models.vehicle import Vehicle

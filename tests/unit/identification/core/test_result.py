@@ -143,4 +143,4 @@ def test_a_result_says_what_its_choice_set() -> None:
 def test_a_result_shows_itself_in_notebooks() -> None:
     shown = report_samples.fit()._repr_html_()
     assert "<td>linkage_lower</td>" in shown
-    assert "coax by prediction-error: converged" in shown
+    assert "coax by filter-error: converged" in shown

@@ -9,7 +9,7 @@ import pytest
 
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 
 INF = float("inf")
 
@@ -69,7 +69,7 @@ def _line(*, bounds: tuple[float, float] = (-INF, INF), sigma: float = INF, mean
 
 def test_a_linear_problem_gives_the_least_squares_answer() -> None:
     problem = _line()
-    found = minimise(problem, tolerance=1e-10)
+    found = minimise(problem, Solver(tolerance=1e-10))
     exact = np.linalg.lstsq(problem.A, problem.y, rcond=None)[0]
     np.testing.assert_allclose(found.row * problem.row.scale, exact, rtol=1e-6)
     assert found.converged
@@ -82,7 +82,7 @@ def test_a_linear_problem_gives_the_least_squares_answer() -> None:
 
 def test_a_prior_pulls_by_its_weight() -> None:
     problem = _line(mean=4.0, sigma=0.05)
-    found = minimise(problem, tolerance=1e-10)
+    found = minimise(problem, Solver(tolerance=1e-10))
     weight = np.diag([0.0, 1.0 / 0.05**2, 0.0])
     normal = problem.A.T @ problem.A + weight
     exact = np.linalg.solve(normal, problem.A.T @ problem.y + weight @ [0.0, 4.0, 0.0])
@@ -95,7 +95,7 @@ def test_a_prior_pulls_by_its_weight() -> None:
 @pytest.mark.parametrize("bounds", [(-1.0, INF), (-INF, -3.0)])
 def test_a_bound_holds_and_the_others_are_the_best_beside_it(bounds: tuple[float, float]) -> None:
     problem = _line(bounds=bounds)
-    found = minimise(problem, tolerance=1e-10)
+    found = minimise(problem, Solver(tolerance=1e-10))
     at = -1.0 if np.isfinite(bounds[0]) else -3.0
     rest = np.linalg.lstsq(problem.A[:, [0, 2]], problem.y - at * problem.A[:, 1], rcond=None)[0]
     np.testing.assert_allclose(found.row * problem.row.scale, [rest[0], at, rest[1]], rtol=1e-5)
@@ -105,7 +105,7 @@ def test_a_bound_holds_and_the_others_are_the_best_beside_it(bounds: tuple[float
 @pytest.mark.parametrize("start", [(-1.2, 1.0), (0.0, -3.0), (2.0, 2.0)])
 def test_rosenbrocks_valley(start: tuple[float, float]) -> None:
     row = Row(tuple(Entry(name, "parameter", value, 1.0) for name, value in zip("xy", start, strict=True)))
-    found = minimise(Valley(row), iterations=200, tolerance=1e-12)
+    found = minimise(Valley(row), Solver(iterations=200, tolerance=1e-12))
     np.testing.assert_allclose(found.row, [1.0, 1.0], atol=1e-5)
     assert found.converged
 
@@ -113,7 +113,7 @@ def test_rosenbrocks_valley(start: tuple[float, float]) -> None:
 def test_a_step_into_nowhere_is_taken_back() -> None:
     """The undamped first step would land where the cost is not finite."""
     row = Row((Entry("x", "initial", -1.9, 1.0), Entry("y", "initial", -9.0, 1.0)))
-    found = minimise(Valley(row), iterations=300, tolerance=1e-12)
+    found = minimise(Valley(row), Solver(iterations=300, tolerance=1e-12))
     np.testing.assert_allclose(found.row, [1.0, 1.0], atol=1e-5)
     with pytest.raises(IdentificationError, match="diverges from the flight at the first guess"):
         minimise(Valley(Row((Entry("x", "initial", -3.0, 1.0), Entry("y", "initial", 0.0, 1.0)))))
@@ -122,7 +122,7 @@ def test_a_step_into_nowhere_is_taken_back() -> None:
 def test_no_entry_moves_further_in_one_iteration_than_its_group_may() -> None:
     row = Row(tuple(Entry(name, "parameter", 0.0, 1.0) for name in "ab"))
     problem = Line(row, np.eye(2), np.array([10.0, 0.1]))
-    minimise(problem, iterations=30)
+    minimise(problem, Solver(iterations=30))
     moved = np.abs(np.diff(problem.refreshed, axis=0)).max()
     assert 0.69 < moved <= 0.7 + 1e-12
 
@@ -130,7 +130,9 @@ def test_no_entry_moves_further_in_one_iteration_than_its_group_may() -> None:
 def test_iterations_that_run_out_are_said_and_every_one_is_told() -> None:
     told: list[tuple[int, float]] = []
     row = Row((Entry("x", "parameter", -1.2, 1.0), Entry("y", "parameter", 1.0, 1.0)))
-    found = minimise(Valley(row), iterations=3, tolerance=1e-12, progress=lambda i, cost: told.append((i, cost)))
+    found = minimise(
+        Valley(row), Solver(iterations=3, tolerance=1e-12, progress=lambda i, cost: told.append((i, cost)))
+    )
     assert not found.converged
     assert [i for i, _ in told] == [1, 2, 3]
     assert tuple(cost for _, cost in told) == found.history[1:]
@@ -150,7 +152,7 @@ def test_long_ways_are_gone_along_the_valley_and_past_a_noise_that_runs_away(run
     far = np.array([0.2, 1e4] if runaway else [10.0, 20.0])
     A = np.diag([1e3, 1e-4]) if runaway else np.array([[1e3, -0.5e3], [1.0, 1.0]])
     entries = (Entry("a", "parameter", 0.0, 1.0), Entry("b", "noise" if runaway else "parameter", 0.0, 1.0))
-    optimum = minimise(Line(Row(entries), A, A @ far), iterations=60)
+    optimum = minimise(Line(Row(entries), A, A @ far), Solver(iterations=60))
     assert optimum.row[0] == pytest.approx(far[0], abs=1e-3)
     # The valley of 20 is 29 steps of 0.7 long; beside a runaway the other is found at once.
     assert len(optimum.history) <= (12 if runaway else 35)

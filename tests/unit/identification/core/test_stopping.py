@@ -11,7 +11,7 @@ from test_scoring import Valley
 
 from swashplate.identification.core import stopping
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.scoring import Optimum, minimise
+from swashplate.identification.core.scoring import Optimum, Solver, minimise
 
 BY = {signal.SIGINT: KeyboardInterrupt(), signal.SIGTERM: SystemExit(128 + signal.SIGTERM)}
 
@@ -29,7 +29,7 @@ def _stopped(at: int, by: BaseException) -> Callable[[int, float], None]:
 
 
 def _search(**how: object) -> Optimum:
-    return minimise(_valley(), tolerance=1e-9, **how)  # type: ignore[arg-type]
+    return minimise(_valley(), Solver(tolerance=1e-9, **how))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("number", list(BY))
@@ -75,7 +75,7 @@ def test_a_stop_within_an_iteration_keeps_the_one_before() -> None:
     valley = _Interrupted(_valley().row)
     valley.at = 4  # the start and two iterations are scored before
     with stopping.stoppable() as stop, stopping.kept():
-        found = minimise(valley, tolerance=1e-9)
+        found = minimise(valley, Solver(tolerance=1e-9))
     np.testing.assert_array_equal(found.row, _search(iterations=2).row)
     assert stop.iterations == 2
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 
 _N = 400
 
@@ -57,7 +57,7 @@ def _row(*, variance: bool, first: float = 6.0, lower: float = -12.0, sigma: flo
 
 def test_variances_far_away_are_found_in_few_steps_and_as_damped_steps_find_them() -> None:
     quick, slow = Noisy(_row(variance=True)), Noisy(_row(variance=False))
-    found, damped = minimise(quick, tolerance=1e-6), minimise(slow, tolerance=1e-9, iterations=200)
+    found, damped = minimise(quick, Solver(tolerance=1e-6)), minimise(slow, Solver(tolerance=1e-9, iterations=200))
     np.testing.assert_allclose(found.row, damped.row, atol=2e-4)
     assert found.converged
     assert np.exp(2.0 * found.row[1]) == pytest.approx(4.0, rel=0.02)
@@ -68,7 +68,7 @@ def test_variances_far_away_are_found_in_few_steps_and_as_damped_steps_find_them
 def test_a_noise_that_is_not_there_settles_where_its_prior_holds_it() -> None:
     """The second noise is small beside the first: its variance acts in proportion, and only the prior ends its way."""
     absent = Noisy(_row(variance=True, first=0.7), squares=(4.0, 4.0))
-    found = minimise(absent, tolerance=1e-6)
+    found = minimise(absent, Solver(tolerance=1e-6))
     step = 1e-4 * np.eye(3)
 
     def posterior(row: np.ndarray) -> float:
@@ -82,10 +82,10 @@ def test_a_noise_that_is_not_there_settles_where_its_prior_holds_it() -> None:
 
 def test_bounds_hold_and_a_search_that_is_cut_short_says_so() -> None:
     bounded = Noisy(_row(variance=True, lower=1.5))
-    found = minimise(bounded, tolerance=1e-6)
+    found = minimise(bounded, Solver(tolerance=1e-6))
     assert "first" in found.at_bound
     assert min(row[1] for row in bounded.asked) >= 1.5
-    assert not minimise(Noisy(_row(variance=True)), iterations=2, tolerance=1e-9).converged
+    assert not minimise(Noisy(_row(variance=True)), Solver(iterations=2, tolerance=1e-9)).converged
 
 
 def test_a_wrong_gradient_is_not_called_an_optimum() -> None:
@@ -97,7 +97,7 @@ def test_a_wrong_gradient_is_not_called_an_optimum() -> None:
             return cost, -gradient, information
 
     row = _row(variance=True)
-    found = minimise(Wrong(row), tolerance=1e-6)
+    found = minimise(Wrong(row), Solver(tolerance=1e-6))
     np.testing.assert_allclose(found.row, row.starts(), atol=1e-3)
     assert found.history[0] - found.history[-1] < 1.0
 
@@ -109,7 +109,7 @@ def test_a_kinked_entry_that_goes_too_far_does_not_hold_up_the_others() -> None:
 
     row = _row(variance=True)
     kinked = replace(row.entries[0], kinked=True)
-    found = minimise(Kinked(Row((kinked, *row.entries[1:]))), tolerance=1e-6)
+    found = minimise(Kinked(Row((kinked, *row.entries[1:]))), Solver(tolerance=1e-6))
     assert found.row[0] <= 0.3
     at_kink = 4.0 + (found.row[0] - 1.0) ** 2
     assert np.exp(2.0 * found.row[1]) == pytest.approx(at_kink, rel=0.05)

@@ -13,8 +13,8 @@ from swashplate.control.analysis.gain_premises import refused_by_card
 from swashplate.errors import CardError
 from swashplate.flights.flight import Flight
 from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.identify import identify
 from swashplate.identification.responses.respond import respond
-from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.models.catalogue import vehicle
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import UNMOVED, StateSpaceModel
@@ -50,7 +50,7 @@ def fitted(flight: Flight, method: str) -> StateSpaceModel:
     if method == "responses":
         found = respond([flight], inputs=["command"], outputs=["p"], band=(0.3, 5.0))
         return fit_state_space(ROLL, found, starts=1, least_coherence=0.3).solution
-    return fit_in_time(ROLL, flight.condition(rate=100.0), outputs=["p"], shifts=False).solution
+    return identify(ROLL, flight.condition(rate=100.0), outputs=["p"], shifts=False).solution
 
 
 @pytest.mark.parametrize("method", ["responses", "output-error"])

@@ -13,7 +13,7 @@ from simulated_flights import FREE, ten_seconds
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.belonging import SHIFTS, unrelated
-from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.filter_error import FilterError
 
 
 @lru_cache(maxsize=1)
@@ -23,7 +23,7 @@ def piece() -> Record:
 
 
 def cost(pieces: Sequence[Record]) -> float:
-    likelihood = PredictionError(parameterize(sp.vehicle("coax"), list(FREE)), pieces)
+    likelihood = FilterError(parameterize(sp.vehicle("coax"), list(FREE)), pieces)
     return likelihood.cost(likelihood.row.starts())
 
 

@@ -119,7 +119,7 @@ def test_it_prints_and_is_plain_json() -> None:
 
 def test_an_unknown_method_and_a_short_flight_are_refused() -> None:
     coax = sp.vehicle("coax")
-    with pytest.raises(IdentificationError, match="method is 'magic', expected one of prediction-error"):
+    with pytest.raises(IdentificationError, match="method is 'magic', expected one of filter-error"):
         sp.identify(coax, _flight(), method="magic")
     with pytest.raises(IdentificationError, match=r"longest unbroken piece has 5\.0 s, expected at least"):
         sp.identify(coax, _flight().between(0.0, 5.0), free=FREE)

@@ -19,10 +19,10 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
-from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.time.calibration import first_part
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.output_error import WINDOW, OutputError
-from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.physics.backend import ArrayBackend
 
 
@@ -43,16 +43,16 @@ def _output_error() -> OutputError:
 
 
 @lru_cache(maxsize=1)
-def _prediction_error() -> PredictionError:
-    return PredictionError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_start()])
+def _filter_error() -> FilterError:
+    return FilterError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_start()])
 
 
-@pytest.fixture(params=["output error", "prediction error"])
-def likelihood(request: pytest.FixtureRequest) -> OutputError | PredictionError:
-    return _output_error() if request.param == "output error" else _prediction_error()
+@pytest.fixture(params=["output error", "filter error"])
+def likelihood(request: pytest.FixtureRequest) -> OutputError | FilterError:
+    return _output_error() if request.param == "output error" else _filter_error()
 
 
-def _somewhere(likelihood: OutputError | PredictionError, seed: int = 1) -> np.ndarray:
+def _somewhere(likelihood: OutputError | FilterError, seed: int = 1) -> np.ndarray:
     """A row near the start, away from every symmetry, with its weights taken."""
     rng = np.random.default_rng(seed)
     row = likelihood.row.starts() + 0.05 * rng.standard_normal(len(likelihood.row))
@@ -60,13 +60,13 @@ def _somewhere(likelihood: OutputError | PredictionError, seed: int = 1) -> np.n
     return np.asarray(row)
 
 
-def _picked(likelihood: OutputError | PredictionError) -> np.ndarray:
+def _picked(likelihood: OutputError | FilterError) -> np.ndarray:
     """Some entries of every group."""
     groups = sorted({entry.group for entry in likelihood.row.entries})
     return np.concatenate([likelihood.row.places(group)[:: 1 if group == "parameter" else 6] for group in groups])
 
 
-def test_the_gradient_is_the_slope_of_the_cost(likelihood: OutputError | PredictionError) -> None:
+def test_the_gradient_is_the_slope_of_the_cost(likelihood: OutputError | FilterError) -> None:
     row = _somewhere(likelihood)
     cost, gradient, information = likelihood.scores(row)
     assert cost == pytest.approx(likelihood.cost(row), rel=1e-12)
@@ -80,7 +80,7 @@ def test_the_gradient_is_the_slope_of_the_cost(likelihood: OutputError | Predict
 
 def test_a_heading_that_only_turns_the_innovations_tells_nothing() -> None:
     """What is expected at another heading turns the innovation that is there; no flight is more likely for that."""
-    likelihood = _prediction_error()
+    likelihood = _filter_error()
     model, names = likelihood.model, likelihood.model.output_names
     x = likelihood.runs(_somewhere(likelihood))[0].states.x[100]
     none = np.zeros((model.n_gusts, model.n_outputs))
@@ -107,13 +107,13 @@ def test_a_heading_that_only_turns_the_innovations_tells_nothing() -> None:
 
 def test_records_beside_others_are_run_alike() -> None:
     """Two records in one likelihood cost what each costs alone."""
-    whole = _prediction_error()
+    whole = _filter_error()
     row = _somewhere(whole)
-    both = PredictionError(whole.table, [_start(), _start()])
+    both = FilterError(whole.table, [_start(), _start()])
     assert both.cost(row) == pytest.approx(2.0 * whole.cost(row), rel=1e-12)
 
 
-def test_the_information_is_the_curvature_where_the_model_is_true(likelihood: OutputError | PredictionError) -> None:
+def test_the_information_is_the_curvature_where_the_model_is_true(likelihood: OutputError | FilterError) -> None:
     """The Fisher information is the mean of the Hessian: along a few directions they agree as well as noise lets them.
 
     At the best row, where the residuals are noise; the Hessian by differences of the gradient. The heading of the
@@ -134,14 +134,14 @@ def test_the_information_is_the_curvature_where_the_model_is_true(likelihood: Ou
 _FOUND: dict[int, object] = {}
 
 
-def _best(likelihood: OutputError | PredictionError):  # type: ignore[no-untyped-def]
+def _best(likelihood: OutputError | FilterError):  # type: ignore[no-untyped-def]
     if id(likelihood) not in _FOUND:
         few = 40 if isinstance(likelihood, OutputError) else 15  # what is left to do is noise that shrinks to nothing
-        _FOUND[id(likelihood)] = minimise(likelihood, iterations=few)
+        _FOUND[id(likelihood)] = minimise(likelihood, Solver(iterations=few))
     return _FOUND[id(likelihood)]
 
 
-def test_both_find_the_truth_within_their_bounds(likelihood: OutputError | PredictionError) -> None:
+def test_both_find_the_truth_within_their_bounds(likelihood: OutputError | FilterError) -> None:
     found = _best(likelihood)
     row = likelihood.row
     plain = accuracy.covariance(row, found.information, row.prior(found.row)[2])
@@ -155,7 +155,7 @@ def test_both_find_the_truth_within_their_bounds(likelihood: OutputError | Predi
 
 def test_innovations_at_the_truth_are_as_large_as_promised() -> None:
     """One-step errors over their own covariance: one on average, channel by channel."""
-    likelihood = _prediction_error()
+    likelihood = _filter_error()
     white, sensitivities, _ = likelihood.whitened(_best(likelihood).row)
     assert len(white) == 1
     counted = int(likelihood.counted[0].sum())
@@ -185,7 +185,7 @@ def test_an_outlier_costs_its_distance_and_not_its_square() -> None:
 
 
 def test_a_model_that_leaves_the_finite_numbers_costs_infinitely_much() -> None:
-    for likelihood in (_output_error(), _prediction_error()):
+    for likelihood in (_output_error(), _filter_error()):
         row = _somewhere(likelihood)
         row[likelihood.row.places("parameter")[0]] = -1e-4  # a negative time constant: it explodes at once
         assert likelihood.cost(row) == np.inf
@@ -212,7 +212,7 @@ def test_a_record_shorter_than_a_window_is_refused() -> None:
 
 
 def test_the_first_seconds_of_a_filter_are_not_counted() -> None:
-    counted = _prediction_error().counted[0]
+    counted = _filter_error().counted[0]
     assert not counted[:150].any()
     assert counted.shape == (501,)
     assert counted[150:].all()
@@ -220,7 +220,7 @@ def test_the_first_seconds_of_a_filter_are_not_counted() -> None:
 
 def test_innovations_turn_back_into_the_room() -> None:
     """Their horizontal part is in heading axes; a nose to the east makes forward east."""
-    likelihood, record = _prediction_error(), _start()
+    likelihood, record = _filter_error(), _start()
     outputs = record.outputs.copy()
     outputs[:, 5] = np.pi / 2.0
     east = Record(record.name, record.time, record.inputs, outputs, record.voltage, record.output_names, True)
@@ -232,11 +232,11 @@ def test_innovations_turn_back_into_the_room() -> None:
 
 def test_what_is_left_out_passes_the_filter_and_counts_for_nothing() -> None:
     """The same run; cost, information and whitened innovations are those of the samples that are left."""
-    whole = _prediction_error()
+    whole = _filter_error()
     row, piece = _somewhere(whole), whole.pieces[0]
     first, last = piece.time[0] + 2.0, piece.time[0] + 3.0
     parts = [
-        PredictionError(whole.table, [replace(piece, left_out=out)])
+        FilterError(whole.table, [replace(piece, left_out=out)])
         for out in (((first, last),), ((-1.0, first - 0.005), (last + 0.005, 99.0)))
     ]
     for told, halves in zip(whole.scores(row), zip(*(part.scores(row) for part in parts), strict=True), strict=True):

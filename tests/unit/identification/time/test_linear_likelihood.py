@@ -12,8 +12,8 @@ from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.time.linear_filter import FilterErrors
 from swashplate.identification.time.linear_likelihood import OutputErrors
+from swashplate.identification.time.linear_problem import linear_records, torn
 from swashplate.identification.time.linear_simulation import driven
-from swashplate.identification.time.linear_time_fit import linear_records, torn
 from swashplate.models.linear.state_space_file import structure
 
 MODEL = structure("rotor_body").with_values(

@@ -23,7 +23,7 @@ from swashplate.identification.core.multi_step import Ahead
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import POSE, Record
 from swashplate.identification.time.beginning import FilterNumbers
-from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
@@ -59,12 +59,12 @@ def _vehicle(name: str) -> Vehicle:
 
 
 @lru_cache(maxsize=8)
-def _likelihood(name: str, noise: Noise | None = None) -> PredictionError:
+def _likelihood(name: str, noise: Noise | None = None) -> FilterError:
     vehicle = _vehicle(name)
-    return PredictionError(parameterize(vehicle, _FREE[name]), [_record(vehicle)], noise=noise)
+    return FilterError(parameterize(vehicle, _FREE[name]), [_record(vehicle)], noise=noise)
 
 
-def _somewhere(likelihood: PredictionError) -> Array:
+def _somewhere(likelihood: FilterError) -> Array:
     return likelihood.row.starts() + 0.02 * np.random.default_rng(1).standard_normal(len(likelihood.row))
 
 
@@ -154,7 +154,7 @@ def test_without_a_compiler_the_numbers_are_the_same(
     monkeypatch.setattr(libraries, "can_compile", lambda: False)
     _forget()
     try:
-        by_numpy = PredictionError(in_c.table, in_c.pieces, noise=in_c.noise)
+        by_numpy = FilterError(in_c.table, in_c.pieces, noise=in_c.noise)
         theirs, (other,) = by_numpy.scores(row), by_numpy.runs(row)
         further = by_numpy.errors_ahead_moved(row, AHEAD, places)
         assert by_numpy.compiled_by == "NumPy"

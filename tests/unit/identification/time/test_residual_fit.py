@@ -14,9 +14,9 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import records
 from swashplate.identification.time import residual_fit
+from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.linear_residual import LinearResidual
-from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.identification.time.residual_fit import fit_residual
 from swashplate.identification.time.residual_strength import BLOCK
 
@@ -71,9 +71,9 @@ def test_blocks_begin_with_their_flights_own_accelerations(monkeypatch: pytest.M
     """A block whose filter begins without them must find them with its drifts, in the 1.5 s that are not counted."""
     coax = sp.vehicle("coax")
     (piece,) = records((ten_seconds().condition(rate=100.0, cutoff=0.0),), coax)
-    made: list[PredictionError] = []
+    made: list[FilterError] = []
 
-    def stop(likelihoods: list[PredictionError]) -> None:
+    def stop(likelihoods: list[FilterError]) -> None:
         made.extend(likelihoods)
         raise InterruptedError
 

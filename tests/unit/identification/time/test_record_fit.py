@@ -14,17 +14,16 @@ from swashplate.errors import IdentificationError
 from swashplate.flights.excitation import Excitation
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Problem
-from swashplate.identification.time import vehicle_time_fit
-from swashplate.identification.time.linear_time_fit import fit_in_time
-from swashplate.identification.time.vehicle_time_fit import fit_vehicle
+from swashplate.identification.identify import identify
+from swashplate.identification.time import vehicle_problem
 from swashplate.models.linear.state_space_file import parse
 
 
 def test_a_linear_vehicle_is_fitted_as_the_linear_model() -> None:
     """Runge-Kutta steps, series and forward derivatives against matrix exponentials and complex steps."""
     flown, outputs = gusty(), ("p", "pdot", "ay")
-    found = fit_vehicle(rolling(), flown, free=list(TRUTH), outputs=outputs, biases=["ay"])
-    other = fit_in_time(parse(SAME), flown, method="filter-error", shifts=False, biases=["ay"])
+    found = identify(rolling(), flown, free=list(TRUTH), outputs=outputs, biases=["ay"])
+    other = identify(parse(SAME), flown, method="filter-error", shifts=False, biases=["ay"])
     assert found.converged
     assert other.converged
     assert found.history[-1] == pytest.approx(other.history[-1], abs=0.05)
@@ -42,12 +41,12 @@ def test_a_fit_carries_a_channel_that_is_off_by_a_factor_and_is_not_failed() -> 
     scaled = Problem("p: is 1.25 ± 0.004 times what the attitude's change gives", (1.25, 0.004))
     told = (scaled, Problem("arrays: 2 gaps"))
     flown = replace(flown, provenance=replace(flown.provenance, source="log.csv", problems=told))
-    found = fit_in_time(parse(SAME), flown, method="filter-error", shifts=False, biases=["ay"])
+    found = identify(parse(SAME), flown, method="filter-error", shifts=False, biases=["ay"])
     assert found.problems == (f"log.csv: {scaled.text}",)
     assert not found.failed
     assert found.data[0].problems == told
     assert f"! log.csv: {scaled.text}" in repr(found)
-    assert fit_vehicle(rolling(), flown, free=list(TRUTH), outputs=("p", "pdot", "ay"), biases=["ay"]).problems == (
+    assert identify(rolling(), flown, free=list(TRUTH), outputs=("p", "pdot", "ay"), biases=["ay"]).problems == (
         f"log.csv: {scaled.text}",
     )
 
@@ -57,8 +56,8 @@ def test_what_only_a_controller_moved_is_told_and_gets_no_gains(kind: str, monke
     def moved(*_: object, **__: object) -> tuple[Excitation, ...]:
         return (Excitation("log", "stick", kind, "past motion explains it."),)
 
-    monkeypatch.setattr(vehicle_time_fit, "excitations", moved)
-    found = fit_vehicle(rolling(), gusty(), free=list(TRUTH), outputs=("p", "pdot", "ay"), biases=["ay"], iterations=2)
+    monkeypatch.setattr(vehicle_problem, "excitations", moved)
+    found = identify(rolling(), gusty(), free=list(TRUTH), outputs=("p", "pdot", "ay"), biases=["ay"], iterations=2)
     refused = refused_by_card(found.model.card)
     assert ("stick: fitted although no flight moved it from outside" in refused) == (kind == "controller")
     assert any("stick: past motion explains it." in text for text in found.warnings) == (kind == "controller")
@@ -71,7 +70,7 @@ def test_a_delay_of_a_stick_that_rests_is_what_was_known_before() -> None:
     flown = gusty()
     stick = np.zeros_like(flown.values("stick"))
     flown = Flight({"uniform": flown.streams["uniform"].assign(stick=("time", stick, {"units": "1"}))})
-    found = fit_in_time(model, flown, method="filter-error", shifts=False, biases=["ay"])
+    found = identify(model, flown, method="filter-error", shifts=False, biases=["ay"])
     assert found["late"].insensitivity == np.inf
     assert found["Lb"].insensitivity < found["Lb"].sigma < np.inf
     assert "late" in repr(found)
@@ -81,11 +80,11 @@ def test_what_cannot_be_fitted_is_said() -> None:
     n = 100
     columns = {name: np.linspace(1.0, 2.0, n) for name in ("elevator", "thrust", *OUTPUTS, "beta")}
     flown = flight(columns)
-    with pytest.raises(IdentificationError, match="is no method"):
-        fit_vehicle(hfb320(), flown, free=list(START), outputs=OUTPUTS, method="magic")
+    with pytest.raises(IdentificationError, match="method is 'magic'"):
+        identify(hfb320(), flown, free=list(START), outputs=OUTPUTS, method="magic")
     with pytest.raises(IdentificationError, match="does not predict it"):
-        fit_vehicle(hfb320(), flown, free=list(START), outputs=("V", "beta"))
+        identify(hfb320(), flown, free=list(START), outputs=("V", "beta"))
     with pytest.raises(IdentificationError, match="is none of the outputs"):
-        fit_vehicle(hfb320(), flown, free=list(START), outputs=OUTPUTS, biases=["ay"])
+        identify(hfb320(), flown, free=list(START), outputs=OUTPUTS, biases=["ay"])
     with pytest.raises(IdentificationError, match="has no such parameter"):
-        fit_vehicle(hfb320(), flown, free=["CYb"], outputs=OUTPUTS)
+        identify(hfb320(), flown, free=["CYb"], outputs=OUTPUTS)

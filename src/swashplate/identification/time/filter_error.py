@@ -1,4 +1,4 @@
-"""Maximum likelihood by prediction errors: the default for flights, which fly in disturbed air under feedback.
+"""Maximum likelihood by filter error: the default for flights, which fly in disturbed air under feedback.
 
 The cost is the negative log-likelihood of the innovations of a constant-gain Kalman filter around the nonlinear
 equations, with the process and measurement noise estimated beside the parameters (filter error method: Maine and
@@ -70,7 +70,7 @@ def parameter_entries(table: Parameterization) -> list[Entry]:
     ]
 
 
-class PredictionError:
+class FilterError:
     """The innovations' likelihood of some records as a function of parameters, nuisances and noise.
 
     Args:
@@ -120,13 +120,13 @@ class PredictionError:
         settled = round(SETTLING / self.model.dt)
         self.counted = tuple(piece.counts & (np.arange(piece.time.size) >= settled) for piece in pieces)
 
-    def widened(self, added: Sequence[str]) -> PredictionError:
+    def widened(self, added: Sequence[str]) -> FilterError:
         """The same likelihood with more of the vehicle's numbers free, under a constant gain."""
         table = self.table.wider(added)
-        return PredictionError(table, self.pieces, noise=self.noise, estimate_noise=self.estimate_noise)
+        return FilterError(table, self.pieces, noise=self.noise, estimate_noise=self.estimate_noise)
 
     @property
-    def constant(self) -> PredictionError:
+    def constant(self) -> FilterError:
         """The likelihood of the same row with a constant gain."""
         return self
 
