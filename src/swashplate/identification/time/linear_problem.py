@@ -25,7 +25,7 @@ from swashplate.identification.core.result import Estimate
 from swashplate.identification.estimators import GAINS, Question
 from swashplate.identification.time.linear_filter import VELOCITIES, FilterErrors, GustErrors
 from swashplate.identification.time.linear_likelihood import OutputErrors
-from swashplate.identification.time.record_fit import Problem, RecordEstimator
+from swashplate.identification.time.record_fit import RecordEstimator, RecordProblem
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
@@ -45,7 +45,7 @@ class LinearKind:
 
     def problem(
         self, model: StateSpaceModel, flights: Sequence[Flight], question: Question, *, method: str
-    ) -> Problem[StateSpaceModel]:
+    ) -> RecordProblem[StateSpaceModel]:
         names, shifts, gain = tuple(question.outputs or model.outputs), question.shifts is not False, GAINS[method]
         kind = _likelihood_of(model, method, question.gusts)
         pieces, delays = linear_records(model, flights, names, biases=question.biases)
@@ -61,7 +61,7 @@ class LinearKind:
             return model.with_values({n: estimates[n].value for n in model.free}).with_bounds(told)
 
         settings = {"shifts": shifts, "biases": list(question.biases)}
-        return Problem(
+        return RecordProblem(
             likelihood,
             model,
             [model.parameters[n].unit for n in model.free],

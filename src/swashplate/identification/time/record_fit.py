@@ -56,7 +56,7 @@ class TimeDetails:
 
 
 @dataclass(frozen=True)
-class Problem(Generic[Model]):
+class RecordProblem(Generic[Model]):
     """What is sought, and what is made of the numbers that a search finds.
 
     Attributes:
@@ -103,7 +103,12 @@ class Solved:
 
 
 def fit(
-    problem: Problem[Model], solver: Solver, *, method: str, flights: Sequence[Flight], horizon: Horizon | None = None
+    problem: RecordProblem[Model],
+    solver: Solver,
+    *,
+    method: str,
+    flights: Sequence[Flight],
+    horizon: Horizon | None = None,
 ) -> Result[Model, TimeDetails]:
     """The optimum of a problem as what every identification returns.
 
@@ -170,7 +175,7 @@ def fit(
     )
 
 
-def _solved(problem: Problem[Any], solver: Solver, horizon: Horizon | None) -> Solved:
+def _solved(problem: RecordProblem[Any], solver: Solver, horizon: Horizon | None) -> Solved:
     """The optimum of the likelihood, or of the errors ahead that it leads to."""
     likelihood = problem.likelihood
     optimum = minimise(likelihood, solver, start=problem.begin)
@@ -247,7 +252,7 @@ def check_biases(biases: Sequence[str], outputs: Sequence[str]) -> None:
         raise IdentificationError(f"is none of the outputs {', '.join(outputs)}.", channel=", ".join(unknown))
 
 
-class Kind(Protocol[Model]):
+class RecordKind(Protocol[Model]):
     """What fits of one kind of model to records in time differ in.
 
     Attributes:
@@ -261,7 +266,9 @@ class Kind(Protocol[Model]):
         """Why it is none of its models; "" where it is."""
         ...
 
-    def problem(self, model: Model, flights: Sequence[Flight], question: Question, *, method: str) -> Problem[Model]:
+    def problem(
+        self, model: Model, flights: Sequence[Flight], question: Question, *, method: str
+    ) -> RecordProblem[Model]:
         """The likelihood of the flights' records, by the method's gain."""
         ...
 
@@ -276,7 +283,7 @@ class RecordEstimator(Generic[Model]):
     """
 
     method: str
-    kind: Kind[Model]
+    kind: RecordKind[Model]
 
     @property
     def takes(self) -> frozenset[str]:

@@ -17,7 +17,7 @@ from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.estimators import GAINS, Question
 from swashplate.identification.time.feedback import mark_answers
-from swashplate.identification.time.record_fit import Problem, RecordEstimator, check_biases
+from swashplate.identification.time.record_fit import RecordEstimator, RecordProblem, check_biases
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.surroundings import environment_of
@@ -35,7 +35,7 @@ class VehicleKind:
 
     def problem(
         self, model: Vehicle, flights: Sequence[Flight], question: Question, *, method: str
-    ) -> Problem[Vehicle]:
+    ) -> RecordProblem[Vehicle]:
         if question.free is None:
             raise IdentificationError(
                 f"'{model.name}' has no ready choice of what may move.",
@@ -66,7 +66,7 @@ class VehicleKind:
         answers = tuple(f"{one.input}: {one.words}" for one in of_inputs(moved).values() if one.kind == CONTROLLER)
         sources = ", ".join(piece.name for piece in likelihood.records)
         made, card = _Identified(table, method, sources, moved), model.card.parameters
-        return Problem(
+        return RecordProblem(
             likelihood,
             model,
             [card[name].unit for name in table.names],
