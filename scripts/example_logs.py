@@ -53,13 +53,13 @@ CUTS = {
 
 def cut(content: bytes, chosen: Cut) -> bytes:
     """The chosen messages of a log, in their order."""
-    scan, taken = dataflash._Scan(content), []
+    kinds, taken = dataflash.kinds(content), []
     log = dataflash.messages(content)
     used = set(_DESCRIBE) | set(_SLOW) | set(chosen.rates)
     for name, table in log.tables.items():
         if name not in used or name in ("FMT", "FMTU"):
             continue
-        kind = next(k for k in scan.kinds.values() if k.name == name)
+        kind = next(k for k in kinds if k.name == name)
         size, rate, last = kind.dtype.itemsize + 3, chosen.rates.get(name, _SLOW.get(name, ALL)), {}
         stamps = 1e-6 * table.number("TimeUS")
         told = name in ("PARM", "MODE", "MSG", *_DESCRIBE)
@@ -76,10 +76,10 @@ def cut(content: bytes, chosen: Cut) -> bytes:
             last[sensor] = stamp
             taken.append((at, whole))
     head = []
-    for number, kind in scan.kinds.items():
+    for kind in kinds:
         if kind.name in used and kind.at:
-            head += [content[at : at + 89] for at in _described(content, number)]
-            head += _units(content, scan, number)
+            head += [content[at : at + 89] for at in _described(content, kind.number)]
+            head += _units(content, kinds, kind.number)
     return b"".join(head) + b"".join(whole for _, whole in sorted(taken))
 
 
@@ -89,9 +89,9 @@ def _described(content: bytes, number: int) -> list[int]:
     return [at] if at >= 0 else []
 
 
-def _units(content: bytes, scan: dataflash._Scan, number: int) -> list[bytes]:
+def _units(content: bytes, kinds: Sequence[dataflash.MessageKind], number: int) -> list[bytes]:
     """The FMTU message that gives a type its units."""
-    kind = next((k for k in scan.kinds.values() if k.name == "FMTU"), None)
+    kind = next((k for k in kinds if k.name == "FMTU"), None)
     if kind is None:
         return []
     size = kind.dtype.itemsize + 3
@@ -99,6 +99,7 @@ def _units(content: bytes, scan: dataflash._Scan, number: int) -> list[bytes]:
 
 
 # ---- the flight without a sweep --------------------------------------------------------------------------------------
+LOUD = 4.8  # the gain of the pitch loop there, against its own
 SECONDS, STEP, EVERY, BEGIN = 70.0, 1.0 / 400.0, 4, 60.0
 OSCILLATES, SHAKES = (40.0, 47.0), (58.0, 64.0)
 """s from the beginning: the pitch loop's gain is too high, and a blade is out of track."""
@@ -116,9 +117,9 @@ _FORMATS = {
     "RPM": (77, "QBf", "TimeUS,I,RPM"),
 }
 _GAINS = {
-    "RLL": {"P": 0.10, "I": 0.10, "D": 0.002, "FF": 0.0},
-    "PIT": {"P": 0.12, "I": 0.12, "D": 0.002, "FF": 0.0},
-    "YAW": {"P": 0.18, "I": 0.12, "D": 0.003, "FF": 0.0},
+    "RLL": {"P": 0.20, "I": 0.30, "D": 0.002, "FF": 0.09},
+    "PIT": {"P": 0.20, "I": 0.30, "D": 0.002, "FF": 0.09},
+    "YAW": {"P": 0.30, "I": 0.30, "D": 0.003, "FF": 0.08},
 }
 _PLANT = {"RLL": (80.0, 8.0, 0.02, 8), "PIT": (60.0, 6.0, 0.02, 8), "YAW": (35.0, 3.0, 0.03, 8)}
 """Effect [1/s^2], damping [1/s], lag [s] and delay [steps] of each axis."""
@@ -136,7 +137,7 @@ def flown(rng: np.random.Generator) -> tuple[Array, dict[str, Array]]:
         for i, t in enumerate(time.tolist()):
             stick += STEP * (moves[i] - stick) / 0.15
             gust += -STEP * gust / 0.8 + np.sqrt(STEP) * 1.2 * rng.standard_normal()
-            loud = 7.0 if axis == "PIT" and OSCILLATES[0] <= t < OSCILLATES[1] else 1.0
+            loud = LOUD if axis == "PIT" and OSCILLATES[0] <= t < OSCILLATES[1] else 1.0
             shaken = 0.06 * np.sin(2.0 * np.pi * 25.3 * t) if SHAKES[0] <= t < SHAKES[1] else 0.0
             measured = p + shaken + 0.004 * rng.standard_normal()
             smooth += (1.0 - np.exp(-2.0 * np.pi * 40.0 * STEP)) * (measured - smooth)
@@ -145,7 +146,8 @@ def flown(rng: np.random.Generator) -> tuple[Array, dict[str, Array]]:
             integral = float(np.clip(integral + k["I"] * error * STEP, -0.3, 0.3))
             slope += (1.0 - np.exp(-2.0 * np.pi * 20.0 * STEP)) * ((error - before) / STEP - slope)
             before = error
-            asked = float(np.clip(loud * (k["P"] * error + k["D"] * slope) + integral, -1.0, 1.0))
+            asked = loud * (k["P"] * error + k["D"] * slope) + integral + k["FF"] * wanted
+            asked = float(np.clip(asked, -1.0, 1.0))
             waiting.append(asked)
             command += STEP * (waiting.pop(0) - command) / lag
             p += STEP * (effect * command - damping * p + gust)

@@ -155,6 +155,21 @@ def test_a_card_opens_a_flight_that_ships_and_names_its_command(browser: Any, ad
     assert visit.of("getComputedStyle(document.getElementById('views')).display") == "none", "nothing to view yet"
     visit.page.click("[data-try='helicopter_sweeps.bin']")
     drawn(visit)
+    titles = visit.of("[...document.querySelectorAll('.chart strong')].map(e => e.textContent)")
+    assert titles[:3] == ["Roll rate [deg/s]", "Pitch rate [deg/s]", "Yaw rate [deg/s]"], "target and actual first"
+    visit.page.fill("#search", "vibe")
+    visit.until("document.querySelector('[data-channel=\"VIBE.VibeX\"]')")
+    visit.page.check("[data-channel='VIBE.VibeX']")
+    visit.until("document.querySelector('[data-chart=VIBE] canvas')")
+    over = visit.page.locator(".u-over").first.bounding_box()
+    visit.page.mouse.click(over["x"] + 0.25 * over["width"], over["y"] + 50)
+    visit.page.mouse.move(over["x"] + 0.5 * over["width"], over["y"] + 50, steps=3)
+    visit.until("/Δ 2[23]\\.\\d+ s/.test(document.getElementById('cursor').textContent)")
+    assert visit.of("document.querySelectorAll('.chart output i').length") >= 6
+    visit.view("map")
+    visit.until("document.getElementById('map').dataset.drawn")
+    visit.page.keyboard.press("Escape")
+    visit.until("!/Δ/.test(document.getElementById('map').innerText)")
     visit.until("document.querySelectorAll('#sweeps button').length === 2")
     visit.view("code")
     codes = visit.of("[...document.querySelectorAll('[data-code=\"Command line\"]')].map(e => e.textContent)")

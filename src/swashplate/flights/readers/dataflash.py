@@ -86,12 +86,20 @@ class Messages:
 
 
 @dataclass
-class _Kind:
-    """A described message type and where its messages stand."""
+class MessageKind:
+    """A described message type and where its messages stand.
 
+    Attributes:
+        number, name: of the type. dtype: of its payload. factors: what stored numbers are multiplied by, by field.
+        letters: the log's own word for each field's type.
+        at: bytes from the file's begin to each message.
+    """
+
+    number: int
     name: str
     dtype: np.dtype[np.void]
     factors: Mapping[str, float]
+    letters: Mapping[str, str]
     at: list[int] = field(default_factory=list)
 
 
@@ -101,7 +109,7 @@ def is_dataflash(content: bytes) -> bool:
     return start >= 0 and len(content) >= start + _FMT_LENGTH and content[start + 4] >= 3
 
 
-def _described(content: bytes, at: int) -> tuple[int, int, _Kind | None]:
+def _described(content: bytes, at: int) -> tuple[int, int, MessageKind | None]:
     """Type, length and description in the FMT message at `at`; None where letters and length do not fit together."""
     fields = np.frombuffer(content, _FMT_FIELDS, count=1, offset=at + 3)[0]
     name = bytes(fields["name"]).decode("ascii", "replace")
@@ -115,14 +123,14 @@ def _described(content: bytes, at: int) -> tuple[int, int, _Kind | None]:
     if dtype.itemsize + 3 != length:
         return kind, length, None
     factors = {column: _LETTERS[letter][1] for column, letter in zip(columns, letters, strict=True)}
-    return kind, length, _Kind(name, dtype, factors)
+    return kind, length, MessageKind(kind, name, dtype, factors, dict(zip(columns, letters, strict=True)))
 
 
 class _Scan:
     """One pass over the bytes: where each message stands, and the bytes that belong to none."""
 
     def __init__(self, content: bytes) -> None:
-        self.kinds: dict[int, _Kind] = {}
+        self.kinds: dict[int, MessageKind] = {}
         self.lengths = [0] * 256
         self.lengths[FMT] = _FMT_LENGTH
         self.lost: list[tuple[int, int]] = []
@@ -174,7 +182,13 @@ class _Scan:
             self.lost.append((start, stop))
 
 
-def _gathered(content: bytes, kind: _Kind) -> MessageTable:
+def kinds(content: bytes) -> list[MessageKind]:
+    """Every message type that the bytes describe, with the places of its messages."""
+    return list(_Scan(content).kinds.values())
+
+
+def gathered(content: bytes, kind: MessageKind) -> MessageTable:
+    """The messages of a type as columns."""
     size = kind.dtype.itemsize
     payload = b"".join([content[at + 3 : at + 3 + size] for at in kind.at])
     records = np.frombuffer(payload, kind.dtype) if size else np.zeros(len(kind.at), kind.dtype)
@@ -190,7 +204,7 @@ def messages(content: bytes) -> Messages:
     tables: dict[str, MessageTable] = {}
     for kind in scan.kinds.values():
         if kind.at and kind.name not in tables:
-            tables[kind.name] = _gathered(content, kind)
+            tables[kind.name] = gathered(content, kind)
     notes, damage = [], []
     if scan.unfinished:
         notes.append(f"the last {scan.unfinished} bytes are an unfinished message or an unused block: not read")

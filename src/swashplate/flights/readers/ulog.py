@@ -112,7 +112,7 @@ def read(source: Source, options: Options) -> Flight:
     """
     refuse_mapping(options, "a ULog file", where=source.name)
     whole = whole_messages(source.content)
-    log = _decoded(whole.content, source.name)
+    log = decoded(whole.content, source.name)
     told = clocked.Remarks()
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
@@ -148,7 +148,7 @@ def read(source: Source, options: Options) -> Flight:
     return Flight(streams, provenance)
 
 
-def _decoded(content: bytes, where: str) -> Any:
+def decoded(content: bytes, where: str) -> Any:
     """What pyulog makes of the bytes; whatever it stumbles over is the file's fault."""
     core = library("pyulog.core", what="a PX4 ULog file", where=where)
     sizes = re.findall(rb"\w\[(\d{1,20})\] ", content)

@@ -15,6 +15,7 @@ from starlette.types import ASGIApp
 
 from swashplate.links.logs import requests as ask
 from swashplate.links.logs.desk import BINS, MOST_LOGS, Desk
+from swashplate.links.logs.map import map_of
 from swashplate.links.logs.remedies import Remedy
 from swashplate.links.logs.spectra import spectra
 from swashplate.links.logs.track import track
@@ -104,6 +105,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             start=ask.number,
             stop=ask.number,
         ),
+        _post("/map", lambda log: map_of(desk.log(log)), log=_LOG),
         _post("/track", lambda log: track(desk.log(log)), log=_LOG),
         _post("/align", desk.align, first=_LOG, second=_LOG),
         _post(

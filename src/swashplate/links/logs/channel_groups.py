@@ -8,6 +8,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.flights.flight import Flight
+from swashplate.flights.readers.log_fields import LogFields
 from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, VELOCITY, channel, is_known
 
 _GROUPS = (
@@ -53,3 +54,13 @@ def groups(flight: Flight) -> list[dict[str, Any]]:
         entry = {"name": name, "unit": unit, "rate": rate, "samples": samples, "about": about}
         made[group_of(name)].append(entry)
     return [{"title": title, "channels": channels} for title, channels in made.items() if channels]
+
+
+def field_groups(fields: LogFields | None) -> list[dict[str, Any]]:
+    """The log's own fields, a group for each message."""
+    made: dict[str, list[dict[str, Any]]] = {}
+    for name, field in (fields.listed if fields else {}).items():
+        about = f"{field.message} message, field {field.field}, as the log has it"
+        entry = {"name": name, "unit": field.unit, "rate": field.rate, "samples": field.samples, "about": about}
+        made.setdefault(field.message, []).append(entry)
+    return [{"title": title, "channels": channels, "raw": True} for title, channels in sorted(made.items())]

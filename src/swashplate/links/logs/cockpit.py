@@ -52,14 +52,14 @@ class Cockpit:
         late.start()
         try:
             assert process.stdout is not None
-            found = next((m for line in process.stdout if (m := re.search(rb"http://\S+", line))), None)
+            address = next((m for line in process.stdout if (m := re.search(rb"http://\S+", line))), None)
         finally:
             late.cancel()
-        if found is None:
+        if address is None:
             raise SwashError(
                 f"the live page of {VEHICLE} did not start.", hint=f"`swash live {VEHICLE}` in a terminal says why."
             )
-        self._address = found[0].decode()
+        self._address = address[0].decode()
 
     def close(self) -> None:
         """End it, as an interrupt in its terminal would."""

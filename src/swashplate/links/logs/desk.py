@@ -148,7 +148,8 @@ class Desk:
         return made
 
     def plot_code(self, wanted: Sequence[tuple[int, str]], span: tuple[float, float] | None) -> dict[str, str]:
-        """The lines that draw the same channels."""
+        """The lines that draw the same channels; fields that are no channels have no such lines."""
+        wanted = [(number, name) for number, name in wanted if name in self.log(number).ready]
         numbers = list(dict.fromkeys(number for number, _ in wanted))
         channels = [[name for number, name in wanted if number == log] for log in numbers]
         return code_lines.plotted([self.log(number).read for number in numbers], channels, span).as_dict()

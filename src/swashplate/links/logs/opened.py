@@ -15,9 +15,10 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import Inspection, inspect
+from swashplate.flights.readers.log_fields import LogFields, log_fields
 from swashplate.flights.readers.read import read as read_log
 from swashplate.links.logs.bins import gaps
-from swashplate.links.logs.channel_groups import groups, shown_unit
+from swashplate.links.logs.channel_groups import field_groups, groups, shown_unit
 from swashplate.links.logs.code_lines import Read, inspected
 from swashplate.links.logs.remedies import remedy
 
@@ -50,6 +51,7 @@ class Opened:
         state: "reading", "ready" or "failed".
         flight: where it is ready.
         inspection: where it is checked too, which on a long log takes longer than reading.
+        fields: what the log holds beside its channels, where it holds more; listed: whether that has been looked for.
         problem, hint: where it failed.
         version: counts readings, so that a page sees that it was read anew.
     """
@@ -60,6 +62,8 @@ class Opened:
     state: str = READING
     flight: Flight | None = None
     inspection: Inspection | None = None
+    fields: LogFields | None = None
+    listed: bool = False
     problem: str = ""
     hint: str = ""
     version: int = 0
@@ -87,7 +91,7 @@ class Opened:
         except (OSError, MemoryError) as error:
             problem = f"cannot be read: {error or 'it does not fit into memory'}."
         self.flight, self.inspection, self.problem, self.hint = flight, None, problem, hint
-        self._channels, self._gaps = {}, {}
+        self._channels, self._gaps, self.fields, self.listed = {}, {}, None, False
         self._groups = [] if flight is None else groups(flight)
         self.version += 1
         self.state = FAILED if problem or flight is None else READY
@@ -97,7 +101,11 @@ class Opened:
             checking.join(_PATIENCE)
 
     def _check(self, flight: Flight) -> None:
-        """Inspect what was read, unless it has been read anew meanwhile."""
+        """List what else the log holds and inspect what was read, unless it has been read anew meanwhile."""
+        fields = log_fields(self.path)
+        if self.flight is flight:
+            self.fields, self.listed = fields, True
+            self._groups = [*self._groups, *field_groups(fields)]
         inspection, problem, hint = None, "", ""
         try:
             inspection = inspect(flight)
@@ -123,13 +131,19 @@ class Opened:
         return self.flight
 
     def shown(self, name: str) -> DrawnChannel:
-        """A channel in the unit of the screen, kept for the next zoom.
+        """A channel in the unit of the screen, or a field as the log has it, kept for the next zoom.
 
         Raises:
             FlightError: where the log is not ready or has no such channel.
         """
         if name not in self._channels:
             flight = self.ready
+            if name not in flight and self.fields is not None and name in self.fields.listed:
+                time, values = self.fields.read(name)
+                time = time - (flight.epoch or 0.0)
+                kept = DrawnChannel(time, values, self.fields.listed[name].unit, gaps(time))
+                self._channels[name] = kept
+                return kept
             unit, factor = shown_unit(flight, name)
             time, values, home = flight.time(name), flight.values(name), flight.stream_of(name)
             if home not in self._gaps:
@@ -165,6 +179,7 @@ class Opened:
             "options": self.read.options.words,
             "groups": self._groups,
             "checked": look is not None,
+            "listed": self.listed,
             "sweeps": [{"number": i, **vars(s), "words": str(s)} for i, s in enumerate(look.sweeps if look else ())],
             "problems": [_with_remedy(text) for text in (look.problems if look else ())],
             "notes": list(look.notes if look else origin.notes),

@@ -23,13 +23,18 @@ function show() {
     groups.get(channel.group).push(channel);
   }
   const boxes = [...groups].map(([title, list]) => {
-    const box = make("details", { open: words.length > 0 || (OPEN.has(title) && !closed.has(title)) || list.some((c) => drawn(c.name)) },
-      make("summary", {}, title, " ", make("small", {}, String(list.length))), ...list.map(row));
-    box.addEventListener("toggle", () => !words.length && (box.open ? closed.delete(title) : closed.add(title)));
-    return box;
+    const raw = list[0].raw, open = words.length > 0 || (OPEN.has(title) && !closed.has(title)) || list.some((c) => drawn(c.name));
+    const box = make("details", { open }, make("summary", {}, title, " ", make("small", {}, String(list.length))), ...(open ? list.map(row) : []));
+    box.addEventListener("toggle", () => {
+      if (box.open && box.children.length === 1) box.append(...list.map(row)); // hundreds of fields: only those that are looked at
+      if (!words.length) box.open ? closed.delete(title) : closed.add(title);
+    });
+    return { raw, box };
   });
-  const none = words.length ? "No channel is called that." : "";
-  $("groups").replaceChildren(...(boxes.length ? boxes : [make("p", { class: "soft" }, none)]));
+  const none = words.length ? "Nothing in the log is called that." : "";
+  const known = boxes.filter(({ raw }) => !raw), fields = boxes.filter(({ raw }) => raw);
+  const heading = fields.length ? [make("h3", {}, "Every message of the log")] : [];
+  $("groups").replaceChildren(...(boxes.length ? [...known.map(({ box }) => box), ...heading, ...fields.map(({ box }) => box)] : [make("p", { class: "soft" }, none)]));
 }
 
 export function begin() {

@@ -2,7 +2,7 @@
 import uPlot from "/page/vendor/uPlot.esm.js";
 import { DASHES, colour, ink, make, sample, short } from "./make.js";
 import { charts, erase, logs, look, offset, ready, seen } from "./state.js";
-import { mark } from "./marks.js";
+import { mark, measured } from "./marks.js";
 
 const LEAST = 170, MOST = 300, TELEPHONE = 165; // px
 const sync = uPlot.sync("time");
@@ -13,9 +13,17 @@ function spread(_, low, high) {
   return [(low + high) / 2 - half, (low + high) / 2 + half];
 }
 
+// The time of the cursor, and from the click to there.
+export function tellTime(time, from) {
+  const seconds = (value) => `${value.toFixed(3)} s`, gone = from === null ? 0 : time - from;
+  document.getElementById("cursor").textContent =
+    time === null || time === undefined ? "" : from === null ? seconds(time) : `${seconds(time)}, Δ ${seconds(gone)}${Math.abs(gone) > 1e-3 ? ` (${short(1 / Math.abs(gone))} Hz)` : ""}`;
+}
+
 export class Chart {
   constructor(home, spec, first) {
     this.spec = spec;
+    this.first = first;
     this.series = [];
     spec.channels.forEach((name, i) => {
       ready().forEach((log, k) => {
@@ -85,19 +93,31 @@ export class Chart {
     this.plot.setScale("x", { min: seen.low, max: seen.high });
   }
 
-  // Values at the cursor; a line that has no sample just there says its last one before.
+  // The last value of a line at or before a place in the data; a line need not have a sample just there.
+  #before(k, index) {
+    const column = this.data?.[k + 1];
+    for (let i = index; column && i >= 0 && i > index - 200; i--) if (column[i] !== undefined) return column[i];
+    return null;
+  }
+
+  // Values at the cursor, and by how much they differ from those at the time that was clicked.
   #tell(index) {
+    const from = measured(), there = index !== null && index !== undefined, times = this.data?.[0] ?? [];
+    let base = null;
+    if (there && from !== null && from >= times[0] && from <= times.at(-1)) {
+      let low = 0, high = times.length - 1;
+      while (low < high) {
+        const middle = (low + high + 1) >> 1;
+        if (times[middle] <= from) low = middle;
+        else high = middle - 1;
+      }
+      base = low;
+    }
     this.outputs.forEach((output, k) => {
-      let value = null;
-      const column = this.data?.[k + 1];
-      if (column && index !== null && index !== undefined)
-        for (let i = index; i >= 0 && i > index - 200; i--)
-          if (column[i] !== undefined) {
-            value = column[i];
-            break;
-          }
-      output.textContent = value === null ? "" : short(value);
+      const value = there ? this.#before(k, index) : null, then = base === null ? null : this.#before(k, base);
+      output.replaceChildren(value === null ? "" : short(value), value === null || then === null ? "" : make("i", {}, ` Δ ${short(value - then)}`));
     });
+    if (there && this.first) tellTime(times[index], from);
   }
 
   resize() {

@@ -1,5 +1,6 @@
 // Wheel, double click, shifted drag and two fingers: zoom and pan of the shared axis of time.
-import { look, seen, whole } from "./state.js";
+import { choose, measured } from "./marks.js";
+import { look, say, seen, whole } from "./state.js";
 
 const FASTEST = 0.0015;
 
@@ -18,6 +19,13 @@ export function gestures(plot) {
     look(at - (at - seen.low) * factor, at + (seen.high - at) * factor, { remember: false });
   }, { passive: false });
   over.addEventListener("dblclick", () => look(...whole()));
+  let down = null;
+  over.addEventListener("pointerdown", (event) => (down = [event.clientX, event.clientY]));
+  over.addEventListener("click", (event) => {
+    if (!down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 4) return; // it was dragged
+    choose(plot.posToVal(event.clientX - over.getBoundingClientRect().left, "x"));
+    say("marks");
+  });
   let held = null;
   over.addEventListener("touchmove", (event) => {
     if (event.touches.length !== 2) return;
@@ -29,4 +37,12 @@ export function gestures(plot) {
     look(held.low - slope * a, held.low + slope * (size - a), { remember: false });
   }, { passive: false });
   over.addEventListener("touchend", () => (held = null));
+}
+
+export function begin() {
+  addEventListener("keydown", (event) => {
+    if (event.key !== "Escape" || measured() === null) return;
+    choose(null);
+    say("marks");
+  });
 }

@@ -61,7 +61,7 @@ function list() {
 // Other channels than those that the sweep's axis names.
 function again() {
   if (!chosen || last?.state === "running") return [];
-  const names = [...channels().values()].filter((channel) => channel.logs.includes(chosen.log.id)).map((channel) => channel.name);
+  const names = [...channels().values()].filter((channel) => !channel.raw && channel.logs.includes(chosen.log.id)).map((channel) => channel.name);
   const select = (now) => make("select", {}, ...names.map((name) => make("option", { value: name, selected: name === now }, name)));
   const input = select(chosen.input), output = select(chosen.output);
   return [make("details", { class: "notes" }, make("summary", {}, "Take other channels"), make("div", { class: "bar" },

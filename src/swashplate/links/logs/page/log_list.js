@@ -90,13 +90,13 @@ function place(log) {
 export const refresh = attempt(async () => {
   clearTimeout(timer);
   const told = await get("/logs");
-  const before = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state, log.checked]));
+  const before = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state, log.checked, log.listed]));
   logs.clear();
   for (const log of told.logs) if (!leaving.has(log.id)) logs.set(log.id, log);
   for (const log of ready()) place(log);
   $("largest").textContent = Math.floor(told.largest / 1e6);
   if (told.logs.some((log) => log.state === "reading" || log.checked === false)) timer = setTimeout(refresh, 400);
-  const now = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state, log.checked]));
+  const now = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state, log.checked, log.listed]));
   show();
   if (now !== before) say("logs");
   if (ready().length > 1) {

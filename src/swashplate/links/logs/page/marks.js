@@ -8,6 +8,11 @@ export function choose(time) {
   chosen = time;
 }
 
+// The time from which differences are measured, where one was clicked.
+export const measured = () => chosen;
+
+const MOST_WORDS = 40; // events of which the first chart tells more than the place
+
 function clipped(plot, low, high) {
   const { left, width } = plot.bbox;
   const a = Math.max(left, plot.valToPos(low, "x", true)), b = Math.min(left + width, plot.valToPos(high, "x", true));
@@ -20,6 +25,27 @@ function label(ctx, text, a, b, top) {
   let shown = text;
   while (shown.length > 1 && ctx.measureText(shown).width > room) shown = `${shown.slice(0, -2)}…`;
   if (shown.length > 2) ctx.fillText(shown, a + 4 * devicePixelRatio, top);
+}
+
+// Events above, changes of parameters with them: a tick each, with words where there is room.
+function ticks(plot, log, first) {
+  const { ctx, bbox } = plot, scale = devicePixelRatio, shift = offset(log);
+  const all = [...log.events.filter((event) => event.kind !== "mode" && event.kind !== "sweep"), ...log.changes.map((change) => ({ ...change, kind: "parameter", text: `${change.name} ${change.value}` }))];
+  const seen = all.filter((event) => event.time + shift >= plot.scales.x.min && event.time + shift <= plot.scales.x.max).sort((a, b) => a.time - b.time);
+  let free = -Infinity;
+  for (const event of seen) {
+    const x = plot.valToPos(event.time + shift, "x", true);
+    ctx.fillStyle = ink(event.kind === "parameter" ? "c3" : "soft");
+    ctx.fillRect(x, bbox.top, scale, (first ? 6 : 4) * scale);
+    if (!first || x < free || seen.length > MOST_WORDS) continue;
+    const words = event.text.length > 24 ? `${event.text.slice(0, 23)}…` : event.text, width = ctx.measureText(words).width;
+    if (x + width > bbox.left + bbox.width) continue;
+    ctx.fillText(words, x + 2 * scale, bbox.top + bbox.height - 31 * scale);
+    ctx.globalAlpha = 0.35;
+    ctx.fillRect(x, bbox.top, scale, bbox.height);
+    ctx.globalAlpha = 1;
+    free = x + width + 8 * scale;
+  }
 }
 
 export function mark(plot, first) {
@@ -46,6 +72,7 @@ export function mark(plot, first) {
       }
     }
   }
+  for (const log of ready()) ticks(plot, log, first);
   const [log] = ready();
   if (log) {
     log.modes.forEach((mode, k) => {

@@ -4,8 +4,10 @@ import * as code from "./code.js";
 import * as drop from "./drop.js";
 import * as events from "./events.js";
 import * as findings from "./findings.js";
+import * as gestures from "./gestures.js";
 import * as identify from "./identify.js";
 import * as log_list from "./log_list.js";
+import * as map from "./map.js";
 import * as parameters from "./parameters.js";
 import * as plots from "./plots.js";
 import { post } from "./server.js";
@@ -17,11 +19,13 @@ import * as track from "./track.js";
 import * as trouble from "./trouble.js";
 import * as views from "./views.js";
 
+const LOOPS = { "Roll rate": ["p_demand", "p"], "Pitch rate": ["q_demand", "q"], "Yaw rate": ["r_demand", "r"] }; // of a log that tunes: target and actual
 const FIRST = { Rates: 3, Attitude: 3, Commands: 4, Position: 3 }; // channels that are drawn unasked, by group
 const MOST = 3; // charts of them
 let known = "";
 
-// What is drawn of a log that has just come: rates, attitude and commands where it has them, else its first channels.
+// What is drawn of a log that has just come: targets and what came of them, else rates, attitude and commands where it has
+// them, else its first channels.
 function greet() {
   document.body.toggleAttribute("data-logs", state.logs.size > 0);
   views.count();
@@ -34,7 +38,9 @@ function greet() {
   for (const chart of state.charts) chart.channels = chart.channels.filter((name) => there.has(name));
   for (let i = state.charts.length - 1; i >= 0; i--) if (!state.charts[i].channels.length) state.charts.splice(i, 1);
   if (grown || !state.charts.length) {
+    for (const [title, pair] of Object.entries(LOOPS)) if (pair.every((name) => there.has(name))) state.drawTogether(title, pair);
     for (const [title, count] of Object.entries(FIRST)) {
+      if (state.charts.some((chart) => chart.title in LOOPS) && title !== "Attitude") continue;
       const of = [...there.values()].filter((channel) => channel.group === title && !/^q[wxyz]$/.test(channel.name));
       if (state.charts.length < MOST) for (const channel of of.slice(0, count)) state.draw(channel.name, true);
     }
@@ -44,7 +50,7 @@ function greet() {
   state.say("charts");
 }
 
-for (const part of [trouble, code, views, channel_list, log_list, plots, findings, events, parameters, spectrum, track, identify, drop, start]) part.begin();
+for (const part of [trouble, code, views, channel_list, log_list, plots, gestures, findings, events, parameters, spectrum, map, track, identify, drop, start]) part.begin();
 state.on("logs", greet);
 theme.begin();
 const told = await log_list.refresh();

@@ -112,7 +112,7 @@ function draw() {
 
 function list() {
   const select = $("spectrum").querySelector("select"), now = chosen();
-  select.replaceChildren(...[...channels().values()].map((channel) => make("option", { value: channel.name, selected: channel.name === now?.name }, `${channel.name} [${channel.unit || "–"}]`)));
+  select.replaceChildren(...[...channels().values()].filter((channel) => !channel.raw).map((channel) => make("option", { value: channel.name, selected: channel.name === now?.name }, `${channel.name} [${channel.unit || "–"}]`)));
   soon();
 }
 

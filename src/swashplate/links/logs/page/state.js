@@ -18,7 +18,7 @@ export function say(what, ...details) {
 export const ready = () => [...logs.values()].filter((log) => log.state === "ready");
 export const offset = (log) => offsets.get(log.id) ?? 0;
 
-// Every channel of every log once, with its group and unit.
+// Every channel of every log once, with its group and unit; `raw` are the log's own fields, as it has them.
 export function channels() {
   const found = new Map();
   for (const log of ready())
@@ -26,7 +26,7 @@ export function channels() {
       for (const channel of group.channels) {
         const known = found.get(channel.name);
         if (known) known.logs.push(log.id);
-        else found.set(channel.name, { ...channel, group: group.title, logs: [log.id] });
+        else found.set(channel.name, { ...channel, group: group.title, raw: Boolean(group.raw), logs: [log.id] });
       }
   return found;
 }
@@ -62,6 +62,12 @@ export function draw(name, quietly = false) {
   if (home) home.channels.push(name);
   else charts.push({ key, title: channel.group, unit: channel.unit, channels: [name] });
   if (!quietly) say("charts");
+}
+
+// Channels that belong in one chart, by a title of their own.
+export function drawTogether(title, names) {
+  const unit = channels().get(names[0])?.unit ?? "";
+  charts.push({ key: title, title, unit, channels: names });
 }
 
 export function erase(name) {

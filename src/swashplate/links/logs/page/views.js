@@ -4,7 +4,7 @@ import { ready, say } from "./state.js";
 
 const VIEWS = [
   ["channels", "Channels"], ["plots", "Plots"], ["findings", "Findings"], ["events", "Events"], ["parameters", "Parameters"],
-  ["spectrum", "Spectrum"], ["track", "3-D"], ["identify", "Identify"], ["code", "Code"],
+  ["spectrum", "Spectrum"], ["map", "Map"], ["track", "3-D"], ["identify", "Identify"], ["code", "Code"],
 ];
 
 export function view(name) {
