@@ -91,6 +91,15 @@ def read(source: Source, options: Options) -> Flight:
     return flight_of(_table(variables, source, options), source, options, reader=NAME, version=VERSION)
 
 
+def table_of(source: Source, options: Options) -> MatTable:
+    """A MATLAB file's arrays as a table.
+
+    Raises:
+        FlightError: where it cannot be read, or holds no numbers.
+    """
+    return _table(mat.load(source), source, options)
+
+
 def _table(variables: Mapping[str, Any], source: Source, options: Options) -> MatTable:
     told = Remarks()
     arrays: dict[str, Array] = {}
