@@ -12,8 +12,6 @@ from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
 
 CASES: tuple[tuple[str, str, dict[str, Any]], ...] = (
-    ("coax", "rotor = inflow", {"rotor": "inflow"}),
-    ("coax", "rotor = inflow, flapping = blades", {"rotor": "inflow", "flapping": "blades"}),
     ("raptor50", "tip_loss", {"tip_loss": True}),
     ("raptor50", "induced_factor", {"induced_factor": True}),
     ("raptor50", "ground_effect", {"ground_effect": "cheeseman-bennett"}),

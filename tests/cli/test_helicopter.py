@@ -428,13 +428,6 @@ def test_a_card_beside_published_matrices() -> None:
         assert "--published" in one_message(swash("derivatives", "lynx", "--published", report, *bad))
 
 
-def test_a_number_that_nothing_uses_is_refused() -> None:
-    """The paper's rotors have no chord; those with inflow have."""
-    message = one_message(swash("trim", "coax", "--set", "rotor_chord=0.04"))
-    assert "coax.toml: rotor_chord: is on the card, but no equation with these options uses it" in message
-    assert swash("trim", "coax", "--option", "rotor=inflow", "--set", "rotor_chord=0.04").code == 0
-
-
 def test_a_descent_that_the_air_drives_is_told() -> None:
     climbing = swash("trim", "raptor50", "--climb", "-12")
     assert "the air drives the rotors with" in climbing.err

@@ -18,9 +18,7 @@ from swashplate.arrays import Array
 from swashplate.bench.record import LOADS, BenchRecord
 from swashplate.bench.refusals import COMMANDS
 from swashplate.engine.roots import require_casadi
-from swashplate.errors import BenchError
 from swashplate.models.coax import CoaxInputs, CoaxParameters, CoaxState, Drive, loads
-from swashplate.models.coax_rotors import InflowOptions
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, CasadiBackend
 from swashplate.physics.environment import Environment
@@ -218,17 +216,7 @@ def virtual_bench(
         schedules: all at one rate.
         setup: what the bench is made of.
         seed: of everything random.
-
-    Raises:
-        BenchError: for rotors with inflow: the bench's procedures look for the paper's factors.
     """
-    if isinstance(vehicle.options, InflowOptions):
-        raise BenchError(
-            "has rotors with inflow, expected the paper's.",
-            where=vehicle.card.where,
-            channel="rotor",
-            hint='Give the card with rotor = "paper": the bench finds k_thrust and k_torque.',
-        )
     setup = setup or Setup()
     rngs = [np.random.default_rng([seed, number]) for number in range(len(schedules))]
     rows = [_driving_rows(vehicle, schedule) for schedule in schedules]

@@ -163,14 +163,6 @@ def vehicle_of(
     if mass is not None:
         numbers["mass"] = mass
     how = {"source": "the command line", "status": "assumed"}
-    idle = [key for key in numbers if key in made.card.parameters and key not in made.parameter_names]
-    if idle and not made.traits.linear:
-        raise SwashError(
-            "is on the card, but no equation with these options uses it.",
-            where=made.card.where,
-            channel=", ".join(idle),
-            hint="Switch on what uses it with --option, or leave it out.",
-        )
     if whole:
         from swashplate.simulation.trim import need_whole_body
 

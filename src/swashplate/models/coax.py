@@ -2,27 +2,22 @@
 
 Fankhauser, Bouabdallah, Leutenegger and Siegwart, "Modeling and Decoupling Control of the CoaX Micro Helicopter",
 eqs 1 to 18 and Fig. 3. Every block of the figure is one function of `swashplate.physics`; this file only joins them.
-In place of the paper's thrust and torque (eqs 3, 4) a card may ask for rotors with inflow (`coax_rotors`, two states
-more).
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from swashplate.models.coax_discs import UNITS as FLAPPING_UNITS
-from swashplate.models.coax_discs import disc_pair
-from swashplate.models.coax_rotors import SLOWEST, InflowOptions, rotor_pair
-from swashplate.models.coax_rotors import UNITS as INFLOW_UNITS
 from swashplate.physics import drive_train, fuselage, rotor, stabilizer_bar, swashplate
 from swashplate.physics.backend import Backend, Scalar
-from swashplate.physics.coaxial_wake import Induced
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector, euler_rates, local_to_body
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar
 
+_SLOWEST = 0.1
+"""Share of the full speed below which a rotor takes up less than a whole tilt."""
 SENSE_LOWER, SENSE_UPPER = +1.0, -1.0
 """Sense of rotation about body z (down): the lower rotor turns clockwise seen from above."""
 
@@ -87,27 +82,15 @@ UNITS: dict[str, str] = {
 """Every parameter and its unit, in the order of the equations' tuple."""
 
 CoaxParameters = NamedTuple("CoaxParameters", [(name, Any) for name in UNITS])  # pyrefly: ignore[bad-class-definition]
-CoaxInflowParameters = NamedTuple(  # pyrefly: ignore[bad-class-definition]
-    "CoaxInflowParameters", [(name, Any) for name in (*UNITS, *INFLOW_UNITS)]
-)
-CoaxBladeParameters = NamedTuple(  # pyrefly: ignore[bad-class-definition]
-    "CoaxBladeParameters", [(name, Any) for name in (*UNITS, *INFLOW_UNITS, *FLAPPING_UNITS)]
-)
 
 
 class CoaxState(NamedTuple):
-    """Rigid body, lower tip-path plane, stabilizer bar (None where it is taken off) and the two rotor speeds.
-
-    Rotors with inflow carry their induced velocities, and with flapping blades the upper tip-path plane too; None in
-    the paper's form.
-    """
+    """Rigid body, lower tip-path plane, stabilizer bar (None where it is taken off) and the two rotor speeds."""
 
     body: RigidBody
     lower: TipPathPlane
     bar: StabilizerBar | None
     drive: Drive
-    inflow: Induced | None = None
-    upper: TipPathPlane | None = None
 
 
 class Drive(NamedTuple):
@@ -127,10 +110,9 @@ class CoaxInputs(NamedTuple):
 
 
 class CoaxialLoads(NamedTuple):
-    """What acts on the fuselage, in body axes, how the moving parts move, and thrust and torque of both rotors.
+    """What acts on the fuselage, in body axes, how the moving parts move, and the thrusts of both rotors.
 
-    Upper first: `planes`, the discs' tilts [rad], `lift` [N] along their normals and `torque` [N m] about them (with
-    flapping blades along and about the shafts). `upper` moves with flapping blades only.
+    Upper first: `planes`, the discs' tilts [rad], and `lift` [N] along their normals.
     """
 
     force: Vector
@@ -138,11 +120,8 @@ class CoaxialLoads(NamedTuple):
     lower: TipPathPlane
     bar: StabilizerBar | None
     drive: Drive
-    inflow: Induced | None
-    upper: TipPathPlane | None
     planes: tuple[TipPathPlane, TipPathPlane]
     lift: tuple[Scalar, Scalar]
-    torque: tuple[Scalar, Scalar]
 
 
 def _flap_response(par: Any) -> swashplate.FlapResponse:
@@ -151,7 +130,7 @@ def _flap_response(par: Any) -> swashplate.FlapResponse:
 
 def _turning(omega: Scalar, full: Scalar, xp: Backend) -> Scalar:
     """Share of a tilt that a rotor takes up: 1 in flight, 0 at rest, where swashplate, bar and wind tilt no disc."""
-    share = xp.minimum(1.0, xp.maximum(0.0, omega) / (SLOWEST * full))  # eq. 22 is below zero for a motor off
+    share = xp.minimum(1.0, xp.maximum(0.0, omega) / (_SLOWEST * full))  # eq. 22 is below zero for a motor off
     return share * share
 
 
@@ -163,13 +142,12 @@ def loads(
     xp: Backend,
     *,
     mixing: str = "rotation",
-    rotors: InflowOptions | None = None,
 ) -> CoaxialLoads:
     """Force [N] and moment [N m] on the fuselage without gravity, and the rates of bar, lower rotor and drive trains.
 
     Bench and flight use this same function: the bench holds the body still.
     """
-    body, lower, bar, drive, inflow, flapping = state
+    body, lower, bar, drive = state
     density = env.air_density / par.air_density
     air = body.velocity + local_to_body(env.wind, body.attitude, xp).scaled(-1.0)
 
@@ -233,65 +211,38 @@ def loads(
     held = _turning(drive.omega_lower, par.k_drive_lower, xp)
 
     # Forces and torques of the discs (eqs 1 to 7)
-    omegas, planes, upper_rates, inflow_rates = (drive.omega_upper, drive.omega_lower), (upper, lower), None, None
-    if rotors is not None and inflow is not None:
-        level = xp.cos(body.attitude.phi) * xp.cos(body.attitude.theta)
-        heights = (par.hub_height_upper * level - body.z, par.hub_height_lower * level - body.z)
-    if rotors is not None and inflow is not None and rotors.flapping != "paper":
-        asked = TipPathPlane(held * commanded.alpha, held * commanded.beta)
-        if flapping is None:  # the discs follow at once, and what is asked for has the paper's lag
-            tau = par.tau_f_lower
-            lower_rates = TipPathPlane((asked.alpha - lower.alpha) / tau, (asked.beta - lower.beta) / tau)
-            asked, tilts = lower, None
-        else:
-            tilts = (flapping, lower)
-        discs = disc_pair(
-            air, body.rates, (upper, asked), tilts, omegas, inflow, heights, par, env.air_density, rotors, xp
-        )
-        if flapping is not None:
-            upper_rates, lower_rates = discs.turning
-        planes, lifts, torques, inflow_rates = discs.planes, discs.lift, discs.torque, discs.inflow
-        thrust, on_hubs = discs.acting.force, [discs.acting.moment]
-        shaft_torques: tuple[Scalar, Scalar] = (0.0, 0.0)
-    else:
-        lower_rates = swashplate.lower_rotor_rates(
-            lower,
-            commanded,
-            air,
-            body.rates,
-            tau_f_lower=par.tau_f_lower,
-            flap=_flap_response(par),
-            turning=held,
-            xp=xp,
-        )
-        normals = (rotor.thrust_direction(upper, xp), rotor.thrust_direction(lower, xp))
-        if rotors is None or inflow is None:
-            lifts = (
-                rotor.thrust(par.k_thrust_upper, drive.omega_upper, density),
-                rotor.thrust(par.k_thrust_lower, drive.omega_lower, density),
-            )
-            torques = (
-                rotor.drag_torque(par.k_torque_upper, drive.omega_upper, density),
-                rotor.drag_torque(par.k_torque_lower, drive.omega_lower, density),
-            )
-        else:
-            pair = rotor_pair(air, normals, omegas, inflow, heights, par, env.air_density, rotors, xp)
-            lifts, torques = (pair.thrust_upper, pair.thrust_lower), (pair.torque_upper, pair.torque_lower)
-            inflow_rates = pair.inflow
-        thrust_upper, thrust_lower = normals[0].scaled(lifts[0]), normals[1].scaled(lifts[1])
-        thrust, shaft_torques = thrust_upper + thrust_lower, torques
-        on_hubs = [
-            rotor.thrust_moment(thrust_upper, par.hub_height_upper),
-            rotor.thrust_moment(thrust_lower, par.hub_height_lower),
-            rotor.flapping_moment(par.hub_stiffness_upper, upper),
-            rotor.flapping_moment(par.hub_stiffness_lower, lower),
-        ]
+    lower_rates = swashplate.lower_rotor_rates(
+        lower,
+        commanded,
+        air,
+        body.rates,
+        tau_f_lower=par.tau_f_lower,
+        flap=_flap_response(par),
+        turning=held,
+        xp=xp,
+    )
+    normals = (rotor.thrust_direction(upper, xp), rotor.thrust_direction(lower, xp))
+    lifts = (
+        rotor.thrust(par.k_thrust_upper, drive.omega_upper, density),
+        rotor.thrust(par.k_thrust_lower, drive.omega_lower, density),
+    )
+    torques = (
+        rotor.drag_torque(par.k_torque_upper, drive.omega_upper, density),
+        rotor.drag_torque(par.k_torque_lower, drive.omega_lower, density),
+    )
+    thrust_upper, thrust_lower = normals[0].scaled(lifts[0]), normals[1].scaled(lifts[1])
+    on_hubs = (
+        rotor.thrust_moment(thrust_upper, par.hub_height_upper),
+        rotor.thrust_moment(thrust_lower, par.hub_height_lower),
+        rotor.flapping_moment(par.hub_stiffness_upper, upper),
+        rotor.flapping_moment(par.hub_stiffness_lower, lower),
+    )
     drag = fuselage.drag_force(
         air, drag_x=par.drag_x, drag_y=par.drag_y, drag_z=par.drag_z, damping_w=par.damping_w, xp=xp
     ).scaled(density)
     shafts = (
-        rotor.yaw_moment(shaft_torques[0], par.inertia_drive_upper, drive_rates.omega_upper, SENSE_UPPER),
-        rotor.yaw_moment(shaft_torques[1], par.inertia_drive_lower, drive_rates.omega_lower, SENSE_LOWER),
+        rotor.yaw_moment(torques[0], par.inertia_drive_upper, drive_rates.omega_upper, SENSE_UPPER),
+        rotor.yaw_moment(torques[1], par.inertia_drive_lower, drive_rates.omega_lower, SENSE_LOWER),
     )
     others = (
         fuselage.yaw_damping_moment(body.r, par.damping_r),
@@ -302,16 +253,7 @@ def loads(
     for part in (shafts[1], *on_hubs, *others):
         moment = moment + part
     return CoaxialLoads(
-        thrust + drag,
-        moment,
-        lower_rates,
-        bar_rates,
-        drive_rates,
-        inflow_rates,
-        upper_rates,
-        planes,
-        lifts,
-        torques,
+        thrust_upper + thrust_lower + drag, moment, lower_rates, bar_rates, drive_rates, (upper, lower), lifts
     )
 
 
@@ -323,10 +265,9 @@ def derivatives(
     xp: Backend,
     *,
     mixing: str = "rotation",
-    rotors: InflowOptions | None = None,
 ) -> CoaxState:
     """Time derivative of the whole state (Fankhauser et al., eqs 1 to 17)."""
-    acting = loads(state, inputs, par, env, xp, mixing=mixing, rotors=rotors)
+    acting = loads(state, inputs, par, env, xp, mixing=mixing)
     inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz)
     force = acting.force + gravity(par.mass, env.gravity, state.body.attitude, xp)
     return CoaxState(
@@ -334,8 +275,6 @@ def derivatives(
         acting.lower,
         acting.bar,
         acting.drive,
-        acting.inflow,
-        acting.upper,
     )
 
 
@@ -347,7 +286,6 @@ def specific_force(
     xp: Backend,
     *,
     mixing: str = "rotation",
-    rotors: InflowOptions | None = None,
 ) -> Vector:
     """What an accelerometer at the CG reads [m/s^2]: every force but gravity, per mass."""
-    return loads(state, inputs, par, env, xp, mixing=mixing, rotors=rotors).force.scaled(1.0 / par.mass)
+    return loads(state, inputs, par, env, xp, mixing=mixing).force.scaled(1.0 / par.mass)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from swashplate.models.card import Card
 from swashplate.models.choices import Choice, Free, PhysicalEffect
 
 _PAPER_TIES = ("a_beta_u = a_alpha_v", "a_beta_v = a_alpha_u", "a_beta_q = a_alpha_p")
@@ -93,35 +92,7 @@ CHOICES: dict[str, Choice] = {
 }
 """The coaxial helicopter's ready choices, by name."""
 
-_INFLOW_FULL = tuple(free for free in _FULL if free.name != "damping_w")
-INFLOW_CHOICES: dict[str, Choice] = {
-    "flight": CHOICES["flight"],
-    "full": Choice(
-        "full", "as for the paper's rotors; heave damping follows from the rotors", _INFLOW_FULL, _TIES, _SET
-    ),
-}
-"""The same for rotors with inflow."""
-
-_FLAPPED = ("a_alpha_p_linear", "a_alpha_v_linear", "a_alpha_u_linear", "gyroscopic")
-_SHAFT = "half of what the lower rotor and its drive have, give or take a half"
-_ROTORS = "beyond that of the rotors, at most as large"
-_BLADE_FULL = (
-    *(free for free in _INFLOW_FULL if free.name not in (*_FLAPPED, "damping_r")),
-    Free("damping_r", 8.8e-4, 0.0, 8.8e-4, source=_ROTORS),
-    Free("blade_inertia", 1.9e-5, 3.8e-5, 1.9e-5, source=_SHAFT),
-)
-
-
-def blade_choices(card: Card) -> dict[str, Choice]:
-    """The same for rotors whose blades flap: by themselves they have no lag of the paper's."""
-    free = _BLADE_FULL
-    if card.options.get("flapping") == "blades":
-        free = tuple(each for each in free if each.name != "tau_f_lower")
-    told = "as for the paper's rotors; flap-back and the damping of heave, roll and pitch follow from the blades"
-    return {"full": Choice("full", told, free, fixed=_SET)}
-
-
-_SHARED_EFFECTS = (
+EFFECTS = (
     PhysicalEffect("gyroscopic moment of the rotors", {"gyroscopic": 0.0}),
     PhysicalEffect("damping of the discs by roll and pitch rate", {"a_alpha_p_linear": 0.0}),
     PhysicalEffect("flap-back linear in speed", {"a_alpha_v_linear": 0.0, "a_alpha_u_linear": 0.0}),
@@ -131,10 +102,6 @@ _SHARED_EFFECTS = (
         "roll and pitch unlike each other",
         {"linkage_asymmetry_lower": 0.0, "phase_asymmetry_lower": 0.0, "linkage_asymmetry_upper": 0.0},
     ),
+    PhysicalEffect("damping of heave", {"damping_w": 0.0}),
 )
-EFFECTS = (*_SHARED_EFFECTS, PhysicalEffect("damping of heave", {"damping_w": 0.0}))
-"""Parts of the paper's rotors that numbers can leave out."""
-INFLOW_EFFECTS = _SHARED_EFFECTS
-"""The same for rotors with inflow, whose heave damping follows from their equations."""
-BLADE_EFFECTS = tuple(effect for effect in _SHARED_EFFECTS if not any(name in _FLAPPED for name in effect.without))
-"""The same for rotors whose blades flap: these effects cannot be left out of them."""
+"""Parts of the physics that numbers can leave out."""

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from swashplate.arrays import Array
 from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter, no_option
 from swashplate.models.coax import (
     UNITS,
-    CoaxBladeParameters,
     CoaxialLoads,
-    CoaxInflowParameters,
     CoaxInputs,
     CoaxParameters,
     CoaxState,
@@ -24,27 +20,15 @@ from swashplate.models.coax import (
     loads,
     specific_force,
 )
-from swashplate.models.coax_choices import (
-    BLADE_EFFECTS,
-    CHOICES,
-    EFFECTS,
-    INFLOW_CHOICES,
-    INFLOW_EFFECTS,
-    blade_choices,
-)
-from swashplate.models.coax_discs import UNITS as FLAPPING_UNITS
-from swashplate.models.coax_rotors import FLAPPINGS, InflowOptions, balanced_hover, checked_blades
-from swashplate.models.coax_rotors import UNITS as INFLOW_UNITS
+from swashplate.models.coax_choices import CHOICES, EFFECTS
 from swashplate.models.nesting import rebuild
 from swashplate.models.traits import Axis, Pose, RecordingFit, Traits
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics import rotor
 from swashplate.physics.backend import Backend, FloatBackend, Scalar
-from swashplate.physics.coaxial_wake import FORMS as INTERFERENCES
 from swashplate.physics.drive_train import steady_speed
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
-from swashplate.physics.frames import Euler, local_to_body
-from swashplate.physics.ground_effect import FORMS as GROUND_EFFECTS
+from swashplate.physics.frames import Euler
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar
@@ -69,11 +53,11 @@ def picture(vehicle: Vehicle) -> dict[str, Any]:
 
 
 def acting_at(vehicle: Vehicle, x: Sequence[float], u: Sequence[float], around: Environment) -> CoaxialLoads:
-    """What acts on a CoaX, paper's rotors or others, at a state row and an input row."""
+    """What acts on a CoaX at a state row and an input row."""
     state: CoaxState = rebuild(vehicle.state, [float(value) for value in x])
     inputs = CoaxInputs(*(float(value) for value in u))
     mixing = vehicle.card.options.get("mixing", "rotation")
-    return loads(state, inputs, vehicle.values(), around, _XP, mixing=mixing, rotors=vehicle.options)
+    return loads(state, inputs, vehicle.values(), around, _XP, mixing=mixing)
 
 
 def pose(vehicle: Vehicle) -> Pose:
@@ -128,68 +112,6 @@ def settled(inputs: Any, parameters: Any, voltage: Scalar, attitude: Any, runnin
     return {**speeds, "eta_bar": attitude.phi, "zeta_bar": attitude.theta}
 
 
-def rotor_factors(vehicle: Vehicle) -> dict[str, float]:
-    """`k_thrust_*` and `k_torque_*` of a vehicle in hover: the card's, or what rotors with inflow have there.
-
-    The second are thrust and torque over Omega^2 at the rotor speeds that balance torque and weight, at the card's air
-    density; in hover they hold for any weight, away from it they do not.
-    """
-    card = vehicle.card.values()
-    if not isinstance(vehicle.options, InflowOptions):
-        return {name: card[name] for name in _BALANCING}
-    hovering = balanced_hover(vehicle.values(), vehicle.options, _XP)
-    return {
-        "k_thrust_upper": hovering.thrust_upper / hovering.omega_upper**2,
-        "k_thrust_lower": hovering.thrust_lower / hovering.omega_lower**2,
-        "k_torque_upper": hovering.torque / hovering.omega_upper**2,
-        "k_torque_lower": hovering.torque / hovering.omega_lower**2,
-    }
-
-
-_RING = (0.5, 2.0)
-"""Sink over the hover's induced velocity between which wakes come back through the discs (Leishman 2006, sec. 2.13)."""
-_CARRIES = 0.1
-"""Of the weight: rotors that lift less have no wake that could come back, and no number of it is told."""
-_STALLED = 0.13
-"""C_T / sigma beyond which blades stall."""
-
-
-def inflow_power(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> float:
-    """Power [W] that the two rotors take from their shafts."""
-    state: CoaxState = rebuild(vehicle.state, [float(value) for value in x])
-    upper, lower = acting_at(vehicle, list(x), list(u), environment).torque
-    return float(upper * state.drive.omega_upper + lower * state.drive.omega_lower)
-
-
-def inflow_doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> dict[str, str]:
-    """Where rotors with inflow stop being true: vortex ring and stall, in words by kind."""
-    state: CoaxState = rebuild(vehicle.state, [float(value) for value in x])
-    acting, par = acting_at(vehicle, list(x), list(u), environment), vehicle.values()
-    air = state.body.velocity + local_to_body(environment.wind, state.body.attitude, _XP).scaled(-1.0)
-    area = math.pi * par.rotor_radius**2
-    hover = math.sqrt(max(sum(acting.lift), 0.0) / (2.0 * environment.air_density * area))
-    across, doubts = math.hypot(air.x, air.y), {}
-    low, high = (share * hover for share in _RING)
-    carries = sum(acting.lift) > _CARRIES * par.mass * environment.gravity
-    if carries and low < air.z < high and across < hover:
-        doubts["vortex ring"] = (
-            f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({low:.1f} to {high:.1f} m/s "
-            f"below {hover:.1f} m/s of speed), where momentum theory is only a mean"
-        )
-    solidity = par.rotor_blades * par.rotor_chord / (math.pi * par.rotor_radius)
-    for side, lift in zip(("upper", "lower"), acting.lift, strict=True):
-        tip = getattr(state.drive, f"omega_{side}") * par.rotor_radius
-        loading = lift / (environment.air_density * area * max(tip, 1e-3) ** 2) / solidity
-        if tip > _SLOWEST_JUDGED * par.rotor_radius * getattr(par, f"k_drive_{side}") and loading > _STALLED:
-            doubts[f"stall {side}"] = (
-                f"C_T / sigma of the {side} rotor is {loading:.3f}, above {_STALLED}: blades would stall, lift here is "
-                "linear"
-            )
-    return doubts
-
-
-_SLOWEST_JUDGED = 0.25
-"""Share of the full speed below which a rotor carries nothing that could be doubted."""
 _BALANCING = ("k_torque_upper", "k_torque_lower", "k_thrust_upper", "k_thrust_lower")
 
 
@@ -256,26 +178,6 @@ TRAITS = Traits(
     balance=balance,
 )
 
-
-INFLOW_TRAITS = replace(
-    TRAITS,
-    choices=lambda card: INFLOW_CHOICES,
-    effects=lambda card: INFLOW_EFFECTS,
-    hover=None,
-    settled=None,
-    balance=None,
-    doubts=inflow_doubts,
-    power=inflow_power,
-)
-BLADE_TRAITS = replace(INFLOW_TRAITS, choices=blade_choices, effects=lambda card: BLADE_EFFECTS, heavy=True)
-
-
-def _traits(rotors: InflowOptions | None) -> Traits:
-    if rotors is None:
-        return TRAITS
-    return INFLOW_TRAITS if rotors.flapping == "paper" else BLADE_TRAITS
-
-
 _SYMMETRY = Parameter(
     value=0.0,
     unit="1",
@@ -301,10 +203,6 @@ def _symmetric_where_silent(card: Card) -> Card:
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "bar": (True, False),
     "mixing": ("rotation", "as_printed"),
-    "rotor": ("paper", "inflow"),
-    "interference": INTERFERENCES,
-    "ground_effect": GROUND_EFFECTS,
-    "flapping": FLAPPINGS,
 }
 
 
@@ -312,7 +210,7 @@ def _checked_options(card: Card) -> dict[str, Any]:
     """The options with their defaults.
 
     Raises:
-        CardError: naming the option that is not known, has no such value, or belongs to other rotors.
+        CardError: naming the option that is not known or has no such value.
     """
     for name, value in card.options.items():
         if name not in _CHOICES:
@@ -320,64 +218,39 @@ def _checked_options(card: Card) -> dict[str, Any]:
         if not any(value is choice or (isinstance(value, str) and value == choice) for choice in _CHOICES[name]):
             expected = ", ".join(map(repr, _CHOICES[name])).replace("True", "true").replace("False", "false")
             raise CardError(f"is {value!r}, expected one of {expected}.", where=card.where, channel=name)
-        if name in InflowOptions._fields and card.options.get("rotor", "paper") == "paper":
-            raise CardError("needs rotors with inflow.", where=card.where, channel=name, hint='Add rotor = "inflow".')
-    return {"bar": True, "mixing": "rotation", "rotor": "paper", **card.options}
+    return {"bar": True, "mixing": "rotation", **card.options}
 
 
 def coax(card: Card) -> Vehicle:
     """The CoaX with a card's numbers and options.
 
-    `bar` (True, False), `mixing` ("rotation", "as_printed"), `rotor`: "paper" for thrust and torque by Omega^2, or
-    "inflow" for rotors that know climb, speed and each other's wake (`coax_rotors`, two states more); those have
-    `interference`, `ground_effect` and `flapping` (`InflowOptions`).
+    Options are `bar` (True, False) and `mixing` ("rotation", "as_printed").
 
     Raises:
         CardError: for an unknown option, or a number that is missing, unknown, in another unit or impossible.
     """
     options = _checked_options(card)
-    rotors = None
-    if options["rotor"] == "inflow":
-        rotors = InflowOptions(**{name: options[name] for name in InflowOptions._fields if name in options})
-    card = _symmetric_where_silent(card)
-    if rotors is not None:
-        card = checked_blades(card, rotors)
-    also = {**INFLOW_UNITS, **FLAPPING_UNITS}
-    needed = {**UNITS, **{name: unit for name, unit in also.items() if name in card.parameters}}
-    card = card.checked_against(needed)
+    card = _symmetric_where_silent(card).checked_against(UNITS)
     bar = StabilizerBar(0.0, 0.0) if options["bar"] else None
     bar_names = ("eta_bar", "zeta_bar") if options["bar"] else ()
-    drive, induced = Drive(0.0, 0.0), None
-    parameters: Any = CoaxParameters
-    if rotors is not None:
-        parameters = CoaxInflowParameters if rotors.flapping == "paper" else CoaxBladeParameters
-        numbers = card.values()
-        hovering = balanced_hover(parameters(*(numbers[name] for name in parameters._fields)), rotors, _XP)
-        drive, induced = Drive(hovering.omega_lower, hovering.omega_upper), hovering.induced
-    inflow_names = () if induced is None else induced._fields
-    upper = TipPathPlane(0.0, 0.0) if rotors is not None and rotors.flapping == "blades" else None
-    upper_names = () if upper is None else ("alpha_upper", "beta_upper")
     return Vehicle(
         card=card,
-        state=CoaxState(RigidBody(*(0.0,) * 12), TipPathPlane(0.0, 0.0), bar, drive, induced, upper),
+        state=CoaxState(RigidBody(*(0.0,) * 12), TipPathPlane(0.0, 0.0), bar, Drive(0.0, 0.0)),
         inputs=CoaxInputs,
-        parameters=parameters,
+        parameters=CoaxParameters,
         state_names=(
             *RigidBody._fields,
-            *("alpha_lower", "beta_lower", *bar_names, "omega_lower", "omega_upper", *inflow_names, *upper_names),
+            *("alpha_lower", "beta_lower", *bar_names, "omega_lower", "omega_upper"),
         ),
         state_units=(
             *BODY_UNITS,
             *("rad",) * (2 + len(bar_names)),
             *("rad/s", "rad/s"),
-            *("m/s",) * len(inflow_names),
-            *("rad",) * len(upper_names),
         ),
         input_names=CoaxInputs._fields,
         input_units=("1",) * 4,
         input_limits=((0.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (-1.0, 1.0)),
-        derivatives=partial(derivatives, mixing=options["mixing"], rotors=rotors),
-        specific_force=partial(specific_force, mixing=options["mixing"], rotors=rotors),
-        traits=_traits(rotors),
-        options=rotors,
+        derivatives=partial(derivatives, mixing=options["mixing"]),
+        specific_force=partial(specific_force, mixing=options["mixing"]),
+        traits=TRAITS,
     )

@@ -69,7 +69,6 @@ class Traits:
         wind, ground: whether they are in its equations (a battery is where the card has `voltage_nominal`). What has no
             `ground` cannot stand either.
         standing: options of its card with which it stands on the ground and starts its engine; others get skids.
-        heavy: its equations have so many operations that derivatives are compiled soon instead of for speed.
         rotorcraft: it is a single-rotor helicopter's equations: derivatives by contributor, the forms of papers.
         coaxial: two rotors on drive trains, as the autopilot with the decoupling inverts them.
         observed: the observer of validation (tracked pose, gusts, delays of servos and motors) is made for it.
@@ -108,7 +107,6 @@ class Traits:
     wind: bool = True
     ground: bool = True
     standing: Mapping[str, Any] = field(default_factory=dict)
-    heavy: bool = False
     rotorcraft: bool = False
     coaxial: bool = False
     observed: bool = False

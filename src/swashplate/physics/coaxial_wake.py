@@ -10,12 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from swashplate.physics.backend import Backend, Scalar
-from swashplate.physics.inflow import mass_flow
 
 FORMS = ("vortex-tube", "contracted-wake", "coplanar", "none")
-APPARENT_MASS = 8.0 / (3.0 * 3.141592653589793)
-"""Air that moves along with a uniform inflow, by rho A R (Carpenter and Fridovich 1953, NACA TN 3044)."""
-_TINY, _TURNS = 1e-12, 40
+_TINY = 1e-12
 
 
 class WakeShares(NamedTuple):
@@ -87,44 +84,3 @@ def wake_shares(
     down = xp.minimum(1.0, xp.maximum(0.0, through / size + 0.5))
     down = down * down * (3.0 - 2.0 * down)
     return WakeShares(down * below + (1.0 - down) * ahead, down * ahead + (1.0 - down) * above)
-
-
-def induced_rate(
-    own: Scalar, whole: Scalar, axial: Scalar, across2: Scalar, loading: Scalar, *, radius: Scalar, xp: Backend
-) -> Scalar:
-    """Rate of a rotor's own induced velocity [m/s^2]: M R dv/dt = T / (rho A) - 2 v V (Carpenter and Fridovich 1953).
-
-    Args:
-        own: v [m/s].
-        whole: v and what the other rotor adds, V of the momentum with the climb and the flight across [m/s].
-        axial, across2: as in `wake_shares`.
-        loading: T / (rho A) [m^2/s^2].
-        radius: R [m].
-        xp: the operations.
-    """
-    through, _, _ = mass_flow(whole, -axial, across2, xp)
-    return (loading - 2.0 * own * through) / (APPARENT_MASS * radius)
-
-
-def hover_induced(
-    free: tuple[Scalar, Scalar], loss: tuple[Scalar, Scalar], *, on_upper: Scalar, on_lower: Scalar, xp: Backend
-) -> Induced:
-    """Both induced velocities [m/s] at rest, where T / (rho A) of each rotor is free - loss times the flow through it.
-
-    By turns, forty times each: to 1e-10 even in one plane (tested).
-
-    Args:
-        free, loss: of the upper and the lower rotor [m^2/s^2, m/s].
-        on_upper, on_lower: the shares.
-        xp: the operations.
-    """
-
-    def alone(free: Scalar, loss: Scalar, given: Scalar) -> Scalar:
-        b = 2.0 * given + loss
-        return 0.25 * (xp.sqrt(b * b + 8.0 * xp.maximum(0.0, free - loss * given)) - b)
-
-    upper, lower = alone(free[0], loss[0], 0.0), 0.0 * free[1]
-    for _ in range(_TURNS):
-        lower = alone(free[1], loss[1], on_lower * upper)
-        upper = alone(free[0], loss[0], on_upper * lower)
-    return Induced(upper, lower)

@@ -18,7 +18,7 @@ from swashplate.simulation import steady
 
 @pytest.mark.parametrize(
     ("name", "options"),
-    [("coax", {}), ("coax", {"rotor": "inflow"}), ("raptor50", {"bar": True, "inflow": "pitt-peters"}), ("x8", {})],
+    [("coax", {}), ("coaxial15", {}), ("raptor50", {"bar": True, "inflow": "pitt-peters"}), ("x8", {})],
 )
 def test_slopes_of_a_vehicle_are_those_of_differences(name: str, options: dict[str, Any]) -> None:
     made = sp.vehicle(name, **options)

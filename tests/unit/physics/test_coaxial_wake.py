@@ -146,23 +146,6 @@ def test_continuity_of_the_contracted_wake(form: str) -> None:
         assert shares(form, 0.4, axial=climb)[0] == pytest.approx(area * gain, rel=1e-9)
 
 
-def test_hover_by_turns_is_the_solution() -> None:
-    free, loss = (30.0, 40.0), (3.0, 4.0)
-    for on_upper, on_lower in ((0.0, 0.0), (0.5, 1.0), (1.0, 1.0)):
-        own = coaxial_wake.hover_induced(free, loss, on_upper=on_upper, on_lower=on_lower, xp=XP)
-        flows = own.induced_upper + on_upper * own.induced_lower, own.induced_lower + on_lower * own.induced_upper
-        for v, flow, f, g in zip(own, flows, free, loss, strict=True):
-            assert 2.0 * v * flow == pytest.approx(f - g * flow, rel=1e-9)
-
-
-def test_inflow_comes_late_as_carpenter_and_fridovich_found() -> None:
-    """A sudden thrust: v' = 3 pi T / (8 rho A R) at first, and no more where the momentum carries it."""
-    step = coaxial_wake.induced_rate(0.0, 0.0, 0.0, 0.0, 18.0, radius=0.5, xp=XP)
-    assert step == pytest.approx(3.0 * np.pi / 8.0 * 18.0 / 0.5)
-    rest = coaxial_wake.induced_rate(3.0, 3.0, 0.0, 0.0, 18.0, radius=0.5, xp=XP)
-    assert rest == pytest.approx(0.0, abs=1e-9)
-
-
 # ---- ground ----------------------------------------------------------------------------------------------------------
 def share(height: float, form: str, across: float = 0.0) -> float:
     return float(ground_effect.induced_share(height, across**2, 3.0, radius=1.0, form=form, xp=XP))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from swashplate.models.coax_vehicle import rotor_factors
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.rigid_body import RigidBody
@@ -79,11 +78,8 @@ class Motors(NamedTuple):
 
 
 def coaxial_rotors(vehicle: Vehicle, *, gravity: float, battery: bool = True) -> CoaxialRotors:
-    """The inverse's numbers from a card; without `battery` the voltage is taken for nominal.
-
-    Factors of thrust and torque are those of the hover (`rotor_factors`).
-    """
-    card = vehicle.card.values() | rotor_factors(vehicle)
+    """The inverse's numbers from a card; without `battery` the voltage is taken for nominal."""
+    card = vehicle.card.values()
     given = {name: card[name] for name in CoaxialRotors._fields if name in card}
     return CoaxialRotors(**given, weight=card["mass"] * gravity, k_voltage=card["k_drive_voltage"] if battery else 0.0)
 

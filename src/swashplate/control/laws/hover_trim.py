@@ -9,7 +9,6 @@ import numpy as np
 from swashplate.control.laws.autopilot import Autopilot
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.models.coax_vehicle import rotor_factors
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.drive_train import steady_speed
 
@@ -80,7 +79,6 @@ def hover_trim(vehicle: Vehicle, flight: Flight, *, window: float = 10.0, gravit
         )
         for rotor in ("lower", "upper")
     }
-    factors = rotor_factors(vehicle)
-    lift = sum(factors[f"k_thrust_{rotor}"] * speed**2 for rotor, speed in omega.items())
+    lift = sum(card[f"k_thrust_{rotor}"] * speed**2 for rotor, speed in omega.items())
     lag = card["k_zeta_lower"] * omega["lower"] + card["o_zeta_lower"]
     return HoverTrim(commands, scatter, voltage, omega["lower"], lag, lift / gravity)

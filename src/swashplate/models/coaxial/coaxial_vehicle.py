@@ -120,7 +120,6 @@ _EFFECTS = (
 )
 TRAITS = Traits(
     axes=_AXES,
-    heavy=True,
     servo_layout="two swashplates",
     standing={"ground": True, "grip": True, "rotor_speed": "throttle"},
     effects=lambda card: _EFFECTS,

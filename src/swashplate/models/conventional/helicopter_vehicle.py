@@ -91,7 +91,6 @@ _AXES = (
 )
 TRAITS = Traits(
     axes=_AXES,
-    heavy=True,
     rotorcraft=True,
     servo_layout="swashplate",
     standing={"ground": True, "grip": True, "rotor_speed": "throttle"},
