@@ -23,6 +23,11 @@ def _garbage_left_alone() -> None:
     gc.freeze()  # clocks and Hypothesis collect for themselves, which would look through all modules and programs
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _nobodys_settings(tmp_path_factory: pytest.TempPathFactory) -> None:
+    os.environ["XDG_CONFIG_HOME"] = str(tmp_path_factory.mktemp("settings"))  # mappings that a person has kept
+
+
 ROOT = Path(__file__).resolve().parent.parent
 
 

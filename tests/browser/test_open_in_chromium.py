@@ -177,6 +177,28 @@ def test_a_card_opens_a_flight_that_ships_and_names_its_command(browser: Any, ad
     visit.close()
 
 
+def test_a_strangers_table_is_mapped_in_a_dialog(browser: Any, address: str, tmp_path: Path) -> None:
+    wave = np.sin(0.04 * np.arange(500))
+    rows = (f"{0.01 * k:.2f};{20 * x:.3f};{-50 * x:.3f}".replace(".", ",") for k, x in enumerate(wave.tolist()))
+    (tmp_path / "flug.csv").write_text("\n".join(["Zeit;Rollrate (deg/s);Querruder %", *rows]) + "\n")
+    visit = Visit(browser, address)
+    visit.drop(tmp_path / "flug.csv")
+    visit.until("document.getElementById('columns').open")
+    row = "tr[data-column=Querruder]"
+    assert visit.page.locator(f"{row} input[list]").input_value() == "mixer_roll"
+    before = visit.page.locator(f"{row} polyline").get_attribute("points")
+    visit.page.check(f"{row} input[type=checkbox]")
+    assert visit.page.locator(f"{row} polyline").get_attribute("points") != before, "the curve turns with its sign"
+    visit.page.click("#map-apply")
+    visit.until("!document.getElementById('columns').open")
+    drawn(visit)
+    assert visit.of("swash.state.ready()[0].groups.map((g) => g.title)") == ["Rates", "Commands"]
+    visit.drop(tmp_path / "flug.csv")
+    drawn(visit, logs=2)
+    assert not visit.of("document.getElementById('columns').open"), "the next one opens by itself"
+    visit.close()
+
+
 def test_a_flipped_gyro_is_told_and_mended_by_its_button(browser: Any, address: str, tmp_path: Path) -> None:
     table(tmp_path / "flipped.csv", flip=True)
     visit = Visit(browser, address)

@@ -86,6 +86,17 @@ def _entry(unit: str) -> tuple[str, float] | None:
     return entry
 
 
+def known() -> dict[str, tuple[str, float]]:
+    """Every unit by its usual spelling, with the unit inside and what a value is multiplied by."""
+    return dict(_UNITS)
+
+
+def usual(unit: str) -> str:
+    """The usual spelling of a unit ("°/s" is deg/s); the unit itself where it is not known."""
+    spelled = unit.strip()
+    return spelled if spelled in _UNITS else _SPELLINGS.get(spelled, _SPELLINGS.get(spelled.lower(), unit))
+
+
 def is_known(unit: str) -> bool:
     """Whether `unit` can be converted."""
     return _entry(unit) is not None

@@ -14,6 +14,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from swashplate.links.logs import requests as ask
+from swashplate.links.logs.columns import apply_columns, columns_of
 from swashplate.links.logs.desk import BINS, MOST_LOGS, Desk
 from swashplate.links.logs.map import map_of
 from swashplate.links.logs.remedies import Remedy
@@ -104,6 +105,14 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             channel=_NAME,
             start=ask.number,
             stop=ask.number,
+        ),
+        _post("/columns", lambda log: columns_of(desk.log(log)), log=_LOG),
+        _post(
+            "/map-columns",
+            lambda log, rows, rate: apply_columns(desk.log(log), rows, rate),
+            log=_LOG,
+            rows=ask.rows(300, ask.whole(0, 10_000), _NAME, ask.text(60, least=0), ask.number, ask.number),
+            rate=ask.number,
         ),
         _post("/map", lambda log: map_of(desk.log(log)), log=_LOG),
         _post("/track", lambda log: track(desk.log(log)), log=_LOG),

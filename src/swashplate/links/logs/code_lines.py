@@ -63,6 +63,10 @@ class Read:
             given.append(f"log={self.log}")
         return f"{name} = sp.read({', '.join(given)})"
 
+    def with_mapping(self, mapping: str) -> Read:
+        """The same by a mapping, which says the units."""
+        return replace(self, mapping=mapping, options=Remedy({}, self.options.drop_bad_stamps))
+
     def with_remedy(self, remedy: Remedy) -> Read:
         """The same with more options."""
         units = {**self.options.units, **remedy.units}

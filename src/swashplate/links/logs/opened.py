@@ -16,15 +16,22 @@ from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import Inspection, inspect
 from swashplate.flights.readers.log_fields import LogFields, log_fields
+from swashplate.flights.readers.options import load_mapping
 from swashplate.flights.readers.read import read as read_log
+from swashplate.flights.readers.source import open_source
+from swashplate.flights.readers.table_guess import guessed
+from swashplate.flights.schema import is_known
 from swashplate.links.logs.bins import gaps
 from swashplate.links.logs.channel_groups import field_groups, groups, shown_unit
 from swashplate.links.logs.code_lines import Read, inspected
+from swashplate.links.logs.kept_mappings import kept
 from swashplate.links.logs.remedies import remedy
 
 READING, READY, FAILED = "reading", "ready", "failed"
 CHECKING = "check of a log"
 """Name of the thread that inspects."""
+_TABLES = ("csv", "mat")
+"""Readers that a mapping has a meaning for."""
 _LOG = logging.getLogger("swashplate.open")
 _PATIENCE = 1.0
 """Seconds: a log that is checked as quickly appears with its findings, a longer one is drawn before."""
@@ -52,6 +59,7 @@ class Opened:
         flight: where it is ready.
         inspection: where it is checked too, which on a long log takes longer than reading.
         fields: what the log holds beside its channels, where it holds more; listed: whether that has been looked for.
+        foreign: whether it is a table of whose columns none is a channel: a person has to say what they are.
         problem, hint: where it failed.
         version: counts readings, so that a page sees that it was read anew.
     """
@@ -64,6 +72,7 @@ class Opened:
     inspection: Inspection | None = None
     fields: LogFields | None = None
     listed: bool = False
+    foreign: bool = False
     problem: str = ""
     hint: str = ""
     version: int = 0
@@ -72,24 +81,21 @@ class Opened:
     _gaps: dict[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
 
     def load(self, read: Read) -> None:
-        """Read the log, then check it in a thread; what cannot be read is said in `problem`, never raised."""
-        self.read, self.state = read, READING
-        flight = None
-        problem = hint = ""
-        try:
-            flight = read_log(
-                self.path,
-                units=dict(read.options.units),
-                mapping=read.mapping or None,
-                bad_stamps="drop" if read.options.drop_bad_stamps else "error",
-                log=read.log,
-            )
-            if not flight.channels:
-                raise FlightError("holds no channel that is known.", where=read.file)
-        except SwashError as error:
-            problem, hint = _told(error)
-        except (OSError, MemoryError) as error:
-            problem = f"cannot be read: {error or 'it does not fit into memory'}."
+        """Read the log, then check it in a thread; what cannot be read is said in `problem`, never raised.
+
+        A table whose columns a person has mapped before is read by that mapping.
+        """
+        self.state = READING
+        flight, problem, hint = None, "", ""
+        mapped = None if read.mapping else kept(self.path)
+        if mapped is not None:
+            flight, problem, hint = self._read(read.with_mapping(str(mapped)))
+        if flight is not None and mapped is not None:
+            read = read.with_mapping(str(mapped))
+        else:
+            flight, problem, hint = self._read(read)
+        self.read = read
+        self.foreign = self._is_foreign(flight, problem)
         self.flight, self.inspection, self.problem, self.hint = flight, None, problem, hint
         self._channels, self._gaps, self.fields, self.listed = {}, {}, None, False
         self._groups = [] if flight is None else groups(flight)
@@ -99,6 +105,40 @@ class Opened:
             checking = threading.Thread(target=self._check, args=(flight,), name=CHECKING, daemon=True)
             checking.start()
             checking.join(_PATIENCE)
+
+    def _read(self, read: Read) -> tuple[Flight | None, str, str]:
+        """The flight, or what went wrong and what helps."""
+        try:
+            flight = read_log(
+                self.path,
+                units=dict(read.options.units),
+                mapping=read.mapping or None,
+                bad_stamps="drop" if read.options.drop_bad_stamps else "error",
+                log=read.log,
+            )
+        except SwashError as error:
+            return None, *_told(error)
+        except (OSError, MemoryError) as error:
+            return None, f"cannot be read: {error or 'it does not fit into memory'}.", ""
+        if not flight.channels:
+            return None, "holds no channel that is known.", ""
+        return flight, "", ""
+
+    def _is_foreign(self, flight: Flight | None, problem: str) -> bool:
+        """Whether it is a table whose columns a person has to name: none is a channel, or it cannot be read."""
+        if flight is not None and (flight.provenance.reader not in _TABLES or any(map(is_known, flight.channels))):
+            return False
+        if flight is None and "no such file" in problem:
+            return False
+        try:
+            told = guessed(open_source(self.path))
+        except SwashError:
+            return False
+        return told is not None and sum(guess.why != "no numbers" for guess in told[1]) > 1
+
+    def read_mapping(self) -> dict[str, Any]:
+        """The mapping that it is read by, {} for none."""
+        return dict(load_mapping(self.read.mapping)) if self.read.mapping else {}
 
     def _check(self, flight: Flight) -> None:
         """List what else the log holds and inspect what was read, unless it has been read anew meanwhile."""
@@ -154,7 +194,9 @@ class Opened:
 
     def as_dict(self) -> dict[str, Any]:
         """What the page lists of it."""
+        table = self.foreign or (self.flight is not None and self.flight.provenance.reader in _TABLES)
         head = {"id": self.number, "name": Path(self.read.file).name, "state": self.state, "version": self.version}
+        head |= {"foreign": self.foreign, "table": table}
         code = inspected(self.read).as_dict()
         if self.state == FAILED:
             mend = remedy(self.hint)

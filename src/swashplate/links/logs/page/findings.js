@@ -2,7 +2,7 @@
 import { note } from "./code.js";
 import { $, make } from "./make.js";
 import { post } from "./server.js";
-import { logs, on } from "./state.js";
+import { logs, on, say } from "./state.js";
 import { attempt } from "./trouble.js";
 import { refresh } from "./log_list.js";
 
@@ -22,7 +22,8 @@ function about(log) {
   const title = make("h2", {}, log.name);
   if (log.state === "reading") return [title, make("p", { class: "soft" }, "It is being read …")];
   if (log.state === "failed")
-    return [title, make("ul", { class: "cards" }, make("li", { role: "alert" }, make("b", {}, "It cannot be read: "), log.problem, make("div", { class: "soft" }, log.hint), button(log, log.remedy)))];
+    return [title, make("ul", { class: "cards" }, make("li", { role: "alert" }, make("b", {}, "It cannot be read: "), log.problem, make("div", { class: "soft" }, log.hint), button(log, log.remedy),
+      log.foreign && make("div", {}, make("button", { class: "first", onclick: () => say("columns", log) }, "Say what its columns are"))))];
   if (!log.checked) return [title, make("p", { class: "soft" }, "It is being checked: gaps, jumps, signs, units and sweeps. Look at the plots meanwhile …")];
   const problems = log.problems.length
     ? log.problems.map((problem) => make("li", {}, problem.text, button(log, problem.remedy)))

@@ -41,7 +41,8 @@ function facts(log) {
 function entry(log) {
   const off = make("button", { "aria-label": `close ${log.name}`, title: "close this log", onclick: () => close(log) }, "✕");
   const line = document.createTextNode(""), told = make("small"), name = make("div", { class: "name" }, line, make("span", {}, ...log.name.split(/(?<=[_.@-])/).flatMap((part) => [part, make("wbr")])), off);
-  return { item: make("li", { "data-log": log.id }, name, told), clock: clock(log), line, told };
+  const columns = make("button", { class: "columns", "aria-label": `columns of ${log.name}`, onclick: () => say("columns", logs.get(log.id)) }, "Columns …");
+  return { item: make("li", { "data-log": log.id }, name, told), clock: clock(log), columns, line, told };
 }
 
 // What is on the page stays there and is changed: the list is shown anew while logs are read, and someone may be typing in it.
@@ -55,6 +56,7 @@ function show() {
     for (const part in now) kept[part].replaceWith(now[part]), (kept[part] = now[part]);
     if (box !== document.activeElement) box.value = +offset(log).toFixed(4);
     if (k > 0 !== clock.isConnected) k > 0 ? item.append(clock) : clock.remove();
+    if (Boolean(log.table) !== kept.columns.isConnected) log.table ? item.append(kept.columns) : kept.columns.remove();
     if (!item.isConnected) $("logs").append(item);
   }
 }

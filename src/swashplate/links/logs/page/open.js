@@ -1,6 +1,7 @@
 // The page for any log: its parts, and what is drawn when a log comes.
 import * as channel_list from "./channel_list.js";
 import * as code from "./code.js";
+import * as columns from "./columns.js";
 import * as drop from "./drop.js";
 import * as events from "./events.js";
 import * as findings from "./findings.js";
@@ -50,7 +51,7 @@ function greet() {
   state.say("charts");
 }
 
-for (const part of [trouble, code, views, channel_list, log_list, plots, gestures, findings, events, parameters, spectrum, map, track, identify, drop, start]) part.begin();
+for (const part of [trouble, code, views, channel_list, columns, log_list, plots, gestures, findings, events, parameters, spectrum, map, track, identify, drop, start]) part.begin();
 state.on("logs", greet);
 theme.begin();
 const told = await log_list.refresh();
