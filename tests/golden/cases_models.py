@@ -219,16 +219,14 @@ def inspected_autopilot_logs(folder: Path) -> Values:
     return found
 
 
-@case(data=["coax56", "coax_rig"])
+@case(data=["coax56"])
 def bench_records(folder: Path) -> Values:
-    """The real bench: speed maps, voltage sweeps, the bar, the propeller rig."""
+    """The real bench: speed maps and voltage sweeps."""
     from .cases_flights import data
 
     found: Values = {}
     for label, files in {
         "coax56": [f"coax56/bench_{n}.mat" for n in ("input_to_rpm", "voltage_to_rpm", "rpm_voltage_compensated")],
-        "bar": ["coax56/stabilizer_bar_orientation.mat"],
-        "rig": ["coax_rig"],
     }.items():
         told = swash_json("bench", *(data() / file for file in files))
         one = {k: v for k, v in extract.of_json(told, most=8).items() if isinstance(v, float | list)}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import fsolve, minimize_scalar
 
-from swashplate.bench.record_tables import read_rig
 from swashplate.physics import coaxial_wake
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.coaxial_wake import Induced
@@ -18,11 +18,23 @@ EFFICIENCY, UNEVEN = 0.8, 1.15
 """Of motor and controller together (assumed: it was not measured), and the induced factor."""
 
 
+def run(path: Path) -> np.ndarray:
+    """Pulse width [us], thrust [N] and electrical power [W] of the motors that turn, a row each."""
+    heads, *body = [row for row in csv.reader(path.read_text().splitlines()) if len(row) > 1]
+    columns = {head.strip(): np.array([float(row[i]) for row in body]) for i, head in enumerate(heads) if head.strip()}
+    motors = [
+        (columns[name], columns[name.replace("Voltage (V)", "Current (A)")])
+        for name in columns
+        if "Voltage (V)" in name
+    ]
+    power = sum(volts * amperes for volts, amperes in motors if amperes.max() > 1.0)
+    thrust = next(values for name, values in columns.items() if name.startswith("Thrust"))
+    return np.array([columns["Motor PWM"], 9.80665 * thrust, power])
+
+
 def levels(folder: Path, pattern: str) -> tuple[np.ndarray, np.ndarray]:
     """Mean thrust [N] and electrical power [W] by pulse width, over the runs."""
-    runs = [read_rig(path) for path in sorted(folder.glob(pattern))]
-    pwm = np.round(np.concatenate([run.channels["pwm"] for run in runs]) * 1e6)
-    thrust, power = (np.concatenate([run.channels[name] for run in runs]) for name in ("thrust", "power"))
+    pwm, thrust, power = np.concatenate([run(path) for path in sorted(folder.glob(pattern))], axis=1)
     found = [(thrust[pwm == each].mean(), power[pwm == each].mean()) for each in np.unique(pwm)]
     kept = np.array([row for row in found if row[0] > 0.2 * found[-1][0]])
     return kept[:, 0], kept[:, 1]

@@ -19,7 +19,7 @@ def evaluate_bench(*records: str | Path | BenchRecord, vehicle: Vehicle) -> Benc
     """What bench records say of a vehicle's card.
 
     Args:
-        records: files, folders with one file a record, data sets' names (coax_rig), or records themselves.
+        records: files, folders with one file a record, data sets' names (coax56), or records themselves.
         vehicle: whose published card holds what the bench does not measure.
 
     Returns:

@@ -12,7 +12,6 @@ from swashplate.arrays import Array
 from swashplate.bench import (
     bar_linkage,
     bar_motion,
-    bar_orientation,
     drive_frequency,
     drive_steps,
     fuselage_drag,
@@ -24,7 +23,6 @@ from swashplate.bench import (
     supply_compensated,
     swashplate,
     thrust,
-    thrust_loss,
 )
 from swashplate.bench.joint import Joint
 from swashplate.bench.record import BenchRecord
@@ -57,9 +55,7 @@ _MODULES: tuple[ModuleType, ...] = (
     servo_steps,
     bar_linkage,
     bar_motion,
-    bar_orientation,
     fuselage_drag,
-    thrust_loss,
 )
 PROCEDURES: Mapping[str, ModuleType] = {module.NAME: module for module in _MODULES}
 """Every procedure, in an order in which each finds what it takes as known already measured."""

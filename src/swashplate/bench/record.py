@@ -54,12 +54,6 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "theta": ("rad", "pitch angle of the fuselage (motion capture)"),
     "eta_bar": ("rad", "roll angle of the bar against the local level (motion capture)"),
     "zeta_bar": ("rad", "pitch angle of the bar against the local level (motion capture)"),
-    "normal_x": ("1", "unit normal of the bar's plane, first component (motion capture)"),
-    "normal_y": ("1", "unit normal of the bar's plane, second component"),
-    "normal_z": ("1", "unit normal of the bar's plane, third component"),
-    "pwm": ("s", "pulse width of the motors' command (propeller rig)"),
-    "thrust": ("N", "thrust of everything that turns (propeller rig)"),
-    "power": ("W", "electrical power of everything that turns (propeller rig)"),
 }
 """Every column that a record may have, with the unit inside; others are ignored."""
 

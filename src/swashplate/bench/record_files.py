@@ -1,7 +1,6 @@
 """Which files are bench records, whatever their form, and reading them: one file, a folder, or a data set by name.
 
-A file's content decides, not its name: this project's CSV records, the CoaX-56's MATLAB tables, the propeller rig's
-text files.
+A file's content decides, not its name: this project's CSV records, and the CoaX-56's MATLAB tables.
 """
 
 from __future__ import annotations
@@ -10,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from swashplate.bench import record_tables as bench_tables
 from swashplate.bench.record import BenchRecord, head_of, read_record
+from swashplate.bench.record_tables import is_table, read_table
 from swashplate.errors import BenchError
 from swashplate.flights.datasets import REGISTRY, find, locate
 from swashplate.flights.readers import mat
@@ -25,15 +24,11 @@ def is_bench(path: str | Path) -> bool:
 
 
 def _form(source: Source) -> str:
-    """ "record", "rig", "table" or "normals"; "" for anything else."""
+    """ "record" or "table"; "" for anything else."""
     if mat.is_level_5(source.content):
-        return bench_tables.form_of(mat.load(source))
+        return "table" if is_table(mat.load(source)) else ""
     text = source.text
-    if text is None:
-        return ""
-    if "procedure" in head_of(text[:4096])[0]:
-        return "record"
-    return "rig" if bench_tables.is_rig(text) else ""
+    return "record" if text is not None and "procedure" in head_of(text[:4096])[0] else ""
 
 
 def read_bench(path: str | Path) -> BenchRecord:
@@ -44,32 +39,23 @@ def read_bench(path: str | Path) -> BenchRecord:
         UnitError, FlightError: as the forms' readers.
     """
     source = open_source(path)
-    form = _form(source)
-    if form in _READ_BY:
-        return replace(_READ_BY[form](path), sha256=source.sha256)
+    if _form(source) == "table":
+        return replace(read_table(path), sha256=source.sha256)
     if source.text is None:
         raise BenchError(
             "is no bench record.",
             where=source.path.name,
-            hint="Known are swashplate's CSV records, the CoaX-56's bench tables (.mat) and runs of the propeller rig. "
+            hint="Known are swashplate's CSV records and the CoaX-56's bench tables (.mat). "
             "Flights are for `swash inspect` and `swash identify`.",
         )
     return replace(read_record(path), sha256=source.sha256)  # which says what a record needs
-
-
-_READ_BY = {
-    "rig": bench_tables.read_rig,
-    "table": bench_tables.read_table,
-    "normals": bench_tables.read_normals,
-}
-"""Forms that are no swashplate record."""
 
 
 def read_records(*places: str | Path) -> tuple[BenchRecord, ...]:
     """Records of files, of all CSV and MATLAB files in folders, and of data sets by name, each file once.
 
     Args:
-        places: files, folders, "coax56/bench_input_to_rpm" or the name of a data set ("coax_rig": its bench files).
+        places: files, folders, "coax56/bench_input_to_rpm" or the name of a data set ("coax56": its bench files).
 
     Raises:
         BenchError: where a folder is missing or holds none, or as `read_bench`.

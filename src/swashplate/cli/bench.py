@@ -33,7 +33,7 @@ def evaluate(
         list[str],
         typer.Argument(
             metavar="RECORDS",
-            help="Folder with one file a record, files, or a data set's name (coax_rig, coax56/bench_input_to_rpm).",
+            help="Folder with one file a record, files, or a data set's name (coax56, coax56/bench_input_to_rpm).",
         ),
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="The card (.toml).")] = None,
@@ -45,7 +45,7 @@ def evaluate(
     """Evaluate records; a contradiction in one of them ends without a card.
 
     The card has value, standard deviation, source files and procedure of what was measured, and the published value
-    of what was not. Records are this project's CSV files, the CoaX-56's bench tables (.mat) or propeller-rig runs.
+    of what was not. Records are this project's CSV files or the CoaX-56's bench tables (.mat).
     """
     from swashplate.atomic import write_text
     from swashplate.bench.record_files import read_records

@@ -11,7 +11,6 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import quote
 
 from swashplate.errors import DatasetError
 from swashplate.flights import example_logs
@@ -48,13 +47,6 @@ class DatasetFile:
 
 _COAX = "https://raw.githubusercontent.com/mfaessle/coax-control"
 _BENCH = f"{_COAX}/52371bb363c24fa336a88ab64fdea0f7c2189a03"
-_RIG = "https://raw.githubusercontent.com/Aeronavics/coax-testrig/495689fb67fa7de4c6677c9b0a65a3a3700121a7"
-
-
-def _run(sha256: str, folder: str, name: str, description: str) -> DataFile:
-    """A run of the propeller rig."""
-    return DataFile(sha256, f"{_RIG}/{quote(f'Data_scripts/{folder}/{name}')}", description, "bench")
-
 
 _NANOBENCH = "https://raw.githubusercontent.com/syediu/nanobench-iros2026/d45bc5a6090a8a4e522009c06edb1b7ad897891b"
 
@@ -64,8 +56,6 @@ def _nanobench(sha256: str, name: str) -> tuple[str, DataFile]:
     told = name.split("_", 1)[1].replace("_rep", ", flight ").replace("_", " ")
     return f"{name}.csv", DataFile(sha256, f"{_NANOBENCH}/datasets/dataset/{name}.csv", f"{told}; at 100 Hz")
 
-
-_PAIR, _RAISED = "two XOAR 18 x 6.5 in, one above the other", "two XOAR 18 x 6.5 in, the lower marked +2"
 
 REGISTRY: Mapping[str, Dataset] = {
     "coax56": Dataset(
@@ -98,83 +88,6 @@ REGISTRY: Mapping[str, Dataset] = {
                 f"{_BENCH}/data/rpmVoltComp.mat",
                 "rotor speed with voltage compensation",
                 "bench",
-            ),
-            "stabilizer_bar_orientation.mat": DataFile(
-                "89314d6741294f3dc6a3a81abc7ebe55774e43fab4516210a3f1fd940bd95dbc",
-                f"{_BENCH}/stabbar_dynamics/SB_ori.mat",
-                "1,000 unit normals of the stabilizer bar, without time stamps",
-                "bench",
-            ),
-        },
-    ),
-    "coax_rig": Dataset(
-        "Single propellers and coaxial pairs on a thrust rig (2022; Aeronavics/coax-testrig)",
-        {
-            "Coax_pre_XOAR-18-160-6.5-18-160-6.5+2-#0.csv": _run(
-                "6b574dfc2426845a2e4020b836e89920e79de9d69c5cd23d9281fe08c84befa0",
-                "Coax_pre",
-                "XOAR-18-160-6.5-18-160-6.5+2-#0.csv",
-                _RAISED,
-            ),
-            "Coax_pre_XOAR-18-160-6.5-18-160-6.5+2-#1.csv": _run(
-                "3804bba973652aa4e786acbbae2347db25e0f6c4ac67c3168a9b9347d9140a90",
-                "Coax_pre",
-                "XOAR-18-160-6.5-18-160-6.5+2-#1.csv",
-                _RAISED,
-            ),
-            "Coax_pre_XOAR-18-160-6.5-18-160-6.5+2-#2.csv": _run(
-                "664572bf97558839f9fce8968a243aaf2d5af22a26d2bcdd33c4badc5b08b106",
-                "Coax_pre",
-                "XOAR-18-160-6.5-18-160-6.5+2-#2.csv",
-                _RAISED,
-            ),
-            "Coax_pre_XOAR-18-160-6.5-18-160-6.5-#0.csv": _run(
-                "0487cc4b408d57e670c290292f159f3699c6f6c3597704e47e980c9e160a02ea",
-                "Coax_pre",
-                "XOAR-18-160-6.5-18-160-6.5-#0.csv",
-                _PAIR,
-            ),
-            "Coax_pre_XOAR-18-160-6.5-18-160-6.5-#1.csv": _run(
-                "8a531ebeb513e153b07d3883e6cb9dcf7820841c1623f5489c334204329508fe",
-                "Coax_pre",
-                "XOAR-18-160-6.5-18-160-6.5-#1.csv",
-                _PAIR,
-            ),
-            "Coax_pre_XOAR-18-160-6.5-18-160-6.5-#2.csv": _run(
-                "0304e38798d0dda1f8ef84824ae646ed6119cbfb317ceeb3dd980432a91b1abd",
-                "Coax_pre",
-                "XOAR-18-160-6.5-18-160-6.5-#2.csv",
-                _PAIR,
-            ),
-            "Data_Single_prop_160_Falcon-18.3-160-6.2-0-0-0-#1.csv": _run(
-                "5bfd640492a76649e3386baf60e6981af3ba67c1f4ff9291a0f816fbb244b171",
-                "Data/Single prop/160",
-                "Falcon-18.3-160-6.2-0-0-0-#1.csv",
-                "one Falcon 18.3 x 6.2 alone",
-            ),
-            "Data_Single_prop_160_Falcon-18.3-160-6.2-0-0-0-#2.csv": _run(
-                "d408deccd6caf00a146e59e7929705de2ee64dd9f3c516f3447b55a727a3f134",
-                "Data/Single prop/160",
-                "Falcon-18.3-160-6.2-0-0-0-#2.csv",
-                "one Falcon 18.3 x 6.2 alone",
-            ),
-            "Data_Single_prop_160_Xoar-18-160-6.5-0-0-0-#0.csv": _run(
-                "f6dad77dd0900146c2f89cc3804f6a12815409711f2717bb2ae62c9071f6f127",
-                "Data/Single prop/160",
-                "Xoar-18-160-6.5-0-0-0-#0.csv",
-                "one XOAR 18 x 6.5 alone",
-            ),
-            "Data_Single_prop_160_Xoar-18-160-6.5-0-0-0-#1.csv": _run(
-                "29458bf843a2f08eacb6e26f3d487d9fd2cf868e59eb75db6cac7cca1d27abf6",
-                "Data/Single prop/160",
-                "Xoar-18-160-6.5-0-0-0-#1.csv",
-                "one XOAR 18 x 6.5 alone",
-            ),
-            "Data_Single_prop_160_Xoar-18-160-6.5-0-0-0-#2.csv": _run(
-                "ca960fdc97b024478a51b2631bdfffa84132d5295089d87795be63648bcdaab1",
-                "Data/Single prop/160",
-                "Xoar-18-160-6.5-0-0-0-#2.csv",
-                "one XOAR 18 x 6.5 alone",
             ),
         },
     ),

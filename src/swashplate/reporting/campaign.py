@@ -11,14 +11,13 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text
-from swashplate.reporting.theme import FLIGHT, INPUT_COLORS, MODEL, VERMILION, axis, base_layout, grid, line
+from swashplate.reporting.theme import FLIGHT, MODEL, VERMILION, grid, line
 from swashplate.reporting.versions import date, versions
 from swashplate.reporting.words import counted
 
 _BINS = 40
 _POINTS = 24
 _DIGITS = tuple("+-.0123456789")
-_COLOURS = (MODEL, VERMILION, *INPUT_COLORS)
 
 
 class WorstRow(NamedTuple):
@@ -69,7 +68,6 @@ def compose_campaign(
     worst_by: str,
     folder: str,
     tables: Sequence[tuple[str, tuple[str, ...], tuple[tuple[str, ...], ...]]],
-    curves: Sequence[tuple[str, str, str, tuple[tuple[float, float, float, float], ...]]],
     failed: Sequence[FailedTask],
     refused: Sequence[str] = (),
 ) -> Report:
@@ -80,7 +78,6 @@ def compose_campaign(
         summary, careful: of its kind. shares: of the quantiles (0 to 1). shapes: of what is shown.
         worst: rows, the worst first. worst_by: by what, with its unit. folder: of the campaign.
         tables: of its kind: caption, headings, cells.
-        curves: lines over a choice: what, along what, the line's name, and x, y and y's interval of its points.
         failed: tasks that were given up. refused: results that are not what was computed, each in words.
     """
     count = max((len(shape.values) for shape in shapes), default=0)
@@ -90,8 +87,6 @@ def compose_campaign(
         Section(f"table-{k}", caption, (_plain(caption, head, cells),))
         for k, (caption, head, cells) in enumerate(tables)
     ]
-    if curves:
-        sections.append(Section("choices", f"Over {curves[0][1]}", _over(curves)))
     if shapes:
         blocks: tuple[Block, ...] = (_quantiles(shapes, shares, rows), _spread(shapes, rows))
         sections.append(Section("spread", "How they are spread", blocks))
@@ -108,29 +103,6 @@ def compose_campaign(
         sections=tuple(sections),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
-
-
-def _over(curves: Sequence[tuple[str, str, str, tuple[tuple[float, float, float, float], ...]]]) -> tuple[Block, ...]:
-    """Figures over a choice, some lines in each so that their colours can be told apart."""
-    figures = []
-    for k in range(0, len(curves), len(_COLOURS)):
-        few = curves[k : k + len(_COLOURS)]
-        what, along = few[0][0], few[0][1]
-        layout = {**base_layout(300), "xaxis": axis(along), "yaxis": axis(what)}
-        traces = []
-        for (_, _, name, points), colour in zip(few, _COLOURS, strict=False):
-            x, y, low, high = np.array(points).T
-            around = {"type": "data", "array": (high - y).tolist(), "arrayminus": (y - low).tolist(), "thickness": 1}
-            traces.append(line(x, y, name=name, color=colour, hover=f"{name}<br>%{{x:.4g}}, %{{y:.4g}}",
-                               mode="lines+markers", error_y={**around, "color": colour}))  # fmt: skip
-        figures.append(
-            Figure(
-                f"campaign-choices-{k}", {"data": traces, "layout": layout}, 300,
-                f"{what} over {along}, each with its 95 % interval.", f"{what} over {along} for {len(few)} choices.",
-                keys=tuple(Key(name, colour) for (_, _, name, _), colour in zip(few, _COLOURS, strict=False) if name),
-            )
-        )  # fmt: skip
-    return tuple(figures)
 
 
 def _label(shape: Shape) -> str:

@@ -126,7 +126,6 @@ def test_a_path_that_exists_wins(cache: Path) -> None:
 
 PUBLIC = {
     "coax56": "mfaessle/coax-control",
-    "coax_rig": "Aeronavics/coax-testrig",
     "nanobench": "syediu/nanobench-iros2026",
 }
 

@@ -52,20 +52,6 @@ NO_RESULT = ("kind", "of", "title", "count", "batch", "over")
 """Entries that no task's result depends on: its portion says the rest."""
 
 
-class ChoiceCurve(NamedTuple):
-    """A line of a figure over choices.
-
-    Attributes:
-        what, along: of the axes. name: of the line.
-        points: x, y, and the ends of y's 95 % interval, each.
-    """
-
-    what: str
-    along: str
-    name: str
-    points: tuple[tuple[float, float, float, float], ...]
-
-
 @dataclass(frozen=True)
 class CampaignFindings:
     """What a campaign has found, as a kind tells it.
@@ -76,8 +62,6 @@ class CampaignFindings:
         worst: column by whose size rows are bad, the largest worst; "" where none is.
         tables: further ones: caption, headings, cells.
         careful: what a reader must see first.
-        counted: column of 0 and 1 whose share of ones is told of each choice of a sweep; "" where none is.
-        curves: lines of one figure.
         again: ending of the file that `replay` writes of a row.
     """
 
@@ -86,8 +70,6 @@ class CampaignFindings:
     worst: str = ""
     tables: tuple[tuple[str, tuple[str, ...], tuple[tuple[str, ...], ...]], ...] = field(default=())
     careful: tuple[str, ...] = ()
-    counted: str = ""
-    curves: tuple[ChoiceCurve, ...] = ()
     again: str = ".json"
 
 
@@ -144,9 +126,6 @@ CAMPAIGNS: Registry[CampaignKind] = Registry(
         "recovery": "swashplate.api.campaigns.kinds.recovery:RECOVERY",
         "multi-start": "swashplate.api.campaigns.kinds.multi_start:MULTI_START",
         "fleet": "swashplate.api.campaigns.kinds.fleet:FLEET",
-        "cross-validation": "swashplate.api.campaigns.kinds.cross_validation:CROSS_VALIDATION",
-        "bootstrap": "swashplate.api.campaigns.kinds.bootstrap:BOOTSTRAP",
-        "sweep": "swashplate.api.campaigns.kinds.sweep:SWEEP",
     },
 )
 """By the name that a campaign's file says as `of`."""

@@ -171,7 +171,6 @@ class Campaign(Shown):
             worst_by=f"{findings.worst} [{unit}]" if unit else findings.worst,
             folder=str(self.folder),
             tables=findings.tables,
-            curves=findings.curves,
             refused=tuple(self.refused.values()),
             failed=[FailedTask(told["first"], told["count"], told["seed"], told["of"], tuple(told["tries"]))
                     for told in self.failed.values()],

@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 
 import swashplate as sp
 from swashplate.api.campaigns import worker
+from swashplate.api.campaigns.fitting import unusable
 from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings, settings_of
 from swashplate.api.campaigns.kinds import monte_carlo as of_flights
 from swashplate.api.campaigns.kinds.fleet import FLEET
@@ -227,7 +228,7 @@ def test_the_files_of_the_page_are_ones_that_their_kinds_take(tmp_path: Path) ->
     page = (Path(__file__).parents[4] / "docs" / "howto" / "campaigns.md").read_text(encoding="utf-8")
     written = re.findall(r"<!-- file: (\S+) -->\n```toml\n(.*?)```", page, re.DOTALL)
     (tmp_path / "logs").mkdir()
-    for name in ("hold.toml", "fit.json", "flight.nc", "logs/a.bin", "july.nc", "august.nc", "september.nc"):
+    for name in ("hold.toml", "fit.json", "flight.nc", "logs/a.bin"):
         (tmp_path / name).write_bytes(b"")
     rows = {}
     for name, text in written:
@@ -235,8 +236,7 @@ def test_the_files_of_the_page_are_ones_that_their_kinds_take(tmp_path: Path) ->
         made = sp.plan_campaign(tmp_path / name)
         rows[made.of] = made.rows
     assert rows == {
-        "monte-carlo": 100_000, "recovery": 200, "multi-start": 1000, "fleet": 1, "cross-validation": 3,
-        "bootstrap": 200, "sweep": 3 * 6 * 200,
+        "monte-carlo": 100_000, "recovery": 200, "multi-start": 1000, "fleet": 1,
     }  # fmt: skip
     assert set(rows) == set(CAMPAIGNS), "every kind is shown"
 
@@ -247,3 +247,22 @@ def test_a_number_that_is_zero_starts_about_it_by_its_own_spread() -> None:
     known = from_card(replace(coax.card, parameters={**coax.card.parameters, "gyroscopic": named}))
     starts = [start_values(known, ("gyroscopic",), factor=3.0, seed=seed)[0] for seed in range(20)]
     assert 0.01 < max(np.abs(starts)) <= 0.03
+
+
+@pytest.mark.parametrize(
+    ("of", "settings"), [("recovery", {"maneuver": "hover:4s"}), ("multi-start", {"flights": ["a"]})]
+)
+def test_a_method_that_nobody_has_is_refused_before_anything_is_computed(of: str, settings: dict[str, Any]) -> None:
+    with pytest.raises(sp.SwashError, match="method is 'predicton-error', expected one of "):
+        CAMPAIGNS[of].parts(settings_of(of, {"vehicle": "coax", "method": "predicton-error", **settings}), Path())
+
+
+def test_the_reason_of_most_unusable_fits_is_told() -> None:
+    table: Columns = {"problem": np.array(["", "flat", "it diverged", "flat", ""])}
+    usable = np.array([True, False, False, False, False])
+    assert unusable(table, usable) == [
+        "4 fits may not be used and are in no figure below",
+        "their most frequent problem (2 of 4): flat",
+    ]
+    assert unusable({}, usable) == ["4 fits may not be used and are in no figure below"], "without the column"
+    assert unusable(table, usable | True) == []

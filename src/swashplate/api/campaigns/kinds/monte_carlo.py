@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 import msgspec
@@ -16,14 +15,11 @@ from swashplate.api.campaigns.kind import CampaignFindings, CampaignSettings, Na
 from swashplate.api.campaigns.shares import share_words
 from swashplate.api.campaigns.tasks import Columns, Portion
 from swashplate.api.controllers import load_controller
-from swashplate.api.design_controller import USUAL_SENSORS, Gain, Method, design_controller
 from swashplate.api.monte_carlo import MonteCarlo, monte_carlo
 from swashplate.control.draws.spread import SHOWN, Limits
-from swashplate.control.lqg.design import Holding
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
-from swashplate.simulation.controller import Controller
 
 _FLIGHTS = 256
 """Of a task, where the file does not say: some seconds of work, so that starting it costs little."""
@@ -48,36 +44,18 @@ class FlightVaries(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, fro
     delay: float = 0.0
 
 
-class ControllerChoices(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """A controller that is designed for the vehicle, in the place of a file; see `sp.design_controller`.
-
-    Attributes:
-        method, sensors, holding, rate, computation, allowed, effort, gain: as there.
-    """
-
-    method: Method = "lqg"
-    sensors: str = USUAL_SENSORS
-    holding: Holding = "place"
-    rate: float = 100.0
-    computation: float | None = None
-    allowed: dict[str, float] = msgspec.field(default_factory=dict)
-    effort: float | dict[str, float] | None = None
-    gain: Gain = "flying"
-
-
 class FlightsCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, frozen=True):
     """The file of a campaign of flights.
 
     Attributes:
-        vehicle: a name, or a card's or model's file. controller: its file. design: or how it is designed.
+        vehicle: a name, or a card's or model's file. controller: its file.
         maneuver: as of `swash simulate`.
         varies: what differs. battery: volts at the start and at the end. bits: of a command.
         limits: beyond which a flight is lost, in the units of a report (lean and heading in degrees); 0: none.
     """
 
     vehicle: str
-    controller: str | None = None
-    design: ControllerChoices | None = None
+    controller: str
     maneuver: str = "hover:10s"
     varies: FlightVaries = FlightVaries()
     battery: tuple[float, float] | None = None
@@ -100,8 +78,6 @@ class FlightsKind:
         _limits(settings.limits)
         gusts_of(settings.varies.gusts)
         parse_maneuver(settings.maneuver)
-        if (settings.controller is None) == (settings.design is None):
-            raise CampaignError("expected either a controller's file or a table [design].", channel="controller")
         return in_batches(settings, usual=_FLIGHTS)
 
     def run(self, settings: FlightsCampaign, portion: Portion, files: Mapping[str, Path]) -> Columns:
@@ -126,15 +102,12 @@ class FlightsKind:
             words = _limits(settings.limits).words()
             summary = [("Lost", f"{share_words(lost, every)} (limits: {words})", "bad" if lost else "good")]
         worst = "place" if "place" in table else ""
-        return CampaignFindings(tuple(summary), shown, worst=worst, counted="lost", again=".nc")
+        return CampaignFindings(tuple(summary), shown, worst=worst, again=".nc")
 
     def _flown(self, settings: FlightsCampaign, portion: Portion, files: Mapping[str, Path]) -> MonteCarlo:
         varies = settings.varies
         vehicle = str(files.get(settings.vehicle, settings.vehicle))
-        if settings.controller is not None:
-            controller = load_controller(files[settings.controller])
-        else:
-            controller = _designed(vehicle, msgspec.json.encode(settings.design))
+        controller = load_controller(files[settings.controller])
         return monte_carlo(
             vehicle_of(vehicle),
             controller,
@@ -151,23 +124,6 @@ class FlightsKind:
             limits=_limits(settings.limits),
             seed=portion.seed,
         )
-
-
-@lru_cache(maxsize=4)
-def _designed(vehicle: str, choices: bytes) -> Controller:
-    """A controller of a worker's tasks, designed once."""
-    made = msgspec.json.decode(choices, type=ControllerChoices)
-    return design_controller(
-        vehicle_of(vehicle),
-        method=made.method,
-        sensors=made.sensors,
-        holding=made.holding,
-        rate=made.rate,
-        computation=made.computation,
-        allowed=made.allowed or None,
-        effort=made.effort,
-        gain=made.gain,
-    ).controller
 
 
 def _limits(given: Mapping[str, float]) -> Limits:

@@ -113,7 +113,7 @@ class MultiStartKind:
         more = f" (the best {_SHOWN} of {len(groups)})" if len(groups) > _SHOWN else ""
         return CampaignFindings(
             summary, {"cost": ("", 1.0)}, tables=((f"Optima that starts ended at{more}", head, cells),),
-            careful=tuple(careful), counted="usable",
+            careful=tuple(careful),
         )  # fmt: skip
 
     def _read(

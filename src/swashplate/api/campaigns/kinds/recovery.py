@@ -122,7 +122,7 @@ class RecoveryKind:
         head = ("parameter", "truth inside 95 % [%]", "which is", "mean off [sigma]", "scatter [sigma]", "the bounds")
         shown = {f"{name}.off": ("sigma", 1.0) for name in names}
         table_of = ("How often the bounds hold the truth", head, tuple(cells))
-        return CampaignFindings(summary, shown, tables=(table_of,), careful=tuple(careful), counted="usable")
+        return CampaignFindings(summary, shown, tables=(table_of,), careful=tuple(careful))
 
     def _fitted(
         self, settings: RecoveryCampaign, truth: Vehicle, names: Sequence[str], files: Mapping[str, Path], seed: int
