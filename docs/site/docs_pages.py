@@ -117,6 +117,13 @@ def channels_text() -> str:
     return _table(("channel", "unit inside", "on screens", "frame", "meaning and sign", "at most (on screens)"), rows)
 
 
+def terms_text() -> str:
+    """The glossary."""
+    from swashplate.reporting.terms import TERMS
+
+    return _table(("word", "meaning"), [(word, TERMS[word]) for word in sorted(TERMS, key=str.lower)])
+
+
 def thresholds_text() -> str:
     """The verdict's thresholds."""
     from swashplate.identification.time import feedback
@@ -180,6 +187,7 @@ GENERATED: Mapping[str, Callable[[], str]] = {
     "trust": trust_text,
     "choices": choices_text,
     "channels": channels_text,
+    "terms": terms_text,
     "thresholds": thresholds_text,
     "bench_columns": bench_columns_text,
     "bench_procedures": bench_procedures_text,

@@ -147,12 +147,25 @@ def test_nothing_overflows_a_telephone(visit: Any, name: str) -> None:
     assert scrolling, "wide tables scroll in their own box"
 
 
-def test_summary_is_seen_without_scrolling(visit: Any) -> None:
+def test_verdict_warnings_and_picture_are_seen_without_scrolling(visit: Any) -> None:
     page = visit("both", "desk").page
-    bottom = page.evaluate("document.querySelector('.summary').getBoundingClientRect().bottom")
-    assert bottom < SIZES["desk"][1]
-    top = page.evaluate("document.querySelector('#key-picture').getBoundingClientRect().top")
-    assert top < 0.75 * SIZES["desk"][1]
+    page.evaluate("window.scrollTo(0, 0)")
+    for part in (".summary", ".first table", "#key-picture"):
+        assert page.evaluate(f"document.querySelector('{part}').getBoundingClientRect().bottom") < SIZES["desk"][1], (
+            part
+        )
+    assert page.locator(".summary dt").all_inner_texts()[:2] == ["Verdict", "Warnings"]
+
+
+def test_what_is_open_is_short_and_the_rest_opens(browser: Any, written: dict[str, Path]) -> None:
+    page = Visit(browser, written["both"], SIZES["desk"]).page
+    tall = page.evaluate("document.documentElement.scrollHeight")
+    assert tall < 2000
+    assert len(page.evaluate("document.body.innerText").split()) < 700
+    page.locator("summary", has_text="How well does it predict").click()
+    assert page.locator("#prediction figure").first.is_visible()
+    assert page.evaluate("document.documentElement.scrollHeight") > tall + 1000
+    page.close()
 
 
 def test_simulated_and_failed_are_the_first_thing_seen(visit: Any) -> None:
@@ -172,6 +185,7 @@ def test_names_from_files_run_nothing(visit: Any) -> None:
 
 def test_a_parameter_leads_to_its_meaning(visit: Any) -> None:
     page = visit("both", "desk").page
+    page.locator("#parameters summary").click()
     page.locator("#parameters a", has_text="tau_f_upper").click()
     target = page.locator("#meaning-tau_f_upper")
     target.wait_for(state="visible", timeout=5000)
@@ -180,9 +194,9 @@ def test_a_parameter_leads_to_its_meaning(visit: Any) -> None:
 
 def test_panels_zoom_in_time_together(visit: Any) -> None:
     page = visit("both", "desk").page
-    page.evaluate("Plotly.relayout('fit-1-tilt', {'xaxis.range': [3, 5]})")
+    page.evaluate("Plotly.relayout('prediction-1-tilt', {'xaxis.range': [3, 5]})")
     ranges = page.evaluate(
-        "Object.entries(document.getElementById('fit-1-tilt')._fullLayout)"
+        "Object.entries(document.getElementById('prediction-1-tilt')._fullLayout)"
         ".filter(e => /^xaxis/.test(e[0])).map(e => e[1].range)"
     )
     assert len(ranges) == 5

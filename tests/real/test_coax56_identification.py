@@ -87,4 +87,4 @@ def test_bands_of_a_model_with_a_residual_are_judged_on_another_flight(
     again = sp.load(tmp_path / "fit.json")
     found = sp.validate(again, [sp.read(flight_july).condition(rate=100.0)], draws=again.draw(39, seed=1))
     assert {band.channel for band in found.bands} >= {"u", "phi", "p", "r"}
-    assert "do not trust it" in str(found), "learnt in one flight, too narrow in the other"
+    assert "do not trust the 95 % band" in str(found), "learnt in one flight, too narrow in the other"

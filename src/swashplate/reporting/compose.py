@@ -12,8 +12,9 @@ from swashplate.reporting import sections_data, sections_fit, sections_prior, se
 from swashplate.reporting.figures_validation import key_picture
 from swashplate.reporting.glossary import PARAMETERS
 from swashplate.reporting.sections_verification import verification_section
-from swashplate.reporting.structure import Figure, Report, Section
+from swashplate.reporting.structure import Cell, Figure, Report, Section, Table, Text
 from swashplate.reporting.summary import banners, summary
+from swashplate.reporting.terms import terms_in
 from swashplate.reporting.versions import date, versions
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.modes import Mode
@@ -44,31 +45,71 @@ def compose(
         raise SwashError("there is nothing to report: neither a fit nor a validation was given.")
     at_hover, problems = (modes, []) if modes is not None else hover_modes(fit, validation)
     hover = sections_sight.hover(at_hover, problems)
+    seen = fit is not None and fit.in_time
+    one_step = seen and fit.method == "prediction-error" and validation is not None
     parts: list[Section | None] = [
         sections_validation.verdict(validation) if validation else None,
-        sections_data.asked(fit, validation),
-        sections_data.data(fit, validation),
+        sections_validation.prediction(validation) if validation else None,
         _with_warnings(fit) if fit else None,
         sections_prior.prior(fit) if fit else None,
-        sections_fit.comparison(fit) if fit and fit.in_time else None,
-        sections_validation.prediction(validation) if validation else None,
-        verification_section(verification) if verification else None,
-        sections_fit.residuals(fit) if fit and fit.in_time else None,
         sections_sight.sight(fit) if fit else None,
-        hover,
+        # One sample ahead any model lies on the flight: where a flight is predicted, that is what is looked at.
+        sections_fit.comparison(fit) if seen and not one_step else None,
+        verification_section(verification) if verification else None,
+        sections_fit.residuals(fit) if seen else None,
         sections_validation.innovations(validation) if validation and validation.innovations else None,
-        sections_fit.noise(fit) if fit else None,
+        hover,
+        sections_data.data(fit, validation),
         sections_fit.meanings(fit, PARAMETERS) if fit else None,
-        sections_data.made_with(fit, validation),
+        _made(fit, validation),
     ]
+    sections = tuple(part for part in parts if part is not None)
+    lines = summary(fit, validation)
     return Report(
         title=title or _title(fit, validation),
         banners=banners(fit, validation),
-        summary=summary(fit, validation),
+        summary=tuple(sorted(lines, key=lambda line: _FIRST.get(line[0], 2))),
         picture=_picture(fit, validation),
-        sections=tuple(part for part in parts if part is not None),
+        sections=with_terms(sections, lines),
         made=f"swashplate {versions()['swashplate']}, {date()}",
+        verdict=sections_validation.verdict_in_short(validation) if validation else None,
     )
+
+
+_FIRST = {"Verdict": 0, "Warnings": 1}
+"""Lines of the summary that a page begins with."""
+
+
+def _made(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
+    noise = sections_fit.noise(fit) if fit else None
+    blocks = (
+        *sections_data.asked(fit, validation),
+        *([noise] if noise else []),
+        *sections_data.made_with(fit, validation),
+    )
+    return Section("made", "How was this made?", blocks, folded=True)
+
+
+def with_terms(sections: Sequence[Section], lines: Sequence[tuple[str, str, str]] = ()) -> tuple[Section, ...]:
+    """Sections with one more at the end: what the words in them mean."""
+    texts = [words for line in lines for words in line[:2]]
+    for section in sections:
+        texts.append(section.title)
+        for block in section.blocks:
+            if isinstance(block, Table):
+                texts += [
+                    block.caption,
+                    block.note,
+                    *block.columns,
+                    *(cell.words for row in block.rows for cell in row),
+                ]
+            elif isinstance(block, Figure):
+                texts.append(block.caption)
+            else:
+                texts += [block.words] if isinstance(block, Text) else block.items
+    rows = tuple((Cell(term), Cell(words)) for term, words in terms_in(texts).items())
+    table = Table("Words of this page", ("word", "meaning"), rows)
+    return (*sections, Section("words", "What do the words mean?", (table,), folded=True)) if rows else tuple(sections)
 
 
 def hover_modes(

@@ -17,7 +17,6 @@ from swashplate.reporting.theme import (
     GREY,
     MODEL,
     PUBLISHED,
-    VERMILION,
     axis,
     base_layout,
     grid,
@@ -146,61 +145,6 @@ def residual_correlation(pieces: Mapping[str, Sequence[Array]], dt: float) -> Fi
         alt="Autocorrelation of the residuals per channel: "
         + ", ".join(f"{name} {100.0 * share:.0f} % of lags outside the bound" for name, share in outside.items()),
         keys=(Key("autocorrelation", MODEL, "bar"), Key("95 % bound of white noise", BAND, "band")),
-    )
-
-
-def residual_histogram(pieces: Mapping[str, Sequence[Array]], sigma: Mapping[str, float]) -> Figure:
-    """Distribution of the residuals beside the normal distribution that the model promises."""
-    names = list(pieces)
-    finely = {name: _finely(name, sigma[name]) for name in names}
-    layout = grid(
-        [f"{name} [{finely[name][1]}]" for name in names],
-        columns=2,
-        height=140,
-        x_title="residual",
-        y_title="density [per unit]",
-    )
-    traces: list[dict[str, Any]] = []
-    for i, name in enumerate(names):
-        number = "" if i == 0 else str(i + 1)
-        rows = finely[name][0] * np.concatenate(pieces[name])
-        promised = sigma[name] * finely[name][0]
-        reach = 4.0 * max(float(np.std(rows)), promised, np.finfo(float).tiny)
-        counts, edges = np.histogram(np.clip(rows, -reach, reach), bins=41, range=(-reach, reach), density=True)
-        smooth = np.linspace(-reach, reach, 121)
-        normal = (
-            np.exp(-0.5 * (smooth / promised) ** 2) / (promised * np.sqrt(2.0 * np.pi)) if promised > 0 else 0 * smooth
-        )
-        traces.append(
-            {
-                "type": "bar",
-                "x": numbers(0.5 * (edges[1:] + edges[:-1])),
-                "y": numbers(counts),
-                "marker": {"color": MODEL, "opacity": 0.55},
-                "xaxis": f"x{number}",
-                "yaxis": f"y{number}",
-                "hoverinfo": "skip",
-            }
-        )
-        traces.append(
-            {
-                **line(smooth, normal, name="normal", color=VERMILION, axis=number),
-                "hoverinfo": "skip",
-                "hovertemplate": None,
-            }
-        )
-        layout[f"yaxis{number}"]["showticklabels"] = False
-        tick = _round(0.6 * reach)
-        layout[f"xaxis{number}"] |= {"tickmode": "array", "tickvals": [-tick, 0.0, tick]}
-    layout["bargap"] = 0.0
-    return Figure(
-        identifier="residual-histogram",
-        spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
-        caption="Distribution of the residuals; what lies beyond four standard deviations is counted in the "
-        "outermost bars.",
-        alt=f"Histograms of the residuals of {', '.join(names)} with the promised normal distributions.",
-        keys=(Key("residuals", MODEL, "bar"), Key("normal distribution with the promised σ", VERMILION)),
     )
 
 

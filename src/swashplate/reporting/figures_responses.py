@@ -55,7 +55,9 @@ def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answer
     """
     h, coherence, error = responses.pair(output, input)
     hertz = responses.omega / TWO_PI
-    gain, phase = np.asarray(decibel(h)), unwrapped_degrees(h)
+    gain, phase = np.asarray(decibel(h)), unwrapped_degrees(h, coherent=coherence >= 0.6)
+    if model is not None:  # where the model is, the flight's count of turns is the model's
+        phase = beside_model(phase, responses.omega, model.omega, unwrapped_degrees(model.response))
     spread = np.minimum(error, 3.0)
     layout = over_frequency([f"{output}/{input} [dB]", "phase [deg]", "coherence [-]"], height=140, unit="Hz")
     layout["yaxis2"] |= phase_ticks(phase)
@@ -78,9 +80,6 @@ def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answer
     if model is not None:
         omega, answer = model.omega, model.response
         turned = unwrapped_degrees(answer)
-        # The model's count of turns is the flight's where they meet.
-        here = np.interp(omega, responses.omega[known], phase[known])
-        turned = turned + 360.0 * np.round(np.median(here - turned) / 360.0)
         wide = [(2.0 * _DB * model.gain, decibel(answer), ""), (np.degrees(2.0 * model.phase), turned, "2")]
         for half, middle, number in wide:
             if np.isfinite(half).all():
@@ -106,6 +105,21 @@ def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answer
         alt=f"Bode diagram of {output} over {input} with coherence; {told}.",
         keys=tuple(keys),
     )
+
+
+def beside_model(phase: Array, omega: Array, model_omega: Array, model_phase: Array) -> Array:
+    """A flight's phase [deg] with the model's count of whole turns, line by line where the model is.
+
+    At a notch a flight's phase may turn either way; beyond the model's lines the turns of its ends stay.
+    """
+    inside = (omega >= model_omega[0] * (1.0 - 1e-9)) & (omega <= model_omega[-1] * (1.0 + 1e-9))
+    places = np.flatnonzero(inside & np.isfinite(phase))
+    if places.size == 0:
+        return phase
+    reference = np.interp(omega, model_omega, model_phase)
+    turns = np.round((reference - phase) / 360.0)
+    nearest = places[np.clip(np.searchsorted(places, np.arange(phase.size)), 0, places.size - 1)]
+    return np.asarray(phase + 360.0 * turns[nearest])
 
 
 def _band(x: Array, below: Array, above: Array, *, color: str, name: str, axis: str) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from swashplate.reporting.theme import (
     unit_words,
 )
 
-PANEL = 118
+PANEL = 96
 """Height of one panel [px]."""
 
 _VERTICAL_INPUTS = ("motor", "collective", "pedal", "throttle")
@@ -92,7 +92,8 @@ def time_figures(
         model_words, flight_words: what the dashed and the solid lines are.
         predictions: pieces that begin at start points, drawn dashed with their band and a dot at the start.
     """
-    figures = []
+    figures: list[Figure] = []
+    above: list[list[int]] = []
     grouped = {name for _, _, names in _GROUPS for name in names}
     rest = tuple(name for name in channels if name not in grouped)
     for group, title, names in (*_GROUPS, ("other", "Other channels", rest)):
@@ -100,21 +101,23 @@ def time_figures(
         if not present:
             continue
         rows = inputs_of(group, input_names)
+        rows = [] if rows in above else rows  # the figure before has them
+        above.append(rows)
         traces = _input_traces(inputs, input_names, rows)
-        for i, name in enumerate(present):
-            traces += _channel_traces(channels[name], name, axis=str(i + 2))
-            traces += _prediction_traces((predictions or {}).get(name, ()), name, axis=str(i + 2))
-        layout = stacked(
-            [inputs_title([input_names[row] for row in rows]), *(axis_title(name) for name in present)], height=PANEL
-        )
+        for i, name in enumerate(present, start=2 if rows else 1):
+            axis = "" if i == 1 else str(i)
+            traces += _channel_traces(channels[name], name, axis=axis)
+            traces += _prediction_traces((predictions or {}).get(name, ()), name, axis=axis)
+        titles = [axis_title(name) for name in present]
+        layout = stacked([inputs_title([input_names[row] for row in rows]), *titles] if rows else titles, height=PANEL)
         figures.append(
             Figure(
                 identifier=f"{identifier}-{group}",
                 spec={"data": traces, "layout": layout},
                 height=int(layout["height"]),
-                caption=f"{title}, {source}. Inputs on top; all panels zoom in time together.",
-                alt=f"{title} of {source} against time: {', '.join(present)}, {flight_words} and {model_words}, "
-                f"under the commands {', '.join(input_names[row] for row in rows)}.",
+                caption=f"{title}, {source}. {'Inputs on top; a' if rows else 'A'}ll panels zoom in time together.",
+                alt=f"{title} of {source} against time: {', '.join(present)}, {flight_words} and {model_words}"
+                + (f", under the commands {', '.join(input_names[row] for row in rows)}." if rows else "."),
                 keys=(
                     Key(flight_words, FLIGHT),
                     Key(model_words, MODEL, "dash"),

@@ -43,9 +43,9 @@ def middle_horizon(validation: Validation) -> float:
 def key_picture(validation: Validation) -> Figure:
     """Fit % of every predictor on every channel, one second ahead: the model's marks should lie furthest right."""
     horizon = middle_horizon(validation)
-    names = _channels(validation)
+    names = [name for name in _channels(validation) if name not in ("x", "y", "z")]
     scores = {(s.channel, s.predictor): s for s in validation.scores if s.horizon == horizon}
-    height = 30 * len(names) + 70
+    height = 26 * len(names) + 60
     layout = base_layout(height, left=52)
     layout["xaxis"] = axis(
         f"fit, {horizon:g} s ahead [%]", range=[_FLOOR - 4, 104], zeroline=True, zerolinecolor="#333", zerolinewidth=1.5

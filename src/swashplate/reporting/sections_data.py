@@ -15,7 +15,7 @@ from swashplate.reporting.words import counted, listed, noise_told, plain_words,
 from swashplate.validation.validation import Validation
 
 
-def asked(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
+def asked(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[Block, ...]:
     """What was asked: vehicle, method, flights and settings."""
     blocks: list[Block] = []
     vehicle = fit.model if fit else validation.vehicle if validation else None
@@ -45,7 +45,7 @@ def asked(fit: Result[Any, Any] | None, validation: Validation | None) -> Sectio
     cells = tuple((Cell(_setting(k)), Cell(part), Cell(plain_words(v))) for part, s in rows for k, v in s.items())
     if cells:
         blocks.append(Table("Settings", ("setting", "of", "value"), cells))
-    return Section("asked", "What was asked", tuple(blocks))
+    return tuple(blocks)
 
 
 def _setting(name: str) -> str:
@@ -105,7 +105,7 @@ def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section
             "Flights",
             ("flight", "role", "origin", "length", "reader", "SHA-256 (first 12)"),
             rows,
-            note="Full hashes stand at the end of the report.",
+            note="Full hashes stand under the last heading.",
         )
     ]
     for _, flight in roles:
@@ -123,10 +123,10 @@ def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section
             blocks.append(Text(f"Unbroken segments of {name}: {pieces}."))
         if flight.notes:
             blocks.append(Points(flight.notes, title=f"What to know about {name}"))
-    return Section("data", "The data and what was done to it", tuple(blocks))
+    return Section("data", "Which data, and what was done to it?", tuple(blocks), folded=True)
 
 
-def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
+def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[Block, ...]:
     """Versions and hashes: enough to know whether two reports say the same about the same data."""
     rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
     hashes: list[tuple[str, str]] = []
@@ -141,21 +141,16 @@ def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> Se
     results: list[tuple[str, dict[str, Any]]] = [("fit", _numbers(fit))] if fit else []
     results += [("validation", validation.as_dict())] if validation else []
     hashes += [(f"numbers of the {label}", result_hash(result)) for label, result in results]
-    return Section(
-        "versions",
-        "Versions and hashes",
-        (
-            Text(f"Written on {date()}."),
-            Table("Versions", ("package", "version"), rows),
-            Table(
-                "SHA-256",
-                ("of", "hash"),
-                tuple((Cell(name), Cell(value, tone="quiet")) for name, value in hashes),
-                note="Flights: of the file's bytes. Cards: of their text. Numbers: of all results rounded to six "
-                "digits, wall time left out. None depends on the machine or on where files lie.",
-            ),
+    return (
+        Text(f"Written on {date()}."),
+        Table("Versions", ("package", "version"), rows),
+        Table(
+            "SHA-256",
+            ("of", "hash"),
+            tuple((Cell(name), Cell(value, tone="quiet")) for name, value in hashes),
+            note="Flights: of the file's bytes. Cards: of their text. Numbers: of all results rounded to six digits, "
+            "wall time left out. None depends on the machine or on where files lie.",
         ),
-        folded=True,
     )
 
 

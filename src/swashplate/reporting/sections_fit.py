@@ -15,12 +15,7 @@ from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.estimators import GAINS
 from swashplate.identification.one_step import in_words, not_judged, one_step_effects
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.reporting.figures_fit import (
-    cost_history,
-    residual_correlation,
-    residual_histogram,
-    residual_time,
-)
+from swashplate.reporting.figures_fit import residual_correlation, residual_time
 from swashplate.reporting.figures_time import Series, flight_name, time_figures
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.theme import unit_words
@@ -78,17 +73,15 @@ def parameters(fit: Result[Any, Any]) -> Section:
                 ),
             )
         )
-    if len(fit.history) > 1:
-        blocks.append(cost_history(fit.history))
-    return Section("parameters", "Parameters", tuple(blocks))
+    return Section("parameters", "Which numbers came out, and how sure are they?", tuple(blocks), folded=True)
 
 
-def noise(fit: Result[Any, Any]) -> Section | None:
+def noise(fit: Result[Any, Any]) -> Table | None:
     """The noise model, None where the method has none."""
     if fit.noise is None:
         return None
     told = noise_told({name: float(value) for name, value in fit.noise._asdict().items()})
-    table = Table(
+    return Table(
         "Noise that the method assumed or estimated",
         ("intensity", "value"),
         tuple((Cell(name), Cell(value_words(value), number=True)) for name, value in told.items()),
@@ -96,7 +89,6 @@ def noise(fit: Result[Any, Any]) -> Section | None:
         "standard deviation per sample in m or rad"
         + ("; wind: m/s² per √Hz; speed: horizontal, flown, rms in m/s." if "wind" in told else "."),
     )
-    return Section("noise", "Noise model", (table,), folded=True)
 
 
 def _row(fit: Result[Any, Any], e: Estimate) -> tuple[Cell, ...]:
@@ -166,7 +158,7 @@ def comparison(fit: Result[Any, Any]) -> Section:
             source=source,
             model_words=words,
         )
-    return Section("comparison", "Flight against model", tuple(blocks))
+    return Section("comparison", "Does it follow the flight it was fitted to?", tuple(blocks), folded=True)
 
 
 def _series(fit: Result[Any, Any], pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
@@ -202,7 +194,7 @@ def _nuisance(fit: Result[Any, Any], log: str) -> Nuisance:
 
 
 def residuals(fit: Result[Any, Any]) -> Section:
-    """What the model left over: over time, its autocorrelation, its distribution."""
+    """What the model left over: over time, and its autocorrelation."""
     names = fit.in_time[0].record.output_names
     timed: dict[str, list[tuple[Array, Array]]] = {name: [] for name in names}
     plain: dict[str, list[Array]] = {name: [] for name in names}
@@ -217,60 +209,37 @@ def residuals(fit: Result[Any, Any]) -> Section:
     dt = fit.in_time[0].record.dt
     return Section(
         "residuals",
-        "Residuals",
-        (residual_time(timed, sigma), residual_correlation(plain, dt), residual_histogram(plain, sigma)),
+        "Is what is left over only noise?",
+        (residual_time(timed, sigma), residual_correlation(plain, dt)),
+        folded=True,
     )
 
 
 def meanings(fit: Result[Any, Any], words: Mapping[str, str]) -> Section:
     """What each number means and where its first value comes from."""
     published = fit.start.card.parameters
-    identified = fit.model.card.parameters
-    names = [e.name for e in fit.estimates]
     rows = [
         (
-            Cell(name, anchor=f"meaning-{name}"),
-            Cell(words.get(name, "") or "–"),
-            Cell(unit_words(published[name].unit) or "1"),
-            Cell(f"{published[name].source} ({published[name].status})"),
-            Cell(f"{_limit(published[name].lower)} to {_limit(published[name].upper)}"),
-            Cell("; ".join(dict.fromkeys(note for note in (published[name].note, identified[name].note) if note))),
+            Cell(e.name, anchor=f"meaning-{e.name}"),
+            Cell(words.get(e.name, "") or "–"),
+            Cell(f"{published[e.name].source} ({published[e.name].status})"),
+            Cell(f"{_limit(published[e.name].lower)} to {_limit(published[e.name].upper)}"),
         )
-        for name in names
-        if name in published
+        for e in fit.estimates
+        if e.name in published
     ]
-    of_records = list(dict.fromkeys(e.name for e in fit.constants))
-    units = {e.name: e.unit for e in fit.constants}
     rows += [
         (
             Cell(name, anchor=f"meaning-{name}"),
             Cell(words.get(name, "") or "–"),
-            Cell(unit_words(units[name]) or "1"),
             Cell("estimated for each flight"),
             Cell("–"),
-            Cell(""),
         )
-        for name in of_records
+        for name in dict.fromkeys(e.name for e in fit.constants)
     ]
-    return Section(
-        "meanings",
-        "What the numbers mean and where they come from",
-        (
-            Table(
-                "Meaning, unit and source of each parameter",
-                (
-                    "parameter",
-                    "meaning [symbol of the paper]",
-                    "unit",
-                    "source of the published value",
-                    "physics allows",
-                    "note",
-                ),
-                tuple(rows),
-            ),
-        ),
-        folded=True,
-    )
+    columns = ("parameter", "meaning [symbol of the paper]", "source of the published value", "physics allows")
+    table = Table("Meaning and source of each parameter", columns, tuple(rows))
+    return Section("meanings", "What does each number mean, and where does it come from?", (table,), folded=True)
 
 
 def _limit(value: float | None) -> str:

@@ -67,7 +67,7 @@ def prior(fit: Result[Any, Any]) -> Section | None:
         blocks.append(
             Table("Held at the prior card", ("parameter", "unit", "published", "held at", "±σ", "from"), rows)
         )
-    return Section("prior", "Prior and flight", tuple(blocks))
+    return Section("prior", "Do prior and flight agree?", tuple(blocks), folded=True)
 
 
 def _row(e: Estimate) -> tuple[Cell, ...]:

@@ -31,7 +31,7 @@ def sight(fit: Result[Any, Any]) -> Section:
         blocks.append(Text("There is no combination of the free parameters that these flights do not see."))
     if len(fit.names) > 1:
         blocks.append(correlation_matrix(fit.names, fit.correlation))
-    return Section("sight", "What the flights can tell", tuple(blocks))
+    return Section("sight", "What could these flights tell?", tuple(blocks), folded=True)
 
 
 def _excitation(axes: Sequence[AxisExcitation]) -> Table:
@@ -102,7 +102,7 @@ def hover(modes: Mapping[str, Sequence[Mode]], problems: Sequence[str] = ()) -> 
                 + ". The states named take part most. Quadratic terms have no slope at hover.",
             )
         )
-    return Section("hover", "Eigenvalues at hover", tuple(blocks)) if blocks else None
+    return Section("hover", "Which motions of its own has it at hover?", tuple(blocks), folded=True) if blocks else None
 
 
 def _row(mode: Mode, label: str, place: int) -> tuple[Cell, ...]:

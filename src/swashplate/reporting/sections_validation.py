@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +17,14 @@ from swashplate.reporting.figures_time import Prediction, Series, flight_name, t
 from swashplate.reporting.figures_validation import JUDGED, fit_over_horizon, horizons
 from swashplate.reporting.glossary import meaning
 from swashplate.reporting.structure import Block, Cell, Section, Table, Text
-from swashplate.reporting.theme import unit_words
-from swashplate.reporting.words import counted, percent, sigma_words, value_words
+from swashplate.reporting.theme import PREDICTOR_WORDS, unit_words
+from swashplate.reporting.words import percent, sigma_words, value_words
 from swashplate.validation.bands import NEAR, pairs
 from swashplate.validation.bands import ROWS as BAND_ROWS
 from swashplate.validation.floors import CLOSED_ROWS
-from swashplate.validation.validation import PREDICTORS, Example, Score, Validation
+from swashplate.validation.validation import PREDICTORS, AxisVerdict, Example, Validation
+from swashplate.validation.verdict import JUDGED_AT
 
-_SHORT = {"model": "model", "published card": "card", "hold": "hold", "constant rates": "rates"}
 LEVEL_TONE = {"good": "good", "usable": "caution", "poor": "bad"}
 
 _HONEST = (0.5, 2.0)
@@ -30,50 +32,78 @@ _HONEST = (0.5, 2.0)
 
 
 def verdict(validation: Validation) -> Section:
-    """One line per axis, and the thresholds behind the words."""
-    rows = tuple(
-        (Cell(v.axis), Cell(v.level, tone=LEVEL_TONE.get(v.level, "quiet"), strong=True), Cell(v.words))
-        for v in validation.verdict
+    """Why each axis has its verdict, with the thresholds behind the words."""
+    rows = tuple((*_axis_cells(v), Cell(v.words)) for v in validation.verdict)
+    limits = ", ".join(
+        f"{k.replace('_', ' ')} from {value_words(float(v))} %" for k, v in validation.thresholds.items()
     )
-    blocks: list[Block] = [Table("Verdict per axis", ("axis", "verdict", "why"), rows)]
-    if validation.thresholds:
-        blocks.append(
-            Table(
-                "Thresholds behind the words",
-                ("threshold", "value"),
-                tuple(
-                    (Cell(k.replace("_", " ")), Cell(value_words(float(v)), number=True))
-                    for k, v in validation.thresholds.items()
-                ),
-                note="Least prediction fit [%] of every channel of an axis; good and usable must beat every rival too.",
-            )
-        )
-    return Section("verdict", "Verdict", tuple(blocks))
+    note = f"Every channel of an axis must reach the fit and beat every rival: {limits}. " if limits else ""
+    table = Table("Verdict per axis", ("axis", "verdict", "why"), rows, note=f"{note}{_FIT}")
+    return Section("verdict", "Why this verdict?", (table,), folded=True)
+
+
+def verdict_in_short(validation: Validation) -> Table | None:
+    """One line per axis for the first screen: verdict, fits, and the best rival's."""
+    if not validation.verdict:
+        return None
+    rows = tuple((*_axis_cells(v), Cell(_numbers(v.words))) for v in validation.verdict)
+    return Table("Verdict per axis", ("axis", "verdict", "fit (best rival)"), rows)
+
+
+def _axis_cells(judged: AxisVerdict) -> tuple[Cell, Cell]:
+    return Cell(judged.axis), Cell(judged.level, tone=LEVEL_TONE.get(judged.level, "quiet"), strong=True)
+
+
+def _numbers(words: str) -> str:
+    """The numbers with which a verdict's words begin, as "phi 69 % (56 %), p 55 % (28 %), 1 s ahead"."""
+    match = re.match(r"(.+?) at ([\d.]+) s\.", words)
+    if match is None:
+        return ""
+    numbers = re.sub(r" \[[^]]*\]", "", match[1]).replace("(best rival ", "(")
+    return f"{numbers}, {match[2]} s ahead"
+
+
+_FIT = "Fit: 100 (1 − rms error / rms change since the start); holding the last value has 0."
 
 
 def prediction(validation: Validation) -> Section:
-    """Predictions to look at, then the numbers per horizon."""
+    """Predictions to look at, then the numbers: fits at every horizon, and what stands beside those that are judged."""
     names = {flight_name(record.name) for record in validation.records}
     blocks: list[Block] = [
         Text(
-            "At each start point a causal observer knew the flight up to there and nothing after it; from there on "
-            f"the model ran on the recorded inputs. The shaded band is ±2σ of {_band_of(validation)}."
+            "At each start point a filter knew the flight up to there and nothing after it. From there on the model "
+            f"ran on the recorded inputs. The shaded band is ±2σ of {_band_of(validation)}."
         )
     ]
     for i, source in enumerate(sorted(names)):
         blocks += _pictures(validation, source, identifier=f"prediction-{i + 1}")
     blocks += [Text(one.words, tone="caution") for one in validation.contacts]
-    blocks += [Text(law.words[0].upper() + law.words[1:]) for law in validation.laws]
     blocks += [Text(words, tone="caution" if "narrow" in words else "plain") for words in validation.bands_told]
-    blocks += _told(validation)
     blocks.append(fit_over_horizon(validation))
-    for horizon in horizons(validation):
-        blocks.append(_table(validation, horizon))
-        blocks += _bands(validation, horizon)
-        blocks += _beside(validation, horizon)
-        blocks += _without_contact(validation, horizon)
-        blocks += _loop_closed(validation, horizon)
-    return Section("prediction", "Prediction", tuple(blocks))
+    tables = (_fits(validation), _beside(validation), _bands(validation), _loop_closed(validation))
+    blocks += [table for table in (*tables, _without_contact(validation)) if table]
+    blocks += [Text(law.words[0].upper() + law.words[1:]) for law in validation.laws]
+    blocks += _told(validation)
+    return Section("prediction", "How well does it predict what it has not seen?", tuple(blocks), folded=True)
+
+
+def _judged(validation: Validation) -> dict[str, float]:
+    """The channels that a verdict looks at, with the horizon [s] at which it does: the nearest that was scored."""
+    there = horizons(validation)
+    scored = {score.channel for score in validation.scores}
+    return (
+        {name: min(there, key=lambda h: abs(h - at)) for name, at in JUDGED_AT.items() if name in scored}
+        if there
+        else {}
+    )
+
+
+def _of_judged(validation: Validation, rows: Iterable[Any]) -> list[Any]:
+    """The rows of the judged channels at their horizons, in the order in which people look at them."""
+    wanted = {(row.channel, row.horizon): row for row in rows}
+    judged = _judged(validation)
+    keys = [(name, judged[name]) for name in JUDGED if name in judged]
+    return [wanted[key] for key in keys if key in wanted]
 
 
 def _band_of(validation: Validation) -> str:
@@ -89,26 +119,28 @@ def _band_of(validation: Validation) -> str:
 _PARAMETERS = {True: "the parameters by their posterior, ", False: ""}
 
 
-def _bands(validation: Validation, horizon: float) -> tuple[Block, ...]:
+def _bands(validation: Validation) -> Table | None:
     """How much of the flights the bands hold."""
-    rows = {half.channel: (half, most) for half, most in pairs(validation.bands) if half.horizon == horizon}
-    if not rows:
-        return ()
+    most = {(one.channel, one.horizon): one for half, one in pairs(validation.bands)}
+    halves = _of_judged(validation, (half for half, _ in pairs(validation.bands)))
+    if not halves:
+        return None
     drawn = bool(validation.settings.get("draws"))
-    return (
-        Table(
-            f"What the bands {horizon:g} s ahead hold",
-            ("channel", *(words for words, _ in BAND_ROWS)),
-            tuple(
-                (Cell(name), *(_band_cell(words, cell(*rows[name])) for words, cell in BAND_ROWS))
-                for name in JUDGED
-                if name in rows
-            ),
-            note="Percent of the starts whose measured motion lies inside, with its 95 % interval (block bootstrap "
-            f"over 4 s of flight). A band holds within {NEAR:g} points of its promise. In it: {_PARAMETERS[drawn]}the "
-            "observer's error at the start, gusts and drifts to come, the sensors' noise. By parameters: part of the "
-            "variance. Not in it: a wrong structure, and how sure the fit is of the gusts.",
+    return Table(
+        "Do the bands hold what they promise?",
+        ("channel", "ahead [s]", *(words for words, _ in BAND_ROWS)),
+        tuple(
+            (
+                Cell(half.channel),
+                _cell(f"{half.horizon:g}", False),
+                *(_band_cell(words, cell(half, most[half.channel, half.horizon])) for words, cell in BAND_ROWS),
+            )
+            for half in halves
         ),
+        note="Percent of the starts whose measured motion lies inside, with its 95 % interval (block bootstrap over "
+        f"4 s of flight). A band holds within {NEAR:g} points of its promise. In it: {_PARAMETERS[drawn]}the filter's "
+        "error at the start, gusts and drifts to come, the sensors' noise. Not in it: a wrong structure, and how sure "
+        "the fit is of the gusts.",
     )
 
 
@@ -177,142 +209,117 @@ def apart(examples: Sequence[Example]) -> list[Example]:
     return chosen
 
 
-def _table(validation: Validation, horizon: float) -> Table:
-    scores = {(s.channel, s.predictor): s for s in validation.scores if s.horizon == horizon}
-    names = sorted({name for name, _ in scores}, key=lambda n: (JUDGED.index(n) if n in JUDGED else len(JUDGED), n))
-    shown = [p for p in PREDICTORS if any(predictor == p for _, predictor in scores)]
-    rated = [p for p in shown if p != "hold"]
+def _fits(validation: Validation) -> Table | None:
+    """Fit of every predictor on every channel at every horizon."""
+    there = horizons(validation)
+    scores = {(s.channel, s.predictor, s.horizon): s.fit for s in validation.scores}
+    shown = [p for p in PREDICTORS if p != "hold" and any(predictor == p for _, predictor, _ in scores)]
+    channels = {name for name, _, _ in scores}
+    names = sorted(channels, key=lambda n: (JUDGED.index(n) if n in JUDGED else len(JUDGED), n))
+    if not names:
+        return None
+
+    def cell(name: str, predictor: str, horizon: float) -> Cell:
+        fits = {p: scores.get((name, p, horizon), math.nan) for p in shown}
+        best = max((0.0, *(f for f in fits.values() if math.isfinite(f))))
+        return _cell(percent(fits[predictor]), fits[predictor] == best)
+
+    starts = {s.horizon: s.starts for s in validation.scores}
+    counts = ", ".join(f"{starts[h]} at {h:g} s" for h in there)
+    return Table(
+        "Fit [%] of every predictor",
+        ("channel", *(f"{h:g} s" for _ in shown for h in there)),
+        tuple((Cell(name), *(cell(name, p, h) for p in shown for h in there)) for name in names),
+        groups=(("", 1), *((PREDICTOR_WORDS[p], len(there)) for p in shown)),
+        note=f"{_FIT} Bold: the best at that horizon. Start points: {counts}. Errors in units and Theil's coefficient "
+        "are in validation.json.",
+    )
+
+
+def _without_contact(validation: Validation) -> Table | None:
+    """The model's scores with and without the starts that a proposed mask touches."""
     rows = []
-    for name in names:
-        present = {p: scores[name, p] for p in shown if (name, p) in scores}
-        best = max(present, key=lambda p: present[p].fit)
-        nearest = min((s.theil for s in present.values() if math.isfinite(s.theil)), default=math.nan)
-        unit = channel(name)
+    for without in _of_judged(validation, validation.without_contact):
+        whole = validation.score(without.channel, without.horizon)
+        cells = [_cell(words, False) for words in (f"{without.horizon:g}", percent(whole.fit), percent(without.fit))]
+        counts = [_cell(str(count), False) for count in (whole.starts, without.starts)]
+        rows.append((Cell(without.channel), *cells, *counts))
+    if not rows:
+        return None
+    return Table(
+        "With and without the suspected contact",
+        ("channel", "ahead [s]", "fit [%]", "without [%]", "starts", "starts without"),
+        tuple(rows),
+        note="The mask is a proposal; every other figure has all starts.",
+    )
+
+
+def _loop_closed(validation: Validation) -> Table | None:
+    """Fits with controllers in the place of recorded commands."""
+    rows = _of_judged(validation, validation.loop_closed)
+    if not rows:
+        return None
+    closed = " and ".join(dict.fromkeys(law.axis for law in validation.laws))
+    return Table(
+        f"With the {closed} controller in the place of its recorded command",
+        ("channel", "ahead [s]", *(f"{words} [%]" for words, _ in CLOSED_ROWS)),
+        tuple(
+            (Cell(f.channel), *(_cell(words, False) for words in (f"{f.horizon:g}", *(c(f) for _, c in CLOSED_ROWS))))
+            for f in rows
+        ),
+        note="Recorded commands answer gusts that no prediction knows. Gain: points that closing the loop adds; "
+        "95 %: block bootstrap over 4 s of flight, the same blocks for both.",
+    )
+
+
+def _beside(validation: Validation) -> Table | None:
+    """Whether the model or the flight is poor: scatter, movement, what the filter expects, what a black box reaches."""
+    rows = []
+    for f in _of_judged(validation, validation.floors):
+        unit = channel(f.channel)
+        told = math.isfinite(f.ceiling)
+        ahead = f"{percent(f.lead)} ({percent(f.lead_low)} to {percent(f.lead_high)})" if math.isfinite(f.low) else "–"
+        words = (
+            f"{f.horizon:g}",
+            percent(f.fit),
+            f"{percent(f.low)} to {percent(f.high)}" if math.isfinite(f.low) else "–",
+            ahead,
+            value_words(f.rms * unit.shown_factor, 0.01 * f.rms * unit.shown_factor),
+            value_words(f.moved * unit.shown_factor, 0.01 * f.moved * unit.shown_factor),
+        )
         rows.append(
             (
-                Cell(name),
-                Cell(unit_words(unit.shown_unit)),
-                *(_cell(percent(s.fit), s is present[best]) for s in _row(present, rated)),
-                *(
-                    _cell(value_words(s.rms * unit.shown_factor, 0.01 * s.rms * unit.shown_factor), s is present[best])
-                    for s in _row(present, shown)
-                ),
-                *(
-                    _cell(f"{s.theil:.2f}" if math.isfinite(s.theil) else "–", s.theil == nearest)
-                    for s in _row(present, shown)
-                ),
-            )
-        )
-    words, rated_words = [_SHORT[p] for p in shown], [_SHORT[p] for p in rated]
-    starts = max((s.starts for s in scores.values()), default=0)
-    return Table(
-        f"Prediction {horizon:g} s ahead, from {counted(starts, 'start point')}",
-        ("channel", "unit", *rated_words, *words, *words),
-        tuple(rows),
-        groups=(
-            ("", 2),
-            ("fit [%] (hold scores 0)", len(rated)),
-            ("RMS error", len(shown)),
-            ("Theil's coefficient", len(shown)),
-        ),
-        note="Model: the identified one. Card: the published one. Hold: the last value stays. Rates: constant rates. "
-        "Bold: the best of the row by each measure. Fit: 100 (1 − rms error / rms change since the start). "
-        "Theil: 0 perfect, 1 no better than the opposite; holding the last value always has 1.",
-    )
-
-
-def _without_contact(validation: Validation, horizon: float) -> tuple[Block, ...]:
-    """The model's scores with and without the starts that a proposed mask touches."""
-    rows = {s.channel: s for s in validation.without_contact if s.horizon == horizon}
-    if not rows:
-        return ()
-    table = []
-    for name in [n for n in JUDGED if n in rows]:
-        whole = validation.score(name, horizon)
-        counts = (whole.starts, rows[name].starts)
-        cells = [_cell(percent(s.fit), False) for s in (whole, rows[name])]
-        table.append((Cell(name), *cells, *(_cell(str(count), False) for count in counts)))
-    return (
-        Table(
-            f"With and without the suspected contact, {horizon:g} s ahead",
-            ("channel", "fit [%]", "without [%]", "starts", "starts without"),
-            tuple(table),
-            note="The mask is a proposal; every other figure has all starts.",
-        ),
-    )
-
-
-def _loop_closed(validation: Validation, horizon: float) -> tuple[Block, ...]:
-    """Fits with controllers in the place of recorded commands."""
-    rows = {f.channel: f for f in validation.loop_closed if f.horizon == horizon}
-    if not rows:
-        return ()
-    closed = " and ".join(dict.fromkeys(law.axis for law in validation.laws))
-    return (
-        Table(
-            f"With the {closed} controller in the place of its recorded command, {horizon:g} s ahead",
-            ("channel", *(f"{words} [%]" for words, _ in CLOSED_ROWS)),
-            tuple((Cell(n), *(_cell(cell(rows[n]), False) for _, cell in CLOSED_ROWS)) for n in JUDGED if n in rows),
-            note="Recorded commands answer gusts that no prediction knows. Gain: points that closing the loop adds; "
-            "95 %: block bootstrap over 4 s of flight, the same blocks for both.",
-        ),
-    )
-
-
-def _beside(validation: Validation, horizon: float) -> tuple[Block, ...]:
-    """Whether the model or the flight is poor: scatter, movement, what the filter expects, what a black box reaches."""
-    rows = {f.channel: f for f in validation.floors if f.horizon == horizon}
-    if not rows:
-        return ()
-    table = []
-    for name in [n for n in JUDGED if n in rows]:
-        f, unit = rows[name], channel(name)
-        scatter = f"{percent(f.low)} to {percent(f.high)}" if math.isfinite(f.low) else "–"
-        ahead = f"{percent(f.lead)} ({percent(f.lead_low)} to {percent(f.lead_high)})" if math.isfinite(f.low) else "–"
-        told = math.isfinite(f.ceiling)
-        table.append(
-            (
-                Cell(name),
-                _cell(percent(f.fit), False),
-                _cell(scatter, False),
-                _cell(ahead, False),
-                _cell(value_words(f.rms * unit.shown_factor, 0.01 * f.rms * unit.shown_factor), False),
-                _cell(value_words(f.moved * unit.shown_factor, 0.01 * f.moved * unit.shown_factor), False),
+                Cell(f.channel),
+                *(_cell(text, False) for text in words),
                 Cell(unit_words(unit.shown_unit)),
                 _cell(percent(f.expected), False),
                 _cell(percent(f.past), False),
                 Cell(percent(f.ceiling) if told else "refused", number=True, tone="plain" if told else "caution"),
-                Cell(f"{f.words[0].upper()}{f.words[1:]}"),
             )
         )
-    return (
-        Table(
-            f"What the model's scores {horizon:g} s ahead stand beside",
-            (
-                "channel",
-                "fit [%]",
-                "95 %",
-                "points ahead of the best rival",
-                "RMS error",
-                "RMS movement",
-                "unit",
-                "filter expects [%]",
-                "past alone [%]",
-                "ceiling [%]",
-                "so",
-            ),
-            tuple(table),
-            note="95 %: block bootstrap over 4 s of flight, the same blocks for all. Movement: of the flight since the "
-            "start. Filter expects: what its own covariance promises. Ceiling: ridge regression on past motion, past "
-            f"inputs and the inputs up to the target ({' or '.join(sorted({f.by for f in rows.values() if f.by}))}); "
-            "refused where inputs after the target help too, as a controller's answers do. Past alone: the same "
-            "without any input after the start.",
+    if not rows:
+        return None
+    return Table(
+        "Is the model poor, or the flight? What the judged fits stand beside",
+        (
+            "channel",
+            "ahead [s]",
+            "fit [%]",
+            "95 %",
+            "points ahead of the best rival",
+            "RMS error",
+            "RMS movement",
+            "unit",
+            "filter expects [%]",
+            "past alone [%]",
+            "ceiling [%]",
         ),
+        tuple(rows),
+        note="95 %: block bootstrap over 4 s of flight, the same blocks for all. Movement: of the flight since the "
+        "start. Filter expects: the fit that its own covariance promises. Past alone: a regression on past motion and "
+        "past inputs. Ceiling: the same with the inputs up to the target; refused where inputs after the target help "
+        "too, as a controller's answers do.",
     )
-
-
-def _row(present: dict[str, Score], wanted: Sequence[str]) -> list[Score]:
-    return [present.get(p, Score("", 0.0, p, math.nan, math.nan, math.nan, 0)) for p in wanted]
 
 
 def _cell(words: str, strong: bool) -> Cell:
@@ -364,4 +371,4 @@ def innovations(validation: Validation) -> Section:
                 note="Larger is better; a difference of 1 per sample is large.",
             )
         )
-    return Section("innovations", "Innovations", tuple(blocks))
+    return Section("innovations", "Are the filter's errors as large as it says?", tuple(blocks), folded=True)

@@ -130,6 +130,7 @@ class Report:
         banners: what must be seen before anything else, as (tone, words), most important first.
         summary: five lines, as (label, words, tone).
         picture: the one figure of the summary.
+        verdict: a line for each axis, beside the picture; None for none.
         sections: everything else.
         made: when and by what, one line.
     """
@@ -140,6 +141,7 @@ class Report:
     picture: Figure | None
     sections: tuple[Section, ...]
     made: str
+    verdict: Table | None = None
 
     @property
     def figures(self) -> tuple[Figure, ...]:

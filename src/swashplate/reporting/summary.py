@@ -128,6 +128,12 @@ def _changes(fit: Result[Any, Any]) -> Line:
     return "Change", f"Largest changes for their uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
 
 
+def _in_short(problems: str) -> str:
+    """The first problem of a log, and how many more there are."""
+    first, *others = problems.rstrip(".").split("; ")
+    return f"{first}, and {counted(len(others), 'more remark')} on these data" if others else first
+
+
 def _warnings(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
     words = []
     if fit:
@@ -144,7 +150,8 @@ def _warnings(fit: Result[Any, Any] | None, validation: Validation | None) -> Li
     elif validation and any(not r.voltage_known for r in validation.records):
         words.append("battery voltage not logged")
     data = (*(fit.data if fit else ()), *(validation.data if validation else ()))
-    words += [text.rstrip(".") for text in (*scale_words(data), *problem_words(data))]
+    words += [text.rstrip(".") for text in scale_words(data)]
+    words += [_in_short(text) for text in problem_words(data)]
     if not words:
         return "Warnings", "no problem was found in these flights.", "plain"
     text = "; ".join(words)

@@ -29,7 +29,7 @@ NEAR = 3.0
 """Points between what a band promises and what it holds that are called kept."""
 _WORDS = {
     "holds": "as promised",
-    "too narrow": "too narrow: neither the model nor gusts as in the flights of its fit explain this motion",
+    "too narrow": "too narrow: this motion is larger than the model and the gusts of its fit explain",
     "too wide": "wider than this flight needs",
     "cannot be judged": "the flights are too short to tell",
 }
@@ -107,11 +107,10 @@ class Band:
         """Where it is too narrow: by how much; "" for another."""
         if self.level != "too narrow":
             return ""
-        known = "" if self.by_parameters else ", as if the model's numbers were known,"
+        known = "" if self.by_parameters else " How sure the model's numbers are is not in it."
         return (
-            f"{self.channel}: the {self.promised:g} % band{known} holds {self.held:.0f} % [{self.low:.0f} to "
-            f"{self.high:.0f}], errors are {self.off:.1f} times what it allows for: do not trust it, nor anything that "
-            "is drawn from the model for this channel."
+            f"{self.channel}: do not trust the {self.promised:g} % band. It holds {self.held:.0f} % of the flight "
+            f"[{self.low:.0f} to {self.high:.0f}], because errors are {self.off:.1f} times as large as it says.{known}"
         )
 
 
@@ -235,7 +234,7 @@ def in_brief(judged: Sequence[Band], horizon: float, *, drawn: bool = True) -> s
             said.append(f"{words[0].upper()}{words[1:]}: {', '.join(named)}.")
     if not drawn and not said:
         return ""
-    by = "" if drawn else " by the model alone, as if its numbers were known"
+    by = "" if drawn else " (how sure the model's numbers are is not in them)"
     return f"Bands {horizon:g} s ahead{by}. {' '.join(said)}"
 
 
@@ -246,6 +245,6 @@ def widened_words(judged: Sequence[Band]) -> str:
         return ""
     named = ", ".join(f"{name} {factor:.1f}" for name, factor in wide.items())
     return (
-        f"Bands are wider than the fit says, by what the first seconds were missed: {named} times. The gusts of this "
-        "flight are stronger there than those of the fit's, or the model lacks something."
+        "Bands were made wider than the fit says, because errors in the first seconds of this flight were larger: "
+        f"{named} times. Its gusts are stronger than those of the fit's flights, or the model lacks something."
     )

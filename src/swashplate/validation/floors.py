@@ -25,7 +25,7 @@ _CLOSE = 5.0
 """Points of fit that are no difference worth a word."""
 
 
-_ANSWERS = "on commands that answer the motion it may beat a model that is right"
+_ANSWERS = "where a controller's commands answer the motion, that may beat even a correct model"
 """A true model of a quadrotor, flown in gusts by its autopilot, loses to it by hundreds of points in the simulation of
 `research/multirotor.md`."""
 
@@ -89,19 +89,21 @@ class Floor:
         """Whether the model or the flight is poor."""
         unit = known(self.channel)
         moved, factor = f"{self.moved * unit.shown_factor:.2g}", unit.shown_factor
-        promise = f", the filter itself expects {_percent(self.expected)} %" if math.isfinite(self.expected) else ""
-        moves = f"the flight moves {moved} {unit.shown_unit} rms{promise}"
+        promise = f"; the filter expects a fit of {_percent(self.expected)} %" if math.isfinite(self.expected) else ""
+        moves = f"in that time the flight changes by {moved} {unit.shown_unit} (rms){promise}"
         if not math.isfinite(self.ceiling):
             return f"{moves}. {self._without_ceiling}No ceiling: {self.refused}."
+        if self.fit - self.ceiling > _CLOSE:
+            return f"{moves}. The model is better than the regression that is the ceiling ({_percent(self.ceiling)} %)."
         if self.reached and self.ceiling < _LOW:
             unforeseen = self.moved * (1.0 - self.ceiling / 100.0) * factor
             return (
-                f"the flight's motion is small beside what cannot be predicted ({moved} against {unforeseen:.2g} "
-                f"{unit.shown_unit} rms){promise}: even the ceiling reaches {_percent(self.ceiling)} %."
+                f"{moves}. Of the change, {unforeseen:.2g} {unit.shown_unit} cannot be predicted from what was "
+                f"recorded: even the ceiling is a fit of {_percent(self.ceiling)} %."
             )
         if self.reached:
-            return f"{moves}; at the ceiling ({_percent(self.ceiling)} %)."
-        return f"{moves}; the ceiling is {_percent(self.ceiling)} %: the model is short of it."
+            return f"{moves}. The model is as good as the ceiling ({_percent(self.ceiling)} %)."
+        return f"{moves}. The ceiling is {_percent(self.ceiling)} %: a better model is possible."
 
     @property
     def _without_ceiling(self) -> str:
@@ -109,12 +111,12 @@ class Floor:
             return ""
         if math.isfinite(self.past) and self.past - self.fit > _CLOSE:
             if self.leak > LEAK:
-                return f"The past alone predicts {_percent(self.past)} %: {_ANSWERS}. "
-            return f"The model is poor: the past alone predicts {_percent(self.past)} %. "
+                return f"The past alone has a fit of {_percent(self.past)} %; {_ANSWERS}. "
+            return f"The model is poor: the past alone has a fit of {_percent(self.past)} %. "
         if self.seen - self.fit <= _CLOSE:
-            return f"Even a black box that reads a controller's answers reaches {_percent(self.seen)} %. "
-        alone = f"The past alone predicts {_percent(self.past)} %, a" if math.isfinite(self.past) else "A"
-        return f"{alone} black box that reads a controller's answers {_percent(self.seen)} %. "
+            return f"Even a regression that also reads the controller's later answers has {_percent(self.seen)} %. "
+        alone = f"The past alone has a fit of {_percent(self.past)} %; a" if math.isfinite(self.past) else "A"
+        return f"{alone} regression that also reads the controller's later answers has {_percent(self.seen)} %. "
 
 
 def _shown(floor: Floor, value: float) -> str:

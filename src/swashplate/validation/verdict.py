@@ -25,6 +25,8 @@ _AXES = {
     "heave": (("w",), 0.5),
     "horizontal": (("u", "v"), 0.5),
 }
+JUDGED_AT = {channel: horizon for channels, horizon in _AXES.values() for channel in channels}
+"""The horizon [s] at which a channel is judged."""
 JUDGED_AHEAD = max(horizon for _, horizon in _AXES.values())
 """Furthest horizon [s] that a verdict looks at."""
 

@@ -78,7 +78,6 @@ WITHOUT = {
     "DatasetFile": "a file's name",
     "Decoupling": "a law; `decouple_axes` shows what it is worth",
     "Export": "files",
-    "Film": "a file",
     "Hold": "a law; `check_controller` shows what it is worth",
     "HoverTrim": "a law; `check_controller` shows what it is worth",
     "Line": "one line of words",

@@ -10,9 +10,10 @@ import pytest
 import swashplate as sp
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight, stream
-from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.responses.frequency_response import FrequencyResponse, unwrapped_degrees
 from swashplate.models.conventional.derivative_table import DerivativeTable
 from swashplate.physics.environment import Environment
+from swashplate.reporting.figures_responses import beside_model
 from swashplate.simulation.derivatives_over_speed import Derivatives
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim_curve import TrimCurve, trim_curve
@@ -126,3 +127,26 @@ def test_notebooks_show_a_table_and_a_picture_and_no_markup_of_others(
     assert "roll rate" in page
     assert 'src="data:image/png;base64,' in page
     assert "p / servo_roll" in response._repr_html_()
+
+
+def test_noise_between_coherent_lines_adds_no_turn() -> None:
+    """A lag through 300 degrees with incoherent lines in its middle that turn once around."""
+    degrees = np.linspace(0.0, -300.0, 60)
+    h = np.exp(1j * np.radians(degrees))
+    coherent = np.ones(60, dtype=bool)
+    coherent[25:31] = False
+    h[25:31] = np.exp(1j * np.radians(degrees[24] + np.linspace(100.0, 400.0, 6)))
+    np.testing.assert_allclose(unwrapped_degrees(h, coherent=coherent)[coherent], degrees[coherent], atol=1e-9)
+    assert np.max(np.abs(unwrapped_degrees(h)[coherent] - degrees[coherent])) > 359.0, "the noise would turn it"
+
+
+def test_a_flight_and_its_model_are_never_a_turn_apart() -> None:
+    """At a notch the flight's phase turns the other way than the model's: nothing that a fit could see."""
+    omega = np.geomspace(1.0, 30.0, 80)
+    s = 1j * omega
+    notch = (s**2 + 0.02 * s + 36.0) / (s + 3.0) ** 2
+    other = (s**2 - 0.02 * s + 36.0) / (s + 3.0) ** 2  # the same to a thousandth, and half a turn the other way
+    flown, model = unwrapped_degrees(other), unwrapped_degrees(notch)
+    assert abs(flown[-1] - model[-1]) > 300.0
+    drawn = beside_model(flown, omega, omega[5:-5], model[5:-5])
+    assert np.max(np.abs(drawn - model)[np.abs(omega - 6.0) > 0.5]) < 5.0

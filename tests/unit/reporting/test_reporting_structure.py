@@ -26,11 +26,13 @@ from swashplate.reporting.figures_time import Series, time_figures
 from swashplate.reporting.sections_fit import parameters
 from swashplate.reporting.sections_validation import apart
 from swashplate.reporting.structure import Cell, Report, Section, Table
+from swashplate.reporting.terms import TERMS
 from swashplate.reporting.theme import packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash
 from swashplate.reporting.words import noise_told, plain_words, sigma_words, span_words, step_words, value_words
 from swashplate.validation.prediction import HORIZONS
-from swashplate.validation.validation import AxisVerdict
+from swashplate.validation.validation import PREDICTORS, AxisVerdict
+from swashplate.validation.verdict import JUDGED_AT
 
 
 @given(
@@ -151,12 +153,16 @@ def test_simulated_and_failed_come_first() -> None:
 def test_a_flight_that_the_fit_used_is_no_hold_out() -> None:
     one = fit()
     again = replace(validation(), data=sources_of((flight(),)))
+
+    def what(report: Report) -> str:
+        return next(words for label, words, _ in report.summary if label == "What")
+
     report = compose(one, again, modes=modes())
     assert report.banners == (("caution", "NOT A HOLD-OUT: sweep.mat was used for the fit too."),)
-    assert "never saw" not in report.summary[0][1]
+    assert "never saw" not in what(report)
     part = replace(again, data=sources_of((flight().between(0.0, 5.0),)))
     assert compose(one, part, modes=modes()).banners == report.banners
-    assert "never saw" in compose(one, validation(), modes=modes()).summary[0][1]
+    assert "never saw" in what(compose(one, validation(), modes=modes()))
 
 
 def test_summary_has_five_lines_and_a_picture() -> None:
@@ -164,7 +170,9 @@ def test_summary_has_five_lines_and_a_picture() -> None:
         assert len(report.summary) == 5
         assert report.picture is not None
     only = compose(None, validation(), modes=modes())
-    assert [label for label, _, _ in only.summary] == ["What", "Prediction", "Verdict", "Warnings"]
+    assert [label for label, _, _ in only.summary] == ["Verdict", "Warnings", "What", "Prediction"]
+    assert only.verdict is not None
+    assert [row[0].words for row in only.verdict.rows] == [one.axis for one in validation().verdict]
 
 
 def test_the_warnings_tell_what_is_wrong_with_the_logs() -> None:
@@ -208,19 +216,19 @@ def test_every_part_is_there() -> None:
     report = compose(fit(), validation(), modes=modes())
     assert [section.identifier for section in report.sections] == [
         "verdict",
-        "asked",
-        "data",
-        "parameters",
-        "comparison",
         "prediction",
-        "residuals",
+        "parameters",
         "sight",
-        "hover",
+        "residuals",
         "innovations",
-        "noise",
+        "hover",
+        "data",
         "meanings",
-        "versions",
+        "made",
+        "words",
     ]
+    assert all(section.folded and section.title.endswith("?") for section in report.sections)
+    assert "comparison" in [section.identifier for section in compose(fit(), modes=modes()).sections]
     identifiers = [figure.identifier for figure in report.figures]
     assert len(identifiers) == len(set(identifiers))
     for figure in report.figures:
@@ -256,16 +264,34 @@ def test_examples_that_overlap_are_not_drawn_over_each_other() -> None:
     assert [example.start for example in chosen] == [2.0, 6.0, 9.0, 13.0]
 
 
-def test_every_horizon_says_what_its_scores_stand_beside() -> None:
+def test_every_judged_channel_says_what_its_fit_stands_beside() -> None:
     (section,) = (s for s in compose(None, validation(), modes=modes()).sections if s.identifier == "prediction")
-    beside = [b for b in section.blocks if isinstance(b, Table) and "stand beside" in b.caption]
-    assert len(beside) == len(HORIZONS)
-    cells = {row[0].words: [cell.words for cell in row] for row in beside[0].rows}
-    assert cells["psi"][9] == "refused"
-    assert cells["phi"][9] != "refused"
-    assert "No ceiling" in cells["psi"][-1]
+    (beside,) = (b for b in section.blocks if isinstance(b, Table) and "stand beside" in b.caption)
+    cells = {row[0].words: [cell.words for cell in row] for row in beside.rows}
+    assert {name: row[1] for name, row in cells.items()} == {n: f"{at:g}" for n, at in JUDGED_AT.items() if n in cells}
+    assert cells["psi"][-1] == "refused"
+    assert cells["phi"][-1] != "refused"
     without = compose(None, replace(validation(), floors=()), modes=modes())
     assert not any("stand beside" in getattr(b, "caption", "") for s in without.sections for b in s.blocks)
+
+
+def test_the_same_inputs_are_drawn_once() -> None:
+    report = compose(fit(), validation(), modes=modes())
+    panels = [
+        json.dumps([[t.get("x"), t.get("y")] for t in figure.spec["data"] if t.get("xaxis", "x") == axis])
+        for figure in report.figures
+        for axis in {t.get("xaxis", "x") for t in figure.spec["data"]}
+    ]
+    assert len(panels) == len(set(panels))
+
+
+def test_words_of_the_page_are_explained_and_no_others() -> None:
+    (words,) = (s for s in compose(fit(), validation(), modes=modes()).sections if s.identifier == "words")
+    (table,) = (block for block in words.blocks if isinstance(block, Table))
+    told = {row[0].words for row in table.rows}
+    assert {"ceiling", "fit", "prior share", "residual", "σ"} <= told
+    assert "disc margin" not in told
+    assert told <= set(TERMS)
 
 
 def test_tables_refuse_ragged_rows() -> None:
@@ -315,14 +341,17 @@ def test_what_the_first_seconds_told_is_shown_and_a_wind_nobody_asked_for_is_not
     assert noise_told({"wind": 0.1, "speed": 0.2}) == {"wind": 0.1, "speed": 0.2}
 
 
-def test_theils_best_is_bold_by_itself_and_residuals_are_in_units_that_can_be_read() -> None:
-    report = compose(fit(), validation(), modes=modes())
+def test_the_best_predictor_is_bold_and_residuals_are_in_units_that_can_be_read() -> None:
+    seen = validation()
+    report = compose(fit(), seen, modes=modes())
     tables = [block for section in report.sections for block in section.blocks if isinstance(block, Table)]
-    for table in (t for t in tables if t.caption.startswith("Prediction")):
-        count = table.groups[-1][1]
-        for row in table.rows:
-            theil = {float(c.words): c.strong for c in row[-count:] if c.words != "–"}
-            assert theil[min(theil)]
+    (fits,) = (table for table in tables if table.caption == "Fit [%] of every predictor")
+    scores = {(s.channel, s.predictor): s.fit for s in seen.scores if s.horizon == HORIZONS[0]}
+    at = [k for k, name in enumerate(fits.columns) if name == f"{HORIZONS[0]:g} s"]
+    rated = [p for p in PREDICTORS if p != "hold"]
+    for row in fits.rows:
+        best = max(0.0, *(scores[row[0].words, p] for p in rated))
+        assert [row[k].strong for k in at] == [scores[row[0].words, p] == best for p in rated]
     residuals = next(figure for figure in report.figures if figure.identifier == "residual-time")
     told = [value["title"]["text"] for key, value in residuals.spec["layout"].items() if key.startswith("yaxis")]
     assert told[0] in ("x [m]", "x [mm]")

@@ -45,8 +45,8 @@ def test_its_fit_has_both_bounds_and_says_what_it_cannot_see() -> None:
 
 def test_its_fit_is_reported(tmp_path: Path) -> None:
     page = sp.report(_fit(), path=tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Flight against model" in page
-    assert "Residuals" in page
+    assert "Does it follow the flight it was fitted to?" in page
+    assert "Is what is left over only noise?" in page
     assert page.count("σ corrected") > 0
 
 

@@ -71,7 +71,7 @@ def test_what_a_band_says() -> None:
     found = bands({0.5: [_record(0.5)]})
     band = next(one for one in found if (one.channel, one.promised) == ("p", 95.0))
     assert band.words.startswith(f"p, 0.5 s ahead: the 95 % band holds {band.held:.0f} % ({band.low:.0f} to ")
-    assert "neither the model nor gusts as in the flights of its fit explain" in band.words
+    assert "this motion is larger than the model and the gusts of its fit explain" in band.words
     assert in_brief(found, 0.5).startswith("Bands 0.5 s ahead. Too narrow: ")
     half, most = next(pair for pair in pairs(found) if pair[0].channel == "p")
     cells = [cell(half, most) for _, cell in ROWS]
@@ -86,11 +86,11 @@ def test_a_band_that_is_too_narrow_says_by_how_much_and_no_other(width: float, w
     p = next(band for band in found if band.channel == "p")
     assert p.off == pytest.approx(1.0 / width, rel=0.1)
     if warned:
-        assert f"the 95 % band holds {p.held:.0f} % [" in p.warning
-        assert f"errors are {p.off:.1f} times what it allows for" in p.warning
+        assert f"do not trust the 95 % band. It holds {p.held:.0f} % of the flight [" in p.warning
+        assert f"errors are {p.off:.1f} times as large as it says." in p.warning
         alone = next(b for b in bands({0.5: [_record(width, share=0.0)]}) if (b.channel, b.promised) == ("p", SURE))
-        assert "as if the model's numbers were known" in alone.warning
-        assert in_brief([alone], 0.5, drawn=False).startswith("Bands 0.5 s ahead by the model alone")
+        assert "How sure the model's numbers are is not in it" in alone.warning
+        assert in_brief([alone], 0.5, drawn=False).startswith("Bands 0.5 s ahead (how sure the model")
     else:
         assert in_brief(found, 0.5, drawn=False) == ""
 
@@ -118,7 +118,7 @@ def test_bands_are_widened_by_first_seconds_that_are_missed_and_only_by_chance_o
 def test_what_was_widened_is_told() -> None:
     assert widened_words(bands({0.5: [_record(1.0)]})) == ""
     words = widened_words(bands({0.5: [_record(1.0), _record(1.0, wider=2.5)]}))
-    assert "by what the first seconds were missed: r 2.5 times" in words
+    assert "were larger: r 2.5 times" in words
 
 
 def test_draws_that_leave_no_whole_number_of_paths_outside_are_refused() -> None:

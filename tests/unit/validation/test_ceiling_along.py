@@ -89,7 +89,7 @@ def test_the_truth_is_at_its_ceiling_and_a_spoilt_model_is_short_of_it() -> None
     assert good.floors[0].reached
     assert not spoilt.floors[0].reached
     assert spoilt.floors[0].gap_low > 5.0
-    assert "the model is short of it" in repr(spoilt)
+    assert "a better model is possible" in repr(spoilt)
 
 
 def test_within_a_band_whose_filters_look_ahead_there_is_no_ceiling() -> None:

@@ -83,10 +83,10 @@ def test_the_truth_is_at_the_ceiling_and_a_spoilt_model_is_short_of_it() -> None
     good, spoilt = (_floor(record, _model(record, gain=gain)) for gain in (1.0, -0.5))
     assert good.ceiling == spoilt.ceiling > 60.0
     assert good.reached
-    assert "at the ceiling" in good.words
+    assert "The model is as good as the ceiling" in good.words
     assert not spoilt.reached
     assert spoilt.gap_low > 5.0
-    assert spoilt.words.endswith(f"the ceiling is {spoilt.ceiling:.0f} %: the model is short of it.")
+    assert spoilt.words.endswith(f"The ceiling is {spoilt.ceiling:.0f} %: a better model is possible.")
     assert good.rms < 0.5 * spoilt.rms
     assert good.moved == spoilt.moved
 
@@ -139,8 +139,7 @@ def test_a_flight_that_nothing_moves_has_a_low_ceiling_and_says_so() -> None:
     found = _floor(record, level)
     assert found.ceiling < 45.0  # the mean of noise is nearer than its last value: 29 %
     assert found.reached
-    assert "motion is small beside what cannot be predicted" in found.words
-    assert "even the ceiling reaches" in found.words
+    assert "cannot be predicted from what was recorded: even the ceiling is a fit of" in found.words
 
 
 def test_a_record_that_is_too_short_has_no_ceiling_and_no_interval() -> None:
@@ -243,10 +242,10 @@ def _beside(fit: float, reach: float) -> Floor:
 @pytest.mark.parametrize(
     ("fit", "reach", "level", "words"),
     [
-        (12.0, 14.0, "cannot be judged", "even the ceiling reaches 14 %"),
-        (12.0, 70.0, "poor", "the model is short of it"),
-        (36.0, 38.0, "usable", "even the ceiling reaches 38 %"),
-        (72.0, 74.0, "good", "at the ceiling (74 %)"),
+        (12.0, 14.0, "cannot be judged", "even the ceiling is a fit of 14 %"),
+        (12.0, 70.0, "poor", "a better model is possible"),
+        (36.0, 38.0, "usable", "even the ceiling is a fit of 38 %"),
+        (72.0, 74.0, "good", "as good as the ceiling (74 %)"),
     ],
 )
 def test_the_verdict_says_whether_the_model_or_the_flight_is_poor(
@@ -262,6 +261,13 @@ def test_the_verdict_says_whether_the_model_or_the_flight_is_poor(
 
 def test_a_loss_to_the_past_is_no_proof_against_a_model_on_commands_that_answer() -> None:
     lost = replace(_beside(12.0, 70.0), ceiling=float("nan"), past=66.0, leak=14.0, refused="inputs answer")
-    assert "The past alone predicts 66 %: on commands that answer the motion it may beat a model that is" in lost.words
+    assert "The past alone has a fit of 66 %; where a controller's commands answer the motion" in lost.words
     assert "The model is poor" not in lost.words
-    assert "The model is poor: the past alone predicts 66 %" in replace(lost, leak=3.0).words
+    assert "The model is poor: the past alone has a fit of 66 %" in replace(lost, leak=3.0).words
+
+
+def test_a_model_beyond_the_ceiling_is_not_told_that_its_motion_cannot_be_predicted() -> None:
+    better = _beside(55.0, 39.0).words
+    assert "The model is better than the regression that is the ceiling (39 %)." in better
+    assert "cannot be predicted" not in better
+    assert "cannot be predicted" in _beside(37.0, 39.0).words

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
@@ -289,17 +290,36 @@ def decibel(h: Any) -> Any:
         return 20.0 * np.log10(np.abs(h))
 
 
-def unwrapped_degrees(h: Complex) -> Array:
+def unwrapped_degrees(h: Complex, *, coherent: NDArray[np.bool_] | None = None) -> Array:
     """Phase [deg] without jumps of whole turns; NaN stay NaN and do not break the count of turns.
 
     The first line lies between -270 and +90 degrees, where a lag is expected.
+
+    Args:
+        h: shape (lines,).
+        coherent: lines that count the turns, shape (lines,); noise between them adds none. None: all.
     """
-    phase = np.full(h.shape, np.nan)
     known = np.isfinite(h)
-    if known.any():
-        degrees = np.degrees(np.unwrap(np.angle(h[known])))
-        phase[known] = degrees - (360.0 if degrees[0] > 90.0 + 1e-9 else 0.0)
+    counting = known if coherent is None or not (known & coherent).any() else known & coherent
+    phase = np.full(h.shape, np.nan)
+    if counting.any():
+        degrees = np.degrees(np.unwrap(np.angle(h[counting])))
+        phase[counting] = degrees - (360.0 if degrees[0] > 90.0 + 1e-9 else 0.0)
+        others = known & ~counting
+        phase[others] = turned_beside(np.degrees(np.angle(h)), phase)[others]
     return phase
+
+
+def turned_beside(phase: Array, reference: Array) -> Array:
+    """A phase [deg] with the whole turns that bring each line nearest to a reference, shapes (lines,).
+
+    Where the reference is NaN, its value at the nearest lines that have one counts.
+    """
+    known = np.flatnonzero(np.isfinite(reference))
+    if known.size == 0:
+        return phase
+    whole = np.interp(np.arange(phase.size), known, reference[known])
+    return np.asarray(phase + 360.0 * np.round((whole - phase) / 360.0))
 
 
 def _polar(h: Complex, before: str = "") -> dict[str, Any]:

@@ -17,6 +17,7 @@ from swashplate.identification.responses.frequency_response import (
     decibel,
     unwrapped_degrees,
 )
+from swashplate.reporting.figures_responses import beside_model
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import BLACK, FLIGHT, GREY, MODEL, axis, base_layout, line, phase_ticks
 
@@ -142,7 +143,7 @@ def bode_matrix(rows: Sequence[Sequence[Pair | None]], *, identifier: str = "bod
                 top -= high + _BETWEEN
             upper = layout[f"yaxis{numbers[0]}"]["domain"][1]
             layout["annotations"].append(_heading(f"{pair.output} / {pair.input}", left, upper))
-            layout[f"yaxis{numbers[1]}"] |= phase_ticks(unwrapped_degrees(pair.response))
+            layout[f"yaxis{numbers[1]}"] |= phase_ticks(_phase(pair))
             layout[f"yaxis{numbers[2]}"]["range"] = [0, 1.02]
             traces += _traces(pair, numbers)
     cells = [pair for row in rows for pair in row if pair is not None]
@@ -187,9 +188,17 @@ def _keys(cells: Sequence[Pair]) -> tuple[Key, ...]:
     return tuple(keys)
 
 
+def _phase(pair: Pair) -> Array:
+    """The flight's phase [deg] without jumps of whole turns, beside the model's where there is one."""
+    phase = unwrapped_degrees(pair.response, coherent=pair.coherence >= LEAST_COHERENCE)
+    if pair.model is None:
+        return phase
+    return beside_model(phase, pair.omega, pair.model.omega, unwrapped_degrees(pair.model.response))
+
+
 def _traces(pair: Pair, numbers: Sequence[str]) -> list[dict[str, Any]]:
     hertz = pair.omega / TWO_PI
-    gain, phase = np.asarray(decibel(pair.response)), unwrapped_degrees(pair.response)
+    gain, phase = np.asarray(decibel(pair.response)), _phase(pair)
     good = pair.coherence >= LEAST_COHERENCE
     near = np.concatenate([[True], good, [True]])
     beside = ~good | ~near[:-2] | ~near[2:]  # grey lines reach the black ones and do not run below them
@@ -215,12 +224,7 @@ def _traces(pair: Pair, numbers: Sequence[str]) -> list[dict[str, Any]]:
         traces.append(line(hertz, np.where(good, values, np.nan), name=name, color=BLACK, axis=n, hover=hover))
     if pair.model is not None:
         omega, answer = pair.model.omega, pair.model.response
-        turned, known = unwrapped_degrees(answer), np.isfinite(phase)
-        if known.any():  # the model's count of turns is the flight's where they meet
-            inside = (omega >= pair.omega[known][0]) & (omega <= pair.omega[known][-1])
-            apart = np.interp(omega[inside], pair.omega[known], phase[known]) - turned[inside]
-            turned = turned + 360.0 * np.round(np.nanmedian(apart) / 360.0) if inside.any() else turned
-        for n, values in zip(numbers, (np.asarray(decibel(answer)), turned), strict=False):
+        for n, values in zip(numbers, (np.asarray(decibel(answer)), unwrapped_degrees(answer)), strict=False):
             traces.append(
                 line(
                     omega / TWO_PI,
