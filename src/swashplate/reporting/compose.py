@@ -8,6 +8,7 @@ from typing import Any
 
 from swashplate.errors import SwashError
 from swashplate.identification.core.result import Result
+from swashplate.identification.estimators import GAINS
 from swashplate.reporting import sections_data, sections_fit, sections_prior, sections_sight, sections_validation
 from swashplate.reporting.figures_validation import key_picture
 from swashplate.reporting.glossary import PARAMETERS
@@ -46,7 +47,7 @@ def compose(
     at_hover, problems = (modes, []) if modes is not None else hover_modes(fit, validation)
     hover = sections_sight.hover(at_hover, problems)
     seen = fit is not None and fit.in_time
-    one_step = seen and fit.method == "prediction-error" and validation is not None
+    one_step = seen and GAINS.get(fit.method, "none") != "none" and validation is not None
     parts: list[Section | None] = [
         sections_validation.verdict(validation) if validation else None,
         sections_validation.prediction(validation) if validation else None,
