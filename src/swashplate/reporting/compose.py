@@ -46,8 +46,8 @@ def compose(
         raise SwashError("there is nothing to report: neither a fit nor a validation was given.")
     at_hover, problems = (modes, []) if modes is not None else hover_modes(fit, validation)
     hover = sections_sight.hover(at_hover, problems)
-    seen = fit is not None and fit.in_time
-    one_step = seen and GAINS.get(fit.method, "none") != "none" and validation is not None
+    seen = fit if fit and fit.in_time else None
+    one_step = seen is not None and GAINS.get(seen.method, "none") != "none" and validation is not None
     parts: list[Section | None] = [
         sections_validation.verdict(validation) if validation else None,
         sections_validation.prediction(validation) if validation else None,
@@ -55,9 +55,9 @@ def compose(
         sections_prior.prior(fit) if fit else None,
         sections_sight.sight(fit) if fit else None,
         # One sample ahead any model lies on the flight: where a flight is predicted, that is what is looked at.
-        sections_fit.comparison(fit) if seen and not one_step else None,
+        sections_fit.comparison(seen) if seen and not one_step else None,
         verification_section(verification) if verification else None,
-        sections_fit.residuals(fit) if seen else None,
+        sections_fit.residuals(seen) if seen else None,
         sections_validation.innovations(validation) if validation and validation.innovations else None,
         hover,
         sections_data.data(fit, validation),
