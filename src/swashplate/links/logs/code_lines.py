@@ -128,42 +128,57 @@ def tracked(read: Read, channels: Sequence[str], *, whole: bool) -> Code:
 
 
 def identified(
-    read: Read,
-    part: tuple[float, float],
-    chosen: tuple[str, str, str],
+    parts: Sequence[tuple[Read, float, float]],
+    chosen: Sequence[tuple[str, str, str]],
+    references: Sequence[str],
     band: tuple[float, float],
-    seen: tuple[Read, float, float],
+    seen: Sequence[tuple[Read, float, float, bool]],
     *,
-    gains: bool,
-    unseen: bool,
+    gains: Sequence[bool],
 ) -> Code:
-    """From a sweep to gains; `chosen` are input, output and reference, `seen` what the model is flown along.
+    """From sweeps to gains, axis by axis.
 
-    `unseen`: whether the fit has not seen that; else the lines say so.
+    Args:
+        parts: of the logs that are fitted. chosen: input, output and reference of each axis.
+        seen: what each axis' model is flown along, and whether the fit has not seen that; else the lines say so.
+        gains: whether gains are asked for, by axis.
     """
-    moved, answer, reference = chosen
-    other, start, stop = seen
-    shell = [
-        f"swash respond {read.named(*part)} --inputs {moved} --outputs {answer}"
-        + (f" --references {reference}" if reference else "")
-        + f" --band {band[0]:g}-{band[1]:g} --out responses {read.words}".rstrip(),
-        f"swash fit-tf responses --input {moved}{' --gains' if gains else ''} --hold-out {other.named(start, stop)}"
-        + f" --out study {other.words}".rstrip(),
-    ]
-    called = "unseen" if unseen else "fitted"
-    said = [] if unseen else ["# The fit has seen this stretch: it verifies nothing."]
-    names = [moved, answer, *([reference] if reference else [])]
-    references = f"references=[{reference!r}], " if reference else ""
-    lines = [
-        IMPORT,
-        read.python(),
-        f"records = sp.uniform_records(flight.between({part[0]:.10g}, {part[1]:.10g}), {names!r})",
-        f"responses = sp.respond(records, inputs=[{moved!r}], outputs=[{answer!r}], {references}band={band!r})",
-        other.python("other"),
-        *said,
-        f"{called} = other.between({start:.10g}, {stop:.10g})",
-        f"study = sp.fit_tf(responses, input={moved!r}, gains={gains}, hold_out={called})",
-        "print(study)",
-        'study.save("study")',
-    ]
-    return Code(f"Identify {answer} / {moved}", "\n".join([shell[0], *said, *shell[1:]]), "\n".join(lines))
+    inputs, outputs = ([one[k] for one in chosen] for k in (0, 1))
+    told = "# The fit has seen this stretch: it verifies nothing."
+    reads: list[Read] = []
+    for read, *_ in parts:
+        reads += [read] if read not in reads else []
+    words = " ".join(dict.fromkeys(read.words for read in reads if read.words))
+    logs = " ".join(read.named(start, stop) for read, start, stop in parts)
+    asked = f"--inputs {','.join(inputs)} --outputs {','.join(outputs)}"
+    given = f" --references {','.join(references)}" if references else ""
+    shell = [f"swash respond {logs} {asked}{given} --band {band[0]:g}-{band[1]:g} --out responses {words}".rstrip()]
+    names, lines = [*inputs, *outputs, *references], [IMPORT]
+    flights = ["flight" if len(reads) == 1 else f"flight_{k + 1}" for k in range(len(reads))]
+    lines += [read.python(name) for read, name in zip(reads, flights, strict=True)]
+    pieces = [f"{flights[reads.index(read)]}.between({start:.10g}, {stop:.10g})" for read, start, stop in parts]
+    listed = pieces[0] if len(pieces) == 1 else f"[{', '.join(pieces)}]"
+    lines.append(f"records = sp.uniform_records({listed}, {names!r})")
+    given = f"references={list(references)!r}, " if references else ""
+    lines.append(f"responses = sp.respond(records, inputs={inputs!r}, outputs={outputs!r}, {given}band={band!r})")
+    for k, ((moved, answer, _), (other, start, stop, unseen), wanted) in enumerate(
+        zip(chosen, seen, gains, strict=True)
+    ):
+        end = "" if len(chosen) == 1 else f"-{answer}"
+        one = f" --outputs {answer}" if len(chosen) > 1 else ""
+        shell += [] if unseen else [told]
+        shell.append(
+            f"swash fit-tf responses --input {moved}{one}{' --gains' if wanted else ''} "
+            f"--hold-out {other.named(start, stop)} --out study{end} {other.words}".rstrip()
+        )
+        stretch, study = "unseen" if unseen else "fitted", "study" if len(chosen) == 1 else f"study_{k + 1}"
+        lines += [other.python("other"), *([] if unseen else [told])]
+        lines += [
+            f"{stretch} = other.between({start:.10g}, {stop:.10g})",
+            f"{study} = sp.fit_tf(responses, input={moved!r}, outputs=[{answer!r}], gains={wanted}, "
+            f"hold_out={stretch})",
+            f"print({study})",
+            f'{study}.save("study{end}")',
+        ]
+    title = ", ".join(f"{answer} / {moved}" for moved, answer, _ in chosen)
+    return Code(f"Identify {title}", "\n".join(shell), "\n".join(lines))

@@ -189,7 +189,9 @@ class Desk:
             others = [log for log in self._logs.values() if log is not opened and log.state == READY]
 
         def work(folder: Path, tell: Tell) -> Identified:
-            return identify_sweep(opened, inspection.sweeps[sweep], chosen, others=others, folder=folder, tell=tell)
+            one = inspection.sweeps[sweep]
+            own = bool(input or output)
+            return identify_sweep(opened, one, chosen, others=others, folder=folder, tell=tell, alone_only=own)
 
         return {"number": self.job.start(work), "channels": chosen._asdict()}
 

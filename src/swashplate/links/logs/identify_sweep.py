@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,11 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import Sweep
 from swashplate.flights.schema import channel
 from swashplate.links.logs import code_lines
-from swashplate.links.logs.hold_out import Part, hold_out, part_of
+from swashplate.links.logs.alone import alone
+from swashplate.links.logs.hold_out import Part, hold_out
 from swashplate.links.logs.opened import Opened
 from swashplate.links.logs.sweep_channels import Channels
+from swashplate.links.logs.sweep_set import Swept, together
 from swashplate.public import resolve
 
 Make = Callable[[], Path]
@@ -43,48 +46,110 @@ class Identified:
 
 
 def identify_sweep(
-    opened: Opened, sweep: Sweep, chosen: Channels, *, others: Sequence[Opened], folder: Path, tell: Tell
+    opened: Opened,
+    sweep: Sweep,
+    chosen: Channels,
+    *,
+    others: Sequence[Opened],
+    folder: Path,
+    tell: Tell,
+    alone_only: bool = False,
 ) -> Identified:
-    """Responses, transfer function, verification in time, gains with their answers, and the files.
+    """Responses, transfer functions, verification in time, gains with their answers, and the files.
+
+    Sweeps of other inputs, in the log or in others of the same vehicle, are estimated together with the one asked for.
 
     Args:
-        opened: the log of the sweep. others: logs that may serve for the verification.
-        chosen: input, output and reference.
+        opened: the log of the sweep. others: logs that may join, or serve for the verification.
+        chosen: input, output and reference. alone_only: leave sweeps of other inputs out.
         folder: for the files.
         tell: hears the steps.
 
     Raises:
         SwashError: where a verb refuses; its words say why.
     """
-    flight = opened.ready
-    tell("bringing the sweep to one rate", 0.02)
-    start, stop = part_of(flight, sweep)
-    names = [chosen.input, chosen.output, *([chosen.reference] if chosen.reference else [])]
-    records = resolve("uniform_records")(flight.between(start, stop), names)
-    tell("computing the frequency response", 0.08)
-    band = (float(f"{sweep.low:.3g}"), float(f"{sweep.high:.3g}"))
-    references = [chosen.reference] if chosen.reference else []
+    tell("bringing the sweeps to one rate", 0.02)
+    swept = together(opened, sweep, chosen, [] if alone_only else others)
+    swept = swept[:1] if alone_only else swept
+    inputs, outputs = ([one.chosen[k] for one in swept] for k in (0, 1))
+    shared = all(one.chosen.reference == chosen.reference for one in swept)
+    references = [chosen.reference] if chosen.reference and shared else []
+    names = [*inputs, *outputs, *references]
+    records = [list(resolve("uniform_records")(one.part, names)) for one in swept]
+    tell("computing the frequency responses", 0.08)
+    band = (_digits(min(one.sweep.low for one in swept)), _digits(max(one.sweep.high for one in swept)))
     responses = resolve("respond")(
-        records, inputs=[chosen.input], outputs=[chosen.output], references=references, band=band
+        [record for each in records for record in each],
+        inputs=inputs,
+        outputs=outputs,
+        references=references,
+        band=band,
     )
-    tell("fitting transfer functions", 0.15)
-    seen = hold_out(opened, sweep, chosen.input, chosen.output, others)
+    axes, studies, seen = [], [], []
+    for k, one in enumerate(swept):
+        begin, width = 0.12 + 0.73 * k / len(swept), 0.73 / len(swept)
 
-    def say(what: str, *, done: float = 0.0, total: float | None = None, note: str = "") -> None:
-        tell(f"{what}, structure {done + 1:.0f} of {total:.0f}" if total else what, 0.15 + 0.65 * done / (total or 1e9))
+        def say(
+            what: str,
+            *,
+            done: float = 0.0,
+            total: float | None = None,
+            note: str = "",
+            begin: float = begin,
+            width: float = width,
+            about: str = one.chosen.output,
+        ) -> None:
+            doing = f"{about}: {what}, structure {done + 1:.0f} of {total:.0f}" if total else f"{about}: {what}"
+            tell(doing, begin + width * done / (total or 1e9))
 
-    study, gained = _study(responses, chosen, seen.flight.between(seen.start, seen.stop), say)
-    tell("closing the loop with the gains", 0.85)
-    stretch = (seen.read, seen.start, seen.stop)
+        held = hold_out(one.opened, one.sweep, one.chosen.input, one.chosen.output, others)
+        study, gained = _study(responses, one.chosen, held.flight.between(held.start, held.stop), say)
+        axes.append(_axis(one, responses, study, held, gained))
+        if len(swept) > 1:
+            own = (_digits(one.sweep.low), _digits(one.sweep.high))
+            axes[-1]["alone"] = alone(records[k], one.chosen, responses, band=own, form=axes[-1]["fit"]["form"])
+        studies.append(study)
+        seen.append(held)
+    tell("closing the loops with the gains", 0.88)
     code = code_lines.identified(
-        opened.read, (start, stop), chosen, band, stretch, gains=not gained, unseen=seen.unseen
+        [(one.opened.read, one.start, one.stop) for one in swept],
+        [one.chosen for one in swept],
+        references,
+        band,
+        [(held.read, held.start, held.stop, held.unseen) for held in seen],
+        gains=[axis["no_gains"] == "" for axis in axes],
     )
+    files = _files(studies, [one.chosen.output for one in swept], responses, records, swept, folder)
     document = {
-        "words": str(sweep),
-        "input": chosen.input,
-        "output": chosen.output,
-        "reference": chosen.reference,
-        "bode": _bode(responses, study, chosen),
+        "words": " ".join(f"{one.sweep}." for one in swept),
+        "joined": _joined(swept),
+        "axes": axes,
+        "code": code.as_dict(),
+        "files": list(files),
+    }
+    return Identified(document, files)
+
+
+def _digits(frequency: float) -> float:
+    return float(f"{frequency:.3g}")
+
+
+def _joined(swept: Sequence[Swept]) -> str:
+    if len(swept) == 1:
+        return ""
+    logs = list(dict.fromkeys(one.opened.read.file for one in swept))
+    where = f"of {len(logs)} logs ({', '.join(logs)})" if len(logs) > 1 else "of this log"
+    return f"The sweeps of {' and '.join(one.chosen.input for one in swept)} {where} are estimated together."
+
+
+def _axis(one: Swept, responses: Any, study: Any, held: Part, gained: str) -> dict[str, Any]:
+    """What the page shows of one axis."""
+    refused = [_refused(suggestion) for suggestion in study.material.gains]
+    return {
+        "input": one.chosen.input,
+        "output": one.chosen.output,
+        "reference": one.chosen.reference,
+        "bode": _bode(responses, study, one.chosen),
         "fit": _fit(study),
         "warnings": [
             *responses.warnings,
@@ -92,19 +157,17 @@ def identify_sweep(
             *study.remarks,
             *(study.fit.warnings if study.fit else ()),
         ],
-        "verification": _verified(study, chosen, seen),
+        "verification": _verified(study, one.chosen, held),
         "gains": [_gains(suggestion) for suggestion in study.material.gains if not suggestion.refused],
-        "no_gains": " ".join(filter(None, (gained, *(_refused(one) for one in study.material.gains)))),
-        "code": code.as_dict(),
+        "no_gains": " ".join(filter(None, (gained, *refused))),
+        "alone": None,
     }
-    files = _files(study, responses, records[0], flight.between(start, stop), folder)
-    return Identified({**document, "files": list(files)}, files)
 
 
 def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., None]) -> tuple[Any, str]:
     """The fit with its verification and gains, and why there are no gains where there are none."""
     fit_tf = resolve("fit_tf")
-    study = fit_tf(responses, input=chosen.input, say=say)
+    study = fit_tf(responses, input=chosen.input, outputs=[chosen.output], say=say)
     form = str(study.material.transfer_functions[0].details.form.text)
     band = study.fit.settings.get("band_hz")
     held = (part,) if study.structure is not None else ()
@@ -114,7 +177,9 @@ def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., No
     except SwashError as error:
         words, gains = f"{error.problem} {error.hint or ''}", False
     # Once more with the form that was chosen: the same fit, with what is asked of it.
-    made = fit_tf(responses, input=chosen.input, form=form, band=band, gains=gains, hold_out=held)
+    made = fit_tf(
+        responses, input=chosen.input, outputs=[chosen.output], form=form, band=band, gains=gains, hold_out=held
+    )
     made = replace(made, material=replace(made.material, transfer_functions=(study.fit,)))
     return made, words
 
@@ -220,36 +285,49 @@ def _gains(suggestion: Any) -> dict[str, Any]:
     return {"axis": suggestion.axis, "rows": rows, "words": words, **answers}
 
 
-def _files(study: Any, responses: Any, record: Flight, part: Flight, folder: Path) -> dict[str, Make]:
-    """Everything to take away, by the name of its file; each is made when it is asked for."""
-    place = folder / "study"
+def _files(
+    studies: Sequence[Any],
+    called: Sequence[str],
+    responses: Any,
+    records: Sequence[Sequence[Flight]],
+    swept: Sequence[Swept],
+    folder: Path,
+) -> dict[str, Make]:
+    """Everything to take away, by the name of its file; each is made when it is asked for. Of several axes each has
+    its own, called by its output."""
 
-    def saved(name: str) -> Path:
+    def saved(study: Any, place: Path, name: str) -> Path:
         if not place.exists():
             study.save(place)
         return place / name
 
     def parameters() -> Path:
-        lines = [f"{name},{value:.6g}" for g in study.material.gains for name, value in g.parameters.items()]
+        gains = [one for study in studies for one in study.material.gains]
+        lines = [f"{name},{value:.6g}" for one in gains for name, value in one.parameters.items()]
         return write_text(folder / "gains.param", "\n".join(lines) + "\n")
-
-    def table() -> Path:
-        return write_csv(record, folder / "sweep.csv")[0]
-
-    def recording() -> Path:
-        (content,) = resolve("export_flight")(part, name="sweep").files.values()
-        return write_bytes(folder / "sweep.mcap", content)
 
     def measured() -> Path:
         responses.save(folder / "responses.nc")
         return folder / "responses.nc"
 
-    files: dict[str, Make] = {"report.html": lambda: saved("report.html")}
-    if any(g.parameters for g in study.material.gains):
+    def table(k: int, name: str) -> Path:
+        return write_csv(records[k][0], folder / name)[0]
+
+    def recording(k: int, name: str) -> Path:
+        (content,) = resolve("export_flight")(swept[k].part, name="sweep").files.values()
+        return write_bytes(folder / name, content)
+
+    files: dict[str, Make] = {}
+    if any(one.parameters for study in studies for one in study.material.gains):
         files["gains.param"] = parameters
-    if study.structure is not None:
-        files["model.toml"] = lambda: saved("model.toml")
-    if study.verification is not None:
-        files["verification.json"] = lambda: saved("verification.json")
-    files |= {"fit.json": lambda: saved("fit.json"), "responses.nc": measured, "sweep.csv": table}
-    return files | {"sweep.mcap": recording}
+    for k, study in enumerate(studies):
+        end = f"-{called[k]}" if len(studies) > 1 else ""
+        place = folder / f"study{end}"
+        wanted = {"report": "report.html", "fit": "fit.json"}
+        wanted |= {"model": "model.toml"} if study.structure is not None else {}
+        wanted |= {"verification": "verification.json"} if study.verification is not None else {}
+        for stem, name in wanted.items():
+            files[f"{stem}{end}{Path(name).suffix}"] = partial(saved, study, place, name)
+        files[f"sweep{end}.csv"] = partial(table, k, f"sweep{end}.csv")
+        files[f"sweep{end}.mcap"] = partial(recording, k, f"sweep{end}.mcap")
+    return {**files, "responses.nc": measured}

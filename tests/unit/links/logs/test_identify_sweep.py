@@ -6,6 +6,7 @@ import functools
 import shlex
 import time as clock
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Desk, dict[
 
 
 def test_the_truth_is_recovered_and_gains_are_suggested(made: tuple[Desk, dict[str, Any], Path]) -> None:
-    _, result, _ = made
+    _, document, _ = made
+    (result,) = document["axes"]
+    assert document["joined"] == ""
     assert (result["input"], result["output"], result["reference"]) == ("mixer_roll", "p", "")
     values = {name: value for name, value, *_ in result["fit"]["rows"]}
     assert result["fit"]["form"] == "0/1"
@@ -96,9 +99,10 @@ def test_a_sweep_that_carries_no_gains_says_why_and_offers_no_file(tmp_path: Pat
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fit_tf, "suggest", functools.partial(suggest, forms=(Form.parse("0/1"),)))
         result = identify_sweep(log, sweep, chosen, others=[], folder=tmp_path, tell=lambda what, share: None)
-    assert result.document["gains"] == []
-    assert result.document["no_gains"].startswith("RLL: none: a positive mixer_roll turns p negative")
-    assert any("wrong sign" in text and "--unit mixer_roll=-1" in text for text in result.document["warnings"])
+    (axis,) = result.document["axes"]
+    assert axis["gains"] == []
+    assert axis["no_gains"].startswith("RLL: none: a positive mixer_roll turns p negative")
+    assert any("wrong sign" in text and "--unit mixer_roll=-1" in text for text in axis["warnings"])
     assert "gains.param" not in result.files
     assert "report.html" in result.files
     opened.close()
@@ -106,7 +110,7 @@ def test_a_sweep_that_carries_no_gains_says_why_and_offers_no_file(tmp_path: Pat
 
 def test_it_is_verified_on_the_doublets_that_the_fit_has_not_seen(made: tuple[Desk, dict[str, Any], Path]) -> None:
     _, result, _ = made
-    seen = result["verification"]
+    seen = result["axes"][0]["verification"]
     assert seen["unseen"]
     assert seen["on"].startswith("another part of the log, 4")
     assert min(seen["time"]) > 42.0
@@ -119,18 +123,18 @@ def test_the_copied_lines_give_the_same(made: tuple[Desk, dict[str, Any], Path])
     _, result, _ = made
     names: dict[str, Any] = {}
     exec(result["code"]["python"], names)
-    wanted = {name: value for name, value, *_ in result["fit"]["rows"]}
+    wanted = {name: value for name, value, *_ in result["axes"][0]["fit"]["rows"]}
     found = {row.name: row.value for row in names["study"].fit.estimates}
     assert found == pytest.approx(wanted, rel=1e-6)
     (suggestion,) = names["study"].material.gains
-    suggested = {name: after for name, _, after in result["gains"][0]["rows"]}
+    suggested = {name: after for name, _, after in result["axes"][0]["gains"][0]["rows"]}
     assert suggestion.parameters == pytest.approx(suggested, rel=1e-6)
 
 
 @pytest.mark.proof
 def test_the_copied_commands_give_the_same(made: tuple[Desk, dict[str, Any], Path]) -> None:
     _, result, folder = made
-    suggested = {name: after for name, _, after in result["gains"][0]["rows"]}
+    suggested = {name: after for name, _, after in result["axes"][0]["gains"][0]["rows"]}
     for line in result["code"]["shell"].splitlines():
         done = CliRunner().invoke(app, shlex.split(line)[1:])
         assert done.exit_code == 0, done.output
@@ -206,12 +210,49 @@ def test_a_part_in_which_only_another_input_was_moved_verifies_nothing(tmp_path:
     desk.close()
 
 
+def test_sweeps_of_two_axes_in_two_logs_are_estimated_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each axis shows what its input alone would have been worth: off, where the other command moved along."""
+    coupled(tmp_path / "roll.csv", "roll")
+    coupled(tmp_path / "pitch.csv", "pitch")
+    monkeypatch.chdir(tmp_path)
+    desk = Desk([(tmp_path / name, Read(name)) for name in ("roll.csv", "pitch.csv")])
+    desk.read_given()
+    roll, pitch = desk.log(1), desk.log(2)
+    for log, axis in ((roll, "roll"), (pitch, "pitch")):
+        sweep = Sweep(2.0, 22.0, axis, 0.3, 6.0, f"mixer_{axis}", "signal")
+        assert log.inspection is not None
+        log.inspection = replace(log.inspection, sweeps=(sweep,))
+    one = roll.inspection.sweeps[0]  # type: ignore[union-attr]
+    chosen = channels_of(roll.ready, one)
+    monkeypatch.setattr(fit_tf, "suggest", functools.partial(suggest, forms=(Form.parse("0/1"),)))
+    made = identify_sweep(roll, one, chosen, others=[pitch], folder=tmp_path, tell=lambda what, share: None)
+    result = made.document
+    assert [(axis["input"], axis["output"]) for axis in result["axes"]] == [("mixer_roll", "p"), ("mixer_pitch", "q")]
+    assert "of 2 logs (roll.csv, pitch.csv)" in result["joined"]
+    for axis in result["axes"]:
+        values = {name: value for name, value, *_ in axis["fit"]["rows"]}
+        assert values["K"] == pytest.approx(GAIN, rel=0.08)
+        assert axis["alone"]["decibels"] > 0.3
+        assert "alone gives J" in axis["alone"]["words"]
+    assert {"report-p.html", "report-q.html", "sweep-q.csv"} <= set(made.files)
+    names: dict[str, Any] = {}
+    exec(result["code"]["python"], names)
+    for k, axis in enumerate(result["axes"], 1):
+        values = {name: value for name, value, *_ in axis["fit"]["rows"]}
+        again = {row.name: row.value for row in names[f"study_{k}"].fit.estimates}
+        assert again == pytest.approx(values, rel=1e-6)
+    own = identify_sweep(
+        roll, one, chosen, others=[pitch], folder=tmp_path / "own", tell=lambda what, share: None, alone_only=True
+    )
+    assert len(own.document["axes"]) == 1
+    desk.close()
+
+
 @pytest.mark.parametrize("unseen", [True, False])
 def test_the_lines_say_whether_the_fit_has_seen_the_stretch(unseen: bool) -> None:
     log = Read("flight.csv")
-    code = identified(
-        log, (1.0, 23.0), ("mixer_roll", "p", ""), (0.3, 6.0), (log, 1.0, 23.0), gains=True, unseen=unseen
-    )
+    stretch = (log, 1.0, 23.0, unseen)
+    code = identified([(log, 1.0, 23.0)], [("mixer_roll", "p", "")], [], (0.3, 6.0), [stretch], gains=[True])
     for text in (code.python, code.shell):
         assert ("# The fit has seen this stretch: it verifies nothing." in text) is not unseen
     assert ("unseen = " in code.python) is unseen

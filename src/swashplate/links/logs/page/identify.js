@@ -47,12 +47,16 @@ function progress() {
   box.querySelector("span").textContent = `${last.doing}, ${Math.round(last.seconds ?? 0)} s`;
 }
 
+// Sweeps of several inputs are estimated together, whichever of them is asked for.
+const several = () => new Set(ready().flatMap((log) => log.sweeps.map((sweep) => sweep.axis))).size > 1;
+const WORDS = { one: "Identify this", all: "Identify with the others" };
+const verb = () => (several() ? WORDS.all : WORDS.one);
 const label = (sweep) => `${sweep.axis}, ${+sweep.low.toPrecision(3)} to ${+sweep.high.toPrecision(3)} Hz`;
 
 function list() {
   const rows = ready().flatMap((log) => log.sweeps.map((sweep) =>
     make("li", { class: "fine" }, make("b", {}, label(sweep)), make("div", { class: "soft" }, `${ready().length > 1 ? `${log.name}, ` : ""}${sweep.words.split(": ").slice(1).join(": ")}`),
-      make("button", { class: "first", "data-identify": `${log.id} ${sweep.number}`, disabled: last?.state === "running", onclick: () => begin_with(log, sweep) }, "Identify this"))));
+      make("button", { class: "first", "data-identify": `${log.id} ${sweep.number}`, disabled: last?.state === "running", onclick: () => begin_with(log, sweep) }, verb()))));
   if (rows.length) return make("ul", { class: "cards" }, ...rows);
   const waiting = ready().some((log) => !log.checked);
   return make("p", { class: "soft" }, waiting ? "Sweeps are being looked for …" : NO_SWEEP);
@@ -90,7 +94,7 @@ function show() {
 function shortcuts() {
   $("sweeps").replaceChildren(...ready().flatMap((log) => log.sweeps.map((sweep) =>
     make("div", { class: "sweep" }, make("span", {}, `Sweep ${label(sweep)}${ready().length > 1 ? ` (${log.name})` : ""}`),
-      make("button", { class: "first", onclick: () => begin_with(log, sweep) }, "Identify this")))));
+      make("button", { class: "first", onclick: () => begin_with(log, sweep) }, verb())))));
 }
 
 export function begin() {

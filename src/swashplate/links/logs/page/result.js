@@ -72,18 +72,34 @@ function fit(home, found) {
       make("tbody", {}, ...rows.map(([name, value, unit, share]) => make("tr", {}, make("td", {}, name), make("td", { class: "number" }, String(+value.toPrecision(4))), make("td", {}, unit), make("td", { class: "number" }, share === null ? "–" : share.toFixed(1)))))));
 }
 
-const FILES = { "gains.param": "Parameters", "report.html": "Report", "model.toml": "Model", "sweep.csv": "CSV", "sweep.mcap": "MCAP", "responses.nc": "Responses", "fit.json": "Fit", "verification.json": "Verification" };
+const FILES = { gains: "Parameters", report: "Report", model: "Model", sweep: "CSV", responses: "Responses", fit: "Fit", verification: "Verification" };
+
+function label(name, several) {
+  const [, stem, end, suffix] = /^([a-z]+)(?:-(\w+))?\.(\w+)$/.exec(name);
+  return `${suffix === "mcap" ? "MCAP" : FILES[stem]}${several && end ? ` ${end}` : ""}`;
+}
+
+const link = (name, several) =>
+  make("a", { class: "button plain", href: `/download/${name}`, ...(name.endsWith(".html") ? { target: "_blank", rel: "noopener" } : { download: name }), title: name }, label(name, several));
 
 export function result(home, found) {
-  const box = make("section", { class: "result", "data-result": `${found.output} / ${found.input}` });
+  const several = found.axes.length > 1, title = found.axes.map((axis) => `${axis.output} / ${axis.input}`).join(", ");
+  const first = found.files.filter((name) => /^(gains|report)/.test(name)), more = found.files.filter((name) => !first.includes(name));
+  const box = make("section", { class: "result", "data-result": title });
   home.append(box);
-  box.append(make("h2", {}, `${found.output} / ${found.input}`),
-    make("div", { class: "bar files" }, ...Object.keys(FILES).filter((name) => found.files.includes(name)).map((name) =>
-      make("a", { class: "button plain", href: `/download/${name}`, ...(name === "report.html" ? { target: "_blank", rel: "noopener" } : { download: name }), title: name }, FILES[name]))));
-  if (found.warnings.length) box.append(make("ul", { class: "plain" }, ...found.warnings.map((text) => make("li", { class: "warn" }, text))));
-  gains(box, found);
-  verification(box, found);
-  fit(box, found);
-  bode(box, found);
+  box.append(make("h2", {}, title), found.joined && make("p", { "data-joined": "" }, found.joined) || "",
+    make("div", { class: "bar files" }, ...first.map((name) => link(name, several))),
+    make("details", { class: "notes" }, make("summary", {}, "More files"), make("div", { class: "bar files" }, ...more.map((name) => link(name, several)))));
+  for (const axis of found.axes) {
+    const part = make("section", { class: "axis", "data-axis": axis.output });
+    box.append(part);
+    if (several) part.append(make("h2", {}, `${axis.output} / ${axis.input}`));
+    if (axis.alone) part.append(make("p", { class: "soft", "data-alone": "" }, axis.alone.words));
+    if (axis.warnings.length) part.append(make("ul", { class: "plain" }, ...axis.warnings.map((text) => make("li", { class: "warn" }, text))));
+    gains(part, axis);
+    verification(part, axis);
+    fit(part, axis);
+    bode(part, axis);
+  }
   box.append(make("h3", {}, "The same without this page"), block(found.code));
 }
