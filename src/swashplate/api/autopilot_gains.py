@@ -14,9 +14,15 @@ from swashplate.api.link import mapping_of
 from swashplate.atomic import write_text
 from swashplate.control.analysis.cascade_gains import CascadeGains, cascade_gains, judge_cascade
 from swashplate.control.analysis.gain_premises import refused_by_card
+from swashplate.control.analysis.rotorflight_gains import judge_rotorflight, rotorflight_gains
 from swashplate.control.controller_file import save_controller
 from swashplate.control.laws.ardupilot.law import FLIGHT_MODES, RATE_OF_LOOPS, ArduPilotLaw, FlightMode
 from swashplate.control.laws.ardupilot.parameters import RENAMED
+from swashplate.control.laws.rotorflight.law import MODES as ROTORFLIGHT_MODES
+from swashplate.control.laws.rotorflight.law import RATE_OF_LOOPS as ROTORFLIGHT_RATE
+from swashplate.control.laws.rotorflight.law import RotorflightLaw, RotorflightMode, rotorflight_law
+from swashplate.control.laws.rotorflight.parameters import DEFAULTS as ROTORFLIGHT_DEFAULTS
+from swashplate.control.laws.rotorflight.parameters import cli_dump
 from swashplate.errors import ControllerError, DivergenceError, SwashError
 from swashplate.identification.frequency.handling import delay_words
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, read_parameter_file, written_gains
@@ -34,12 +40,16 @@ from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.trim import Trim, trim
 from swashplate.text_table import text_table
 
-AutopilotName = Literal["ardupilot", "px4"]
+AutopilotName = Literal["ardupilot", "px4", "rotorflight"]
+FlownModeName = FlightMode | RotorflightMode
+CALLED: Mapping[AutopilotName, str] = {"ardupilot": "ArduPilot", "px4": "PX4", "rotorflight": "Rotorflight"}
 STRAYS = 0.5
 """m: how far LOITER may stray in still air."""
-_SUFFIX: Mapping[AutopilotName, str] = {"ardupilot": ".parm", "px4": ".params"}
+_SUFFIX: Mapping[AutopilotName, str] = {"ardupilot": ".parm", "px4": ".params", "rotorflight": ".txt"}
 _UPSET: Mapping[str, float] = {"phi": math.radians(2.0), "theta": math.radians(-2.0), "u": 0.1, "v": -0.1}
 _DURATION, _LAST = 60.0, 20.0
+_PLACED = ("loiter", "hover")
+"""Modes that hold a place."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +57,13 @@ class FlownMode:
     """A mode flown nonlinearly in still air, integrals at zero at the start: how far it strays from what it holds.
 
     Attributes:
-        mode: "stabilize", "alt_hold" or "loiter".
+        mode: "stabilize", "alt_hold" or "loiter"; Rotorflight's "angle", and "hover" with a pilot of ours.
         lean: from the hover's attitude [deg]. heading: [deg]. height, place: [m]; NaN where the mode holds none.
         still: the same of the place in the last 20 s.
         fell: why it did not get to the end; empty where it did.
     """
 
-    mode: FlightMode
+    mode: FlownModeName
     lean: float
     heading: float
     height: float
@@ -67,7 +77,7 @@ class AutopilotGains(Shown):
     """Gains of a whole autopilot for a vehicle.
 
     Attributes:
-        autopilot: "ardupilot" or "px4".
+        autopilot: "ardupilot", "px4" or "rotorflight".
         title: of the vehicle's card.
         found: the law with its gains, what each loop is worth.
         parameters: all lines of the file by the firmware's names, outputs and frame included.
@@ -80,7 +90,7 @@ class AutopilotGains(Shown):
 
     autopilot: AutopilotName
     title: str
-    found: CascadeGains
+    found: CascadeGains[ArduPilotLaw] | CascadeGains[RotorflightLaw]
     parameters: Mapping[str, float]
     gains: tuple[str, ...]
     flown: tuple[FlownMode, ...]
@@ -97,13 +107,17 @@ class AutopilotGains(Shown):
         for flight in self.flown:
             if flight.fell:
                 problems.append(f"{flight.mode} does not fly: {flight.fell}")
-            elif flight.mode == "loiter" and not flight.place <= STRAYS:
-                problems.append(f"loiter strays by {flight.place:.2f} m, expected {STRAYS:g} m or less.")
+            elif flight.mode in _PLACED and not flight.place <= STRAYS:
+                problems.append(f"{flight.mode} strays by {flight.place:.2f} m, expected {STRAYS:g} m or less.")
         return tuple(problems)
 
-    def controller(self, mode: FlightMode = "loiter") -> ArduPilotLaw:
-        """The law as a controller, for `sp.simulate_closed_loop`, `sp.check_controller` and `sp.live`."""
-        return self.found.law.in_mode(mode)
+    def controller(self, mode: FlownModeName | None = None) -> ArduPilotLaw | RotorflightLaw:
+        """The law as a controller, for `sp.simulate_closed_loop`, `sp.check_controller` and `sp.live`.
+
+        Args:
+            mode: as of `FlownMode`; the one that holds a place where None.
+        """
+        return _in_mode(self.found.law, mode)
 
     def save(self, path: str | Path) -> Path:
         """Write the parameter file (.parm or .params), or the controller's (.toml).
@@ -118,6 +132,8 @@ class AutopilotGains(Shown):
         expected = _SUFFIX[self.autopilot]
         if file.suffix != expected:
             raise SwashError(f"ends in '{file.suffix}', expected {expected} or .toml.", where=file)
+        if self.autopilot == "rotorflight":
+            return write_text(file, cli_dump(self.parameters, title=self.title))
         if self.autopilot == "ardupilot":
             return write_text(file, parameter_file(dict(self.parameters), title=self.title))
         return write_text(file, px4_file(dict(self.parameters), title=self.title))
@@ -153,7 +169,7 @@ class AutopilotGains(Shown):
 
     def __repr__(self) -> str:
         law = self.found.law
-        lines = [f"{self.title}: {'ArduPilot' if self.autopilot == 'ardupilot' else 'PX4'}, loops at {law.rate:g} Hz"]
+        lines = [f"{self.title}: {CALLED[self.autopilot]}, loops at {law.rate:g} Hz"]
         lines.append(f"late: {self.late}")
         head = ("loop", "gain [dB]", "phase [deg]", "delay", "crossover", "bandwidth", "rejects to", "max |S|")
         rows = [
@@ -169,7 +185,8 @@ class AutopilotGains(Shown):
             )
         ]
         lines += ["", text_table(head, rows), "each broken with the others closed; frequencies in rad/s"]
-        lines += ["alone: in STABILIZE, no height or place held; what a sweep at the mixer measures", ""]
+        alone = "ANGLE" if self.autopilot == "rotorflight" else "STABILIZE"
+        lines += [f"alone: in {alone}, no height or place held; what a sweep at the mixer measures", ""]
         shown = [(name, f"{self.parameters[name]:.4g}") for name in self.gains if name not in RENAMED]
         lines.append(text_table(("parameter", "value"), shown))
         if self.flown:
@@ -199,21 +216,21 @@ def autopilot_gains(
     voltage: float | None = None,
     fly: bool = True,
 ) -> AutopilotGains:
-    """Gains of rate, attitude, height and place loops for a vehicle under ArduPilot or PX4, judged and flown.
+    """Gains of a whole autopilot's loops for a vehicle under ArduPilot, PX4 or Rotorflight, judged and flown.
 
     Every loop keeps 6 dB, 45 degrees and a sensitivity below two with all others closed, with the vehicle's rotors,
     bar and delays and the autopilot's filters in it. Of what keeps them, that which rejects disturbances best.
 
     Args:
         vehicle: in free flight; any model whose outputs an autopilot can be mapped to.
-        autopilot: "ardupilot" or "px4".
+        autopilot: "ardupilot", "px4" or "rotorflight", which holds neither a place nor a height: a pilot of ours does.
         name, servos: as of `swashplate.link_ardupilot`.
         delays: from output to actuator [s], one for all or by input; where not given those that the model knows, and
             5 ms where it knows none. A SITL has none. What the firmware sends a loop later
             (`control.laws.ardupilot.outputs`) comes to them.
         notch: of the gyros, frequency and width [Hz]; ArduPilot only.
-        rate: of the loops [Hz]; 400 for ArduPilot, 250 for PX4.
-        parameters: judge these instead (by name, or a .parm file); ArduPilot only.
+        rate: of the loops [Hz]; 400 for ArduPilot, 250 for PX4, 1000 for Rotorflight.
+        parameters: judge these instead (by name, or a .parm file); ArduPilot's, or Rotorflight's by name.
         voltage: of the battery [V].
         fly: also fly the three modes on the nonlinear model.
 
@@ -224,14 +241,18 @@ def autopilot_gains(
     """
     if autopilot not in _SUFFIX:
         raise ControllerError(f"is '{autopilot}', expected {', '.join(_SUFFIX)}.", channel="autopilot")
-    if autopilot == "px4" and (notch is not None or parameters is not None):
-        raise ControllerError("is for ArduPilot's parameters only.", channel="notch" if notch else "parameters")
+    if autopilot != "ardupilot" and notch is not None:
+        raise ControllerError("is for ArduPilot's parameters only.", channel="notch")
+    if autopilot == "px4" and parameters is not None:
+        raise ControllerError("is for ArduPilot's and Rotorflight's parameters only.", channel="parameters")
     if notch is not None and not (0.0 < notch[1] < 2.0 * notch[0] and notch[0] < 400.0):
         raise ControllerError(f"is {notch[0]:g} Hz, {notch[1]:g} Hz wide.", channel="notch")
     nominal = vehicle.card.values().get("voltage_nominal")
     hover = trim(vehicle, voltage=nominal if voltage is None else voltage)
-    mapping = mapping_of(vehicle, servos, name=name, suffix="" if autopilot == "ardupilot" else "_px4")
     late, told = _late(vehicle, delays)
+    if autopilot == "rotorflight":
+        return _for_rotorflight(vehicle, hover, late, told, rate or ROTORFLIGHT_RATE, parameters, fly=fly)
+    mapping = mapping_of(vehicle, servos, name=name, suffix="" if autopilot == "ardupilot" else "_px4")
     if autopilot == "px4":
         start = px4_law(mapping, vehicle, hover, rate=rate or PX4_RATE)
         design = cascade_gains(vehicle, hover, start, delays=late)
@@ -271,16 +292,56 @@ def _late(vehicle: Vehicle, given: Mapping[str, float] | float | None) -> tuple[
     return dict(late), f"{', '.join(f'{name} {1e3 * value:.3g} ms' for name, value in late.items())} ({whose})"
 
 
-def _sent_later(law: ArduPilotLaw) -> str:
+def _for_rotorflight(
+    vehicle: Vehicle,
+    hover: Trim,
+    late: Mapping[str, float],
+    told: str,
+    rate: float,
+    parameters: Mapping[str, float] | str | Path | None,
+    *,
+    fly: bool,
+) -> AutopilotGains:
+    if isinstance(parameters, str | Path):
+        raise ControllerError("of Rotorflight are given by name, not as a file.", channel="parameters")
+    start = replace(rotorflight_law(vehicle, hover, given=parameters), rate=rate)
+    search = rotorflight_gains if parameters is None else judge_rotorflight
+    design = search(vehicle, hover, start, delays=late)
+    lines = {name: value for name, value in design.law.parameters.items() if value != ROTORFLIGHT_DEFAULTS[name]}
+    flown = tuple(_flown(vehicle, hover, design, mode) for mode in ROTORFLIGHT_MODES) if fly else ()
+    premise, judged = refused_by_card(vehicle.card), parameters is not None
+    title = vehicle.card.title
+    return AutopilotGains("rotorflight", title, design, lines, tuple(lines), flown, told, premise, judged)
+
+
+def _in_mode(law: ArduPilotLaw | RotorflightLaw, mode: FlownModeName | None) -> ArduPilotLaw | RotorflightLaw:
+    if isinstance(law, RotorflightLaw):
+        asked: RotorflightMode = "angle" if mode == "angle" else "hover"
+        if mode not in (None, *ROTORFLIGHT_MODES):
+            raise ControllerError(f"is '{mode}', expected {', '.join(ROTORFLIGHT_MODES)}.", channel="mode")
+        return law.in_mode(asked)
+    if mode == "angle" or mode == "hover":
+        raise ControllerError(f"is '{mode}', expected {', '.join(FLIGHT_MODES)}.", channel="mode")
+    return law.in_mode(mode or "loiter")
+
+
+def _sent_later(law: ArduPilotLaw | RotorflightLaw) -> str:
+    if isinstance(law, RotorflightLaw):
+        return ""
     by_delay = [f"{1e3 * delay:.3g} ms" for delay in sorted(set(law.output_delays) - {0.0})]
     return f"; outputs of servos that the firmware sends a loop later: {by_delay[0]} more" if by_delay else ""
 
 
-def _flown(vehicle: Vehicle, hover: Trim, design: CascadeGains, mode: FlightMode) -> FlownMode:
+def _flown(
+    vehicle: Vehicle,
+    hover: Trim,
+    design: CascadeGains[ArduPilotLaw] | CascadeGains[RotorflightLaw],
+    mode: FlownModeName,
+) -> FlownMode:
     rest = hover.states()
     start = {**rest, **{name: rest.get(name, 0.0) + by for name, by in _UPSET.items()}}
     reference = {name: rest.get(name, 0.0) for name in ("x", "y", "z", "psi")}
-    law = replace(design.law.in_mode(mode), settled=())
+    law = replace(_in_mode(design.law, mode), settled=())
     nothing = (math.nan,) * 5
     try:
         flight = simulate_closed_loop(
@@ -304,7 +365,7 @@ def _flown(vehicle: Vehicle, hover: Trim, design: CascadeGains, mode: FlightMode
     lean = np.degrees(np.max(np.hypot(away("phi"), away("theta"))))
     heading, height = np.degrees(np.max(np.abs(away("psi")))), float(np.max(np.abs(away("z"))))
     place = np.hypot(away("x"), away("y"))
-    holds, keeps = mode == "loiter", mode != "stabilize"
+    holds, keeps = mode in _PLACED, mode not in ("stabilize", "angle")
     return FlownMode(
         mode,
         float(lean),

@@ -17,6 +17,7 @@ from swashplate.cli.lateness import Delay, delays_from
 class AutopilotChoice(StrEnum):
     ARDUPILOT = "ardupilot"
     PX4 = "px4"
+    ROTORFLIGHT = "rotorflight"
 
 
 def gains(
@@ -38,7 +39,10 @@ def gains(
         ),
     ] = None,
     rate: Annotated[
-        float | None, typer.Option("--rate", help="Rate of the loops [Hz]; 400 by default, or 250 for PX4.", min=50.0)
+        float | None,
+        typer.Option(
+            "--rate", help="Rate of the loops [Hz]; 400 by default, 250 for PX4, 1000 for Rotorflight.", min=50.0
+        ),
     ] = None,
     parameters: Annotated[
         Path | None,
@@ -49,7 +53,10 @@ def gains(
     switched: given.Switch = None,
     fly: Annotated[bool, typer.Option("--fly/--no-fly", help="Also fly the modes on the nonlinear model.")] = True,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the parameters (.parm; PX4: .params).")
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE", help="Write the parameters (.parm; PX4: .params; Rotorflight: .txt)."
+        ),
     ] = None,
     controller: Annotated[
         Path | None,
@@ -58,13 +65,14 @@ def gains(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Gains of rate, attitude, height and place loops for a vehicle under ArduPilot or PX4.
+    """Gains of rate, attitude, height and place loops for a vehicle under ArduPilot, PX4 or Rotorflight.
 
     Every loop keeps 6 dB, 45 degrees and a sensitivity below two with all others closed, with rotors, bar, delays
-    and filters. Then a copy of the autopilot's law flies STABILIZE, ALT_HOLD and LOITER on the nonlinear model.
+    and filters. Then a copy of the autopilot's law flies STABILIZE, ALT_HOLD and LOITER on the nonlinear model;
+    Rotorflight's flies ANGLE, and a hover with a simulated pilot.
     Exit code 2 if no gains keep the margins, or if those of --parameters do not.
     """
-    suffix = ".parm" if autopilot is AutopilotChoice.ARDUPILOT else ".params"
+    suffix = {"ardupilot": ".parm", "px4": ".params"}.get(autopilot.value, ".txt")
     shared.check_suffixes((out, suffix, "--out"), (controller, ".toml", "--controller"))
     room = options.numbers(notch, option="--notch", count=2) if notch else None
     import swashplate as sp

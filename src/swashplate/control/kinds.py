@@ -111,6 +111,7 @@ CONTROLLERS: Registry[ControllerKind[Any]] = Registry(
         "autopilot": "swashplate.control.laws.autopilot_kind:KIND",
         "lqg": "swashplate.control.lqg.kind:KIND",
         "observed-autopilot": "swashplate.control.laws.observed_autopilot_kind:KIND",
+        "rotorflight": "swashplate.control.laws.rotorflight.kind:KIND",
     },
 )
 

@@ -223,3 +223,22 @@ def test_a_notch_takes_its_phase_and_gains_with_it_in_the_loop_hold() -> None:
     same = {**plain.parameters, "INS_HNTCH_ENABLE": 1.0, "INS_HNTCH_FREQ": 12.0, "INS_HNTCH_BW": 8.0}
     kept = sp.autopilot_gains(sp.vehicle("raptor50"), parameters=same, fly=False, name="raptor50")
     assert kept.found.loops[0].phase < plain.found.loops[0].phase - 5.0
+
+
+def test_rotorflights_names_and_modes(tmp_path: Path) -> None:
+    helicopter = sp.vehicle("xcell60")
+    made = sp.autopilot_gains(helicopter, autopilot="rotorflight")
+    assert made.problems == ()
+    assert [flight.mode for flight in made.flown] == ["angle", "hover"]
+    assert made.flown[1].place <= STRAYS
+    text = made.save(tmp_path / "cli.txt").read_text(encoding="utf-8")
+    assert f"set roll_p_gain = {made.parameters['roll_p_gain']:.0f}\n" in text
+    assert made.controller().type == "rotorflight"
+    again = sp.autopilot_gains(helicopter, autopilot="rotorflight", parameters=made.parameters, fly=False)
+    assert [loop.phase for loop in again.found.stabilize][:1] == pytest.approx([made.found.stabilize[0].phase], abs=0.5)
+    with pytest.raises(ControllerError, match="expected angle, hover"):
+        made.controller("loiter")
+    with pytest.raises(SwashError, match=r"expected \.txt or \.toml"):
+        made.save(tmp_path / "gains.parm")
+    with pytest.raises(ControllerError, match="given by name"):
+        sp.autopilot_gains(helicopter, autopilot="rotorflight", parameters=tmp_path / "cli.txt")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.trim import Trim
 
+Law = TypeVar("Law")
 GAIN_KEPT, PHASE_KEPT, PEAK_KEPT = 6.0, 45.0, 2.0
 """dB, degrees and largest sensitivity that every loop keeps with all others closed."""
 _RESERVE: Mapping[FlightMode, tuple[float, float, float]] = {
@@ -92,7 +94,7 @@ class LoopWorth:
 
 
 @dataclass(frozen=True)
-class CascadeGains:
+class CascadeGains(Generic[Law]):
     """Gains of a whole autopilot.
 
     Attributes:
@@ -103,7 +105,7 @@ class CascadeGains:
         delays: from output to actuator, by input [s]; the law's own (`output_delays`) come to them.
     """
 
-    law: ArduPilotLaw
+    law: Law
     loops: tuple[LoopWorth, ...]
     stabilize: tuple[LoopWorth, ...]
     slowest: complex
@@ -128,7 +130,9 @@ class CascadeGains:
         return tuple(problems)
 
 
-def judge_cascade(vehicle: Vehicle, hover: Trim, law: ArduPilotLaw, *, delays: Mapping[str, float]) -> CascadeGains:
+def judge_cascade(
+    vehicle: Vehicle, hover: Trim, law: ArduPilotLaw, *, delays: Mapping[str, float]
+) -> CascadeGains[ArduPilotLaw]:
     """What a law with its gains is worth on a vehicle, whoever chose them.
 
     Args:
@@ -145,14 +149,16 @@ def judge_cascade(vehicle: Vehicle, hover: Trim, law: ArduPilotLaw, *, delays: M
     whole, inner = feedback(plant.omega, k), feedback(plant.omega, k, place=False)
     commands, leans = broken_at_commands(plant, whole, (0, 1, 2, 3)), broken_at_leans(plant, inner, whole)
     names = ("roll", "pitch", "yaw", "height")
-    loops = [*_worth(commands, names), *_worth(leans, ("place right", "place ahead"))]
+    loops = [*worth_of(commands, names), *worth_of(leans, ("place right", "place ahead"))]
     alone = broken_at_commands(plant, feedback(plant.omega, k, height=False, place=False), (0, 1, 2))
     modes = _modes(vehicle, hover, law, "loiter", delays)
     slowest = complex(modes[0]) if modes.size else 0j
-    return CascadeGains(law, tuple(loops), tuple(_worth(alone, names[:3])), slowest, dict(delays))
+    return CascadeGains(law, tuple(loops), tuple(worth_of(alone, names[:3])), slowest, dict(delays))
 
 
-def cascade_gains(vehicle: Vehicle, hover: Trim, start: ArduPilotLaw, *, delays: Mapping[str, float]) -> CascadeGains:
+def cascade_gains(
+    vehicle: Vehicle, hover: Trim, start: ArduPilotLaw, *, delays: Mapping[str, float]
+) -> CascadeGains[ArduPilotLaw]:
     """Gains for a vehicle in hover.
 
     Args:
@@ -286,7 +292,8 @@ def _place_sets() -> dict[str, Array]:
     }
 
 
-def _worth(loops: BrokenLoops, names: tuple[str, ...]) -> list[LoopWorth]:
+def worth_of(loops: BrokenLoops, names: tuple[str, ...]) -> list[LoopWorth]:
+    """What the loops of one set of gains are worth, by their names."""
     return [
         LoopWorth(
             name,

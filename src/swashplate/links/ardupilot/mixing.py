@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 
 from swashplate.control.laws.ardupilot.mixers import CoaxialMixer, Mixer, SwashplateMixer, TwinSwashplateMixer
+from swashplate.control.laws.tail import turn_by_tail
 from swashplate.errors import LinkError
 from swashplate.links.servos import CoaxialMapping, ServoMapping, TwinMapping
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.discretisation import zero_order_hold
-from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 
 CYCLIC = 0.9
 """Share of the servos' travel that a full roll or pitch command takes (twice the 0.45 of AP_MotorsHeli_Swash)."""
 DIFFERENTIAL = 450.0
 """us of collective that a full yaw command gives one swashplate and takes from the other at H_DCP_SCALER 1."""
-_LATER = 0.5
-"""s: when the nose is asked which way it turns."""
 
 
 def mixer_of(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Mixer:
@@ -56,14 +53,10 @@ def _twin(mapping: TwinMapping, hover: Trim) -> Mixer:
 def tail_sense(deg: tuple[float, float], vehicle: Vehicle, hover: Trim) -> float:
     """1 where more of the tail's output turns the nose right, -1 where it has to be reversed.
 
-    The nose is asked half a second after a step, for servos and delays stand between.
-
     Raises:
         LinkError: where it moves nothing.
     """
-    model = linearize(vehicle, hover)
-    _, stepped = zero_order_hold(model.A, model.B, _LATER)
-    turn = (deg[1] - deg[0]) * float(stepped[model.states.index("r"), model.inputs.index("theta0T")])
+    turn = (deg[1] - deg[0]) * turn_by_tail(vehicle, hover)
     if turn == 0.0:
         raise LinkError("the tail moves nothing.", channel="tail.deg")
     return math.copysign(1.0, turn)

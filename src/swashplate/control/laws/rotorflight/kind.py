@@ -1,0 +1,87 @@
+"""Rotorflight's law among the kinds of controllers: its file, its loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import msgspec
+
+from swashplate import documents
+from swashplate.control.analysis.judged_loop import Aircraft
+from swashplate.control.analysis.margins import Margins
+from swashplate.control.kinds import ControllerKind
+from swashplate.control.laws.rotorflight.law import Pilot, Rigging, RotorflightLaw, RotorflightMode
+from swashplate.control.laws.rotorflight.parameters import DEFAULTS, known
+from swashplate.errors import ControllerError
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.trim import Trim
+
+SCHEMA = 1
+_RATES = (250.0, 4000.0)
+
+
+class _LawFile(msgspec.Struct, forbid_unknown_fields=True):
+    kind: str
+    schema: Literal[1]
+    type: str
+    vehicle: str
+    model: str
+    mode: RotorflightMode
+    hover: float
+    rate: float
+    rigging: dict[str, float]
+    pilot: dict[str, float]
+    parameters: dict[str, float]
+
+
+class RotorflightKind(ControllerKind[RotorflightLaw]):
+    """Rotorflight's rate loops with a pilot, fed with the states; it starts with integrals that hold the trim."""
+
+    def about(self, controller: RotorflightLaw, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> RotorflightLaw:
+        if controller.vehicle != vehicle.name:
+            raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
+        return controller.at(vehicle, trim)
+
+    def differences(self, controller: RotorflightLaw, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
+        own, theirs = controller.model, flying.vehicle.card.title
+        return () if own == theirs else (f"Designed on '{own}', flown on '{theirs}'.",)
+
+    def to_document(self, controller: RotorflightLaw) -> dict[str, Any]:
+        return {
+            "kind": "controller",
+            "schema": SCHEMA,
+            "type": controller.type,
+            "vehicle": controller.vehicle,
+            "model": controller.model,
+            "mode": controller.mode,
+            "hover": float(controller.hover),
+            "rate": controller.rate,
+            "rigging": {name: float(value) for name, value in controller.rigging._asdict().items()},
+            "pilot": {name: float(value) for name, value in controller.pilot._asdict().items()},
+            "parameters": {name: float(value) for name, value in controller.parameters.items()},
+        }
+
+    def from_document(self, document: Mapping[str, Any], path: str) -> RotorflightLaw:
+        read = documents.checked(document, _LawFile, where=path, error=ControllerError)
+        for channel, told, expected in (
+            ("rigging", read.rigging, Rigging._fields),
+            ("pilot", read.pilot, Pilot._fields),
+        ):
+            if set(told) != set(expected):
+                words = f"has {', '.join(told)}, expected {', '.join(expected)}."
+                raise ControllerError(words, where=path, channel=channel)
+        low, high = _RATES
+        if not low <= read.rate <= high:
+            raise ControllerError(f"is {read.rate:g} Hz, expected {low:g} to {high:g}.", where=path, channel="rate")
+        strange = sorted(set(read.parameters) - set(DEFAULTS))
+        if strange:
+            raise ControllerError("is no parameter of the law.", where=path, channel=f"parameters.{strange[0]}")
+        rigging, pilot = Rigging(**read.rigging), Pilot(**read.pilot)
+        numbers = known(read.parameters)
+        return RotorflightLaw(
+            read.vehicle, read.model, read.mode, numbers, rigging, pilot, read.hover, 4, rate=read.rate
+        )
+
+
+KIND = RotorflightKind()
