@@ -40,7 +40,7 @@ from swashplate.control.analysis.gain_premises import refuse_turned_commands, re
 from swashplate.control.analysis.sampled_loop import sampled_loop
 from swashplate.control.analysis.stability import modes_of
 from swashplate.control.laws.ardupilot.mixers import Mixed
-from swashplate.control.laws.rotorflight.law import GRAVITY, Pilot, Rigging, RotorflightLaw, RotorflightMode
+from swashplate.control.laws.rotorflight.law import GRAVITY, Rigging, RotorflightLaw, RotorflightMode, SticksPilot
 from swashplate.control.laws.rotorflight.parameters import AXES, SCALES
 from swashplate.control.laws.rotorflight.pid import OFFSET_CHARGE, table
 from swashplate.engine.symbols import ArrayFunctions, Symbols
@@ -113,7 +113,7 @@ def rotorflight_gains(
         k[f"{axis}_f_gain"] = _whole(1.0 / largest_rate(plant, "pq"[i], i), axis, "f_gain")
 
     def law_with(values: Mapping[str, Any]) -> RotorflightLaw:
-        pilot = Pilot(**{name: float(values[name]) for name in Pilot._fields})
+        pilot = SticksPilot(**{name: float(values[name]) for name in SticksPilot._fields})
         return replace(start, parameters={name: float(values[name]) for name in start.parameters}, pilot=pilot)
 
     def settle(

@@ -11,7 +11,7 @@ from swashplate import documents
 from swashplate.control.analysis.judged_loop import Aircraft
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.kinds import ControllerKind
-from swashplate.control.laws.rotorflight.law import Pilot, Rigging, RotorflightLaw, RotorflightMode
+from swashplate.control.laws.rotorflight.law import Rigging, RotorflightLaw, RotorflightMode, SticksPilot
 from swashplate.control.laws.rotorflight.parameters import DEFAULTS, known
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
@@ -66,7 +66,7 @@ class RotorflightKind(ControllerKind[RotorflightLaw]):
         read = documents.checked(document, _LawFile, where=path, error=ControllerError)
         for channel, told, expected in (
             ("rigging", read.rigging, Rigging._fields),
-            ("pilot", read.pilot, Pilot._fields),
+            ("pilot", read.pilot, SticksPilot._fields),
         ):
             if set(told) != set(expected):
                 words = f"has {', '.join(told)}, expected {', '.join(expected)}."
@@ -77,7 +77,7 @@ class RotorflightKind(ControllerKind[RotorflightLaw]):
         strange = sorted(set(read.parameters) - set(DEFAULTS))
         if strange:
             raise ControllerError("is no parameter of the law.", where=path, channel=f"parameters.{strange[0]}")
-        rigging, pilot = Rigging(**read.rigging), Pilot(**read.pilot)
+        rigging, pilot = Rigging(**read.rigging), SticksPilot(**read.pilot)
         numbers = known(read.parameters)
         return RotorflightLaw(
             read.vehicle, read.model, read.mode, numbers, rigging, pilot, read.hover, 4, rate=read.rate

@@ -19,7 +19,7 @@ from swashplate.arrays import Array
 from swashplate.control.laws.rotorflight.filters import low_pass
 from swashplate.control.laws.rotorflight.mixers import GOVERNOR, SATURATED, governed, limited
 from swashplate.control.laws.rotorflight.parameters import AXES, DEFAULTS, SCALES, known
-from swashplate.control.laws.rotorflight.pid import MEMORY, Mixed, pid_step
+from swashplate.control.laws.rotorflight.pid import MEMORY, Deflections, pid_step
 from swashplate.control.laws.tail import turn_by_tail
 from swashplate.engine.symbols import ArrayFunctions, Symbols
 from swashplate.errors import ControllerError
@@ -66,7 +66,7 @@ class Rigging(NamedTuple):
     sense: float
 
 
-class Pilot(NamedTuple):
+class SticksPilot(NamedTuple):
     """Who sits at the sticks.
 
     Attributes:
@@ -106,7 +106,7 @@ class RotorflightLaw(StepController):
     mode: RotorflightMode
     parameters: Mapping[str, float]
     rigging: Rigging
-    pilot: Pilot
+    pilot: SticksPilot
     hover: float
     inputs: int
     speed_state: int = -1
@@ -194,7 +194,7 @@ def rotorflight_law(vehicle: Vehicle, hover: Trim, *, given: Mapping[str, float]
         raise ControllerError("the tail moves nothing.", where=vehicle.name, channel="theta0T")
     sense = 1.0 if vehicle.card.options.get("rotation", "ccw") == "ccw" else -1.0
     rigging = Rigging(np.radians(_UNIT), -np.copysign(np.radians(_TAIL), turn), 0.0, sense)
-    law = RotorflightLaw(vehicle.name, vehicle.card.title, "hover", known(given or {}), rigging, Pilot(), 0.0, 4)
+    law = RotorflightLaw(vehicle.name, vehicle.card.title, "hover", known(given or {}), rigging, SticksPilot(), 0.0, 4)
     return replace(law.at(vehicle, hover), settled=())
 
 
@@ -211,8 +211,8 @@ def rotorflight_step(
     """One step, as `simulate_closed_loop` calls it."""
     dt, places, hover = gains[0], gains[1], gains[2]
     first = 3 + len(Rigging._fields)
-    rig, pilot = Rigging(*gains[3:first]), Pilot(*gains[first : first + len(Pilot._fields)])
-    k = {name: gains[first + len(Pilot._fields) + i] for i, name in enumerate(_NAMES)}
+    rig, pilot = Rigging(*gains[3:first]), SticksPilot(*gains[first : first + len(SticksPilot._fields)])
+    k = {name: gains[first + len(SticksPilot._fields) + i] for i, name in enumerate(_NAMES)}
     m = {name: memory[where] for name, where in _PLACES.items()}
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     degrees = 180.0 / np.pi
@@ -225,7 +225,7 @@ def rotorflight_step(
     lean, collective = _pilot(body, reference, pilot, m, after, places, hover, dt, xp)
     demand = _demand(body, reference, lean, pilot, k, xp)
     headspeed = measured[speed_state] * (30.0 / np.pi) if speed_state >= 0 else 0.0 * dt
-    mixed = Mixed(m["collective"][0], m["cyclic"][0], m["cut"])
+    mixed = Deflections(m["collective"][0], m["cyclic"][0], m["cut"])
     commands, carried = pid_step(m, gyro, demand, mixed, headspeed, k, rig.sense, dt, xp)
     after |= carried
     commands, collective, cut = limited(commands, collective, k["swash_ring"], xp)
@@ -247,7 +247,7 @@ def rotorflight_step(
 def _pilot(
     body: RigidBody,
     reference: Symbols,
-    pilot: Pilot,
+    pilot: SticksPilot,
     m: Mapping[str, Any],
     after: dict[str, Any],
     places: Scalar,
@@ -275,7 +275,7 @@ def _pilot(
 
 
 def _demand(
-    body: RigidBody, reference: Symbols, lean: Symbols, pilot: Pilot, k: Mapping[str, Any], xp: ArrayFunctions
+    body: RigidBody, reference: Symbols, lean: Symbols, pilot: SticksPilot, k: Mapping[str, Any], xp: ArrayFunctions
 ) -> Any:
     """Rates asked of the rate loops [deg/s], (3,): ANGLE mode, and the pilot's rate of the heading."""
     degrees, most = 180.0 / np.pi, k["angle_level_limit"]

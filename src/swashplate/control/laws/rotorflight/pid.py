@@ -37,7 +37,7 @@ MEMORY: Mapping[str, int] = {
 """What it carries, with sizes."""
 
 
-class Mixed(NamedTuple):
+class Deflections(NamedTuple):
     """What the mixer did in the step before.
 
     Attributes:
@@ -83,7 +83,7 @@ def pid_step(
     m: Mapping[str, Any],
     gyro: Symbols,
     demand: Symbols,
-    mixed: Mixed,
+    mixed: Deflections,
     headspeed: Scalar,
     k: Mapping[str, Any],
     sense: Scalar,
@@ -226,7 +226,7 @@ def _precompensated(
     m: Mapping[str, Any],
     after: dict[str, Any],
     demand: Symbols,
-    mixed: Mixed,
+    mixed: Deflections,
     headspeed: Scalar,
     k: Mapping[str, Any],
     sense: Scalar,

@@ -20,7 +20,7 @@ from swashplate.control.laws.rotorflight.mixers import (
     limited,
 )
 from swashplate.control.laws.rotorflight.parameters import known
-from swashplate.control.laws.rotorflight.pid import MEMORY, Mixed, pid_step
+from swashplate.control.laws.rotorflight.pid import MEMORY, Deflections, pid_step
 
 MORE = {
     "roll_d_gain": 30.0,
@@ -88,7 +88,7 @@ GOVERNED = {
 """By step: throttle, integral, feed-forward."""
 
 
-def _flown(n: int) -> tuple[np.ndarray, np.ndarray, Mixed, float]:
+def _flown(n: int) -> tuple[np.ndarray, np.ndarray, Deflections, float]:
     """Demands, gyro, mixer and head speed of a step: steps, saturation, and sines that no two axes share."""
     t = 1e-3 * n
     demand = [
@@ -106,7 +106,7 @@ def _flown(n: int) -> tuple[np.ndarray, np.ndarray, Mixed, float]:
     gyro[0] += 110.0 * (n > 950)
     gyro[1] -= 80.0 * (n > 1450)
     cut = np.array([1.0 * (1100 < n < 1200), 1.0 * (1100 < n < 1200), 1.0 * (300 < n < 400)])
-    mixed = Mixed(0.45 + 0.35 * sin(2.0 * pi * 0.4 * t), 0.1 + 0.05 * sin(2.0 * pi * 1.1 * t), cut)
+    mixed = Deflections(0.45 + 0.35 * sin(2.0 * pi * 0.4 * t), 0.1 + 0.05 * sin(2.0 * pi * 1.1 * t), cut)
     return np.array(demand), np.array(gyro), mixed, 1500.0 + 40.0 * sin(2.0 * pi * 0.5 * t)
 
 
