@@ -31,6 +31,11 @@ def compiler() -> tuple[str, ...] | None:
     paths = (shutil.which(name) for name in ("cc", "gcc", "clang"))
     if path := next((path for path in paths if path is not None and os.path.isabs(path)), None):
         return (path,)
+    return ziglang()
+
+
+def ziglang() -> tuple[str, ...] | None:
+    """The words that start the C compiler of the package ziglang, for other systems too; None without."""
     return (sys.executable, "-I", "-m", "ziglang", "cc") if find_spec("ziglang") is not None else None
 
 

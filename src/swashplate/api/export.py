@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from swashplate.control.controller_file import read_controller
@@ -15,6 +16,8 @@ from swashplate.export.formats import Export, Model
 from swashplate.export.matlab import read_matlab
 from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 
 
@@ -41,16 +44,20 @@ def export_model(
     trim: Trim | None = None,
     precision: Precision = "double",
     delays: bool | None = None,
+    controller: Controller | str | Path | None = None,
+    draws: Sequence[Vehicle] = (),
 ) -> Export:
     """A vehicle or a linear model in another program's format; `.save(folder)` writes it.
 
     Args:
         model: a vehicle or a linear model, or its name or file (also `.json` and `.mat` of an export).
-        form: "c", "fmu", "control", "matlab", "simulink", or another package's.
+        form: "c", "fmu", "control", "matlab", "simulink", "web" (a page in which it flies), or another package's.
         name: what files and C functions begin with; the model's own name where None.
         trim: where a vehicle starts, and what its linear model is about; hover where None.
         precision: of C ("double" or "single"); the other formats are double.
         delays: take along a vehicle's identified input delays; where the card knows them if None.
+        controller: what flies it on the page of "web", or its file; the page's own pilot where None.
+        draws: models that a fit cannot tell from it (`fit.draw(5)`), which fly beside it on that page.
 
     Raises:
         ExportError: where the format cannot hold the model, CasADi is missing, or the compiler refuses the sources.
@@ -58,7 +65,17 @@ def export_model(
     """
     if isinstance(model, str | os.PathLike):
         name, model = name or Path(model).stem, opened(model)
-    return formats.export_model(model, form, name=name or model.name, trim=trim, precision=precision, delays=delays)
+    flown = read_controller(controller) if isinstance(controller, str | Path) else controller
+    return formats.export_model(
+        model,
+        form,
+        name=name or model.name,
+        trim=trim,
+        precision=precision,
+        delays=delays,
+        controller=flown,
+        draws=draws,
+    )
 
 
 def export_controller(path: str | Path, *, name: str | None = None, precision: Precision = "double") -> Export:

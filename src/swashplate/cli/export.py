@@ -42,7 +42,8 @@ def export(
             "--format",
             help="c: C99 step, rates, Jacobians. fmu: FMI 2.0 co-simulation. simulink: S-function. control: JSON for "
             "python-control. matlab: .mat. mcap: a flight for Foxglove, "
-            "Lichtblick, PlotJuggler and Rerun. Or another package's.",
+            "Lichtblick, PlotJuggler and Rerun. web: one HTML file in which the model flies, for any browser. "
+            "Or another package's.",
         ),
     ],
     out: Annotated[
@@ -72,15 +73,17 @@ def export(
 ) -> None:
     """Write a model, published or identified, in the format of another program, with the equations that fly here.
 
-    A controller's file (`swash decouple --out`) is written as C. Formats c, fmu and simulink need the extra 'model';
-    only fmu needs a C compiler, and does without where there is none. Format mcap takes a flight, or a report.html
-    for its fits and predictions over time, and needs the extra 'mcap'. Examples:
+    A controller's file (`swash decouple --out`) is written as C. Formats c, fmu, simulink and web need the extra
+    'model', web the extra 'compiler' too; fmu has compiled code where there is a C compiler. Format mcap takes a
+    flight, or a report.html for its fits and predictions over time, and needs the extra 'mcap'. Examples:
 
     swash export coax --format c --out firmware
 
     swash export fit/model.toml --format fmu
 
     swash export raptor50 --format matlab --speed 10
+
+    swash export fit/model.toml --format web --out model.html
 
     swash export flight.bbl --format mcap
 
@@ -122,7 +125,7 @@ def export(
         typer.echo(f"Written: {', '.join(written)}")
 
 
-_ENDINGS = (".c", ".fmu", ".json", ".mat", ".mcap")
+_ENDINGS = (".c", ".fmu", ".html", ".json", ".mat", ".mcap")
 
 
 def _as_file(made: Export, out: Path) -> Export:

@@ -10,7 +10,8 @@ from swashplate.engine.roots import Looped, Looping, require_casadi
 from swashplate.errors import ExportError
 from swashplate.models.nesting import rebuild
 from swashplate.physics.backend import CasadiBackend
-from swashplate.physics.quaternion import Quaternion, euler_of
+from swashplate.physics.frames import Euler
+from swashplate.physics.quaternion import Quaternion, euler_of, quaternion_of
 
 
 def traced_rates(equations: Equations) -> Looped:
@@ -48,6 +49,14 @@ def traced_angles() -> Any:
     q = casadi.SX.sym("q", 4)
     angles = euler_of(Quaternion(*(q[i] for i in range(4))), CasadiBackend())
     return casadi.Function("angles", [q], [casadi.vertcat(*angles)], {"cse": True})
+
+
+def traced_placing(states: int) -> Any:
+    """A state row with Euler angles as one with a quaternion, a CasADi function of a row of so many states."""
+    casadi = require_casadi()
+    x = casadi.SX.sym("x", states)
+    turned = quaternion_of(Euler(x[6], x[7], x[8]), CasadiBackend())
+    return casadi.Function("placing", [x], [casadi.densify(casadi.vertcat(x[:6], *turned, x[9:]))], {"cse": True})
 
 
 @lru_cache(maxsize=32)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.residual import refuse_predictor
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry
+from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
 
@@ -52,6 +53,8 @@ class ExportRequest:
         about: the trim where a vehicle starts; None for a linear model.
         late: delays of a vehicle's inputs [s], None for none.
         precision: of numbers in C.
+        controller: what flies it where the format is flown; None for the page's own.
+        draws: models that a fit cannot tell from it, for formats that show them.
     """
 
     model: Model
@@ -59,6 +62,8 @@ class ExportRequest:
     about: Trim | None
     late: Mapping[str, float] | None
     precision: Precision
+    controller: Controller | None = None
+    draws: tuple[Vehicle, ...] = ()
 
     def linear(self) -> Linear:
         """The model as matrices."""
@@ -80,6 +85,7 @@ FORMATS: Registry[Maker] = Registry(
         "control": "swashplate.export.makers:control",
         "matlab": "swashplate.export.makers:matlab",
         "simulink": "swashplate.export.makers:simulink",
+        "web": "swashplate.api.web_page:web",
     },
 )
 """A format is a function from an `ExportRequest` to an `Export`; other packages add theirs by an entry point."""
@@ -93,18 +99,22 @@ def export_model(
     trim: Trim | None = None,
     precision: Precision = "double",
     delays: bool | None = None,
+    controller: Controller | None = None,
+    draws: Sequence[Vehicle] = (),
 ) -> Export:
     """A vehicle or a linear model in another program's format.
 
     Args:
         model: a vehicle (packaged, a card's or identified) or a linear model, as `swash fit-ss` writes it or as
             `read_linear` and `read_matlab` read it.
-        form: "c", "fmu", "control", "matlab", "simulink", or another package's (`FORMATS`).
+        form: "c", "fmu", "control", "matlab", "simulink", "web", or another package's (`FORMATS`).
         name: what files and C functions begin with.
         trim: where a vehicle starts, and what its linear model is about; hover where none is given.
         precision: of C ("double" or "single"); the other formats are double.
         delays: take along what an identified vehicle's motion lagged its logged inputs by; where not given, where the
             card knows it. A linear model has its own, unless they are not to be taken along (False).
+        controller: what flies it on the page of "web"; its own pilot where None.
+        draws: models that a fit cannot tell from it (`fit.draw(5)`), which fly beside it on that page.
 
     Raises:
         ExportError: where the format cannot hold the model, CasADi is missing, or the compiler refuses the sources.
@@ -115,6 +125,8 @@ def export_model(
         raise ExportError(f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join(FORMATS)}.")
     if precision != "double" and form != "c":
         raise ExportError(f"numbers of '{form}' are double.", channel="--precision", hint="It is for --format c.")
+    if (controller or draws) and form != "web":
+        raise ExportError(f"'{form}' holds no controller and no drawn models.", channel="--format", hint="web does.")
     flying = model if isinstance(model, Vehicle) and model.structure is None else None
     late, left_out, about = None, "", trim
     if flying is None:
@@ -134,7 +146,7 @@ def export_model(
             left_out = f"Left out: the identified delays of the inputs ({told})."
         about = trim or find_trim(flying)
     called = identifier(name)
-    made = FORMATS[form](ExportRequest(model, called, about, late, precision))
+    made = FORMATS[form](ExportRequest(model, called, about, late, precision, controller, tuple(draws)))
     return replace(made, notes=(*made.notes, left_out)) if left_out else made
 
 

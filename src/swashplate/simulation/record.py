@@ -59,9 +59,14 @@ def monitored(flight: Flight, vehicle: Vehicle) -> Flight:
     return replace(flight, provenance=replace(flight.provenance, notes=(*flight.provenance.notes, *said)))
 
 
+def largest_states(vehicle: Vehicle) -> Array:
+    """How large each state of a simulation may be, shape (n_states,): beyond, it has diverged."""
+    return np.array([_ABSURD.get(unit, 1e9) for unit in vehicle.state_units])
+
+
 def check_divergence(vehicle: Vehicle, time: Array, states: Array, flight: Flight | None) -> None:
     """Raise `DivergenceError` where a state is not finite or absurdly large; the message says which went first."""
-    limits = np.array([_ABSURD.get(unit, 1e9) for unit in vehicle.state_units])
+    limits = largest_states(vehicle)
     with np.errstate(invalid="ignore"):
         bad = ~(np.abs(states) <= limits)
     if not bad.any():

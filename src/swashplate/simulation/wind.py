@@ -70,7 +70,7 @@ def dryden(gusts: Gusts, *, samples: int, rate: float, seed: int, count: int = 1
     """
     random = np.random.default_rng(seed)
     turbulence = {}
-    for name, part in zip(_NAMES, _filters(gusts, rate), strict=True):
+    for name, part in zip(_NAMES, filters_of_gusts(gusts, rate), strict=True):
         x = part.start @ random.standard_normal((part.step.shape[0], count))
         series = np.empty((samples, count))
         coming, shaken = _block(part)
@@ -88,7 +88,7 @@ _BLOCK = 64
 """Samples in one product; a step of two states alone is some calls of numpy."""
 
 
-def _block(part: _Filter) -> tuple[Array, Array]:
+def _block(part: GustFilter) -> tuple[Array, Array]:
     """The next states, one below the other, from the state at the start of a block and from its noise."""
     n = len(part.step)
     powers = [np.eye(n)]
@@ -112,7 +112,7 @@ class Turbulence:
 
     def __init__(self, gusts: Gusts, *, rate: float, seed: int) -> None:
         self._random = np.random.default_rng(seed)
-        self._filters = _filters(gusts, rate)
+        self._filters = filters_of_gusts(gusts, rate)
         self._x = [part.start @ self._random.standard_normal(part.step.shape[0]) for part in self._filters]
 
     def sample(self) -> Array:
@@ -128,7 +128,7 @@ class Turbulence:
 _NAMES = ("wind_north", "wind_east", "wind_down")
 
 
-class _Filter(NamedTuple):
+class GustFilter(NamedTuple):
     """White noise to one component: `x -> step x + noise n`, out comes `output x`; `start` makes the first x."""
 
     step: Array
@@ -137,7 +137,8 @@ class _Filter(NamedTuple):
     start: Array
 
 
-def _filters(gusts: Gusts, rate: float) -> list[_Filter]:
+def filters_of_gusts(gusts: Gusts, rate: float) -> list[GustFilter]:
+    """The filters of wind towards north, east and down, for `rate` samples a second."""
     filters = []
     for i, (sigma, length) in enumerate(zip(gusts.sigma, gusts.length, strict=True)):
         T = length / gusts.speed
@@ -151,7 +152,7 @@ def _filters(gusts: Gusts, rate: float) -> list[_Filter]:
         P = scipy.linalg.solve_continuous_lyapunov(A, -b @ b.T)
         P *= sigma**2 / (c @ P @ c)
         step = scipy.linalg.expm(A / rate)
-        filters.append(_Filter(step, _root(P - step @ P @ step.T), c, _root(P)))
+        filters.append(GustFilter(step, _root(P - step @ P @ step.T), c, _root(P)))
     return filters
 
 

@@ -9,10 +9,10 @@ nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 from scipy.linalg import expm
@@ -22,6 +22,8 @@ from swashplate.control.kinds import kind_of
 from swashplate.control.laws.autopilot import Autopilot, autopilot, row_step
 from swashplate.control.laws.state_hold import state_hold, state_hold_step
 from swashplate.engine.law import REFERENCES
+from swashplate.engine.roots import require_casadi
+from swashplate.engine.symbols import SymbolArrays, expressions, symbols
 from swashplate.errors import ControllerError
 from swashplate.flights.maneuvers.series import DEFAULT_AMPLITUDE
 from swashplate.links.live.axes import STICKS, axes_of
@@ -40,18 +42,56 @@ LEAN = np.radians(12.0)
 """Roll or pitch that a full stick asks for in the mode "attitude" [rad]."""
 
 
-Decide = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
+class DecisionGraph(NamedTuple):
+    """A decision of the page's pilot as a graph.
+
+    Attributes:
+        function: of CasADi, of (memory, told, wanted, gains) to memory and commands in one column; `told` has what the
+            law's own sensors draw at its end.
+        memory: how many numbers it carries. draws: how many its sensors draw.
+    """
+
+    function: Any
+    memory: int
+    draws: int
 
 
-def by_numbers(step: Step) -> Decide:
-    """A controller's step on numbers, as `Pilot.decide`: without the specific force."""
+class Decide(Protocol):
+    """What a pilot decides, by numbers and as a graph."""
 
-    def decide(memory: Array, told: Array, wanted: Array, gains: Array) -> tuple[Array, Array]:
+    def __call__(self, memory: Array, told: Array, wanted: Array, gains: Array) -> tuple[Array, Array]: ...
+
+    def graph(self, told: int, memory: int, gains: int) -> DecisionGraph:
+        """The same as a graph, for rows of so many numbers."""
+
+
+@dataclass(frozen=True)
+class SteppedDecision:
+    """A controller's step, as `Pilot.decide`: without the specific force.
+
+    Attributes:
+        step: see `simulation.controller.Step`.
+    """
+
+    step: Step
+
+    def __call__(self, memory: Array, told: Array, wanted: Array, gains: Array) -> tuple[Array, Array]:
         measured = np.concatenate([told[:-4], told[-1:]])
-        after, commands = step(memory, measured, wanted, gains, np)
+        after, commands = self.step(memory, measured, wanted, gains, np)
         return np.asarray(after), np.asarray(commands)
 
-    return decide
+    def graph(self, told: int, memory: int, gains: int) -> DecisionGraph:
+        casadi = require_casadi()
+        carried, heard, asked, row = (
+            casadi.SX.sym(name, size)
+            for name, size in (("memory", memory), ("told", told), ("wanted", len(WANTED)), ("gains", gains))
+        )
+        measured = np.concatenate([symbols(heard)[:-4], symbols(heard)[-1:]])
+        after, commands = self.step(symbols(carried), measured, symbols(asked), symbols(row), SymbolArrays())
+        results = casadi.densify(casadi.vertcat(expressions(after), expressions(commands)))
+        return DecisionGraph(
+            casadi.Function("decide", [carried, heard, asked, row], [results], {"cse": True}), memory, 0
+        )
 
 
 @dataclass(frozen=True)
@@ -84,6 +124,11 @@ class Pilot:
     title: str = ""
     delays: Array | None = None
     feels: bool = False
+
+    @property
+    def gain_count(self) -> int:
+        """Numbers in a row of gains."""
+        return next(iter(self.gains.values())).size
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -143,7 +188,7 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
             gains[mode, decoupled] = np.array([*head, *travel, *chosen.gains])
     _check_rate(base.rate, base.model)
     return Pilot(
-        by_numbers(coaxial_step),
+        SteppedDecision(coaxial_step),
         base.memory,
         gains,
         DEFAULT_AMPLITUDE,
@@ -188,6 +233,14 @@ class DesignedLaw:
         everything = np.concatenate([told, self._random.standard_normal(self.law.draws)])
         after = np.asarray(self.law.function(memory, everything[self.law.places], wanted[: len(REFERENCES)]))[:, 0]
         return after[: self.law.memory], after[self.law.memory :]
+
+    def graph(self, told: int, memory: int, gains: int) -> DecisionGraph:
+        """As `Decide.graph`."""
+        casadi, law = require_casadi(), self.law
+        sizes = {"memory": memory, "told": told + law.draws, "wanted": len(WANTED), "gains": gains}
+        carried, heard, asked, row = (casadi.MX.sym(name, size) for name, size in sizes.items())
+        results = law.function(carried, heard[law.places.tolist()], asked[: len(REFERENCES)])
+        return DecisionGraph(casadi.Function("decide", [carried, heard, asked, row], [results]), memory, law.draws)
 
 
 def _designed(vehicle: Vehicle, trim: Trim, controller: Controller) -> Pilot:
@@ -243,7 +296,7 @@ def _state_feedback(vehicle: Vehicle, trim: Trim) -> Pilot:
         for on in (True, False)
     }
     return Pilot(
-        by_numbers(partial(state_feedback_step, inputs=m, states=n)),
+        SteppedDecision(partial(state_feedback_step, inputs=m, states=n)),
         np.zeros(1),
         gains,
         axes.amplitude,

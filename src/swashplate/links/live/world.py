@@ -27,7 +27,7 @@ from swashplate.simulation.record import check_divergence
 from swashplate.simulation.stepping import LONGEST_STEP
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
-from swashplate.simulation.wind import Gusts, Turbulence
+from swashplate.simulation.wind import GustFilter, Gusts, Turbulence, filters_of_gusts
 
 PHYSICS_RATE = 500.0
 """Runge-Kutta steps per second [Hz], in the air."""
@@ -96,6 +96,11 @@ class World:
         about = find_trim(vehicle, height=self.start_height, environment=self._environment)
         return pilot(vehicle, about, controller=self._controller)
 
+    @property
+    def steps_back(self) -> NDArray[np.int_]:
+        """How many periods ago the input was given that acts in a step, shape (steps of a period, inputs)."""
+        return self._back
+
     # ---- what the pilot does -----------------------------------------------------------------------------------
     def reset(self) -> None:
         """Back to the hover; switches stay, what was being recorded is kept up to here."""
@@ -146,8 +151,7 @@ class World:
         self.setting.gusts = sigma
         self._turbulence = None
         if sigma > 0.0:
-            gusts = Gusts((sigma, sigma, 0.6 * sigma), (_GUST_LENGTH,) * 3, _GUST_SPEED)
-            self._turbulence = Turbulence(gusts, rate=1.0 / self.period, seed=self._seed)
+            self._turbulence = Turbulence(_gusts(sigma), rate=1.0 / self.period, seed=self._seed)
 
     def fly_maneuver(self, maneuver: Maneuver) -> None:
         """Add a maneuver to the inputs from now on.
@@ -314,6 +318,15 @@ class World:
         """Take over the switches of another world (a bar was put on or off)."""
         self.setting = replace(other.setting, sticks=dict(other.setting.sticks))
         self.reset()
+
+
+def _gusts(sigma: float) -> Gusts:
+    return Gusts((sigma, sigma, 0.6 * sigma), (_GUST_LENGTH,) * 3, _GUST_SPEED)
+
+
+def gust_filters(sigma: float, *, rate: float) -> list[GustFilter]:
+    """White noise to the page's turbulence of a standard deviation [m/s], at so many samples a second."""
+    return filters_of_gusts(_gusts(sigma), rate)
 
 
 def _delays(vehicle: Vehicle, delays: Array | None) -> Array:

@@ -108,5 +108,5 @@ function steer(elapsed) {
   connection.say("stick", { ...axes, number });
 }
 
-window.swash = { sticks, scene, get now() { return now; }, get charts() { return charts; }, get latency() { return latency; }, pace };
+window.swash = { connection, sticks, scene, get now() { return now; }, get charts() { return charts; }, get latency() { return latency; }, pace };
 pace.run(frame);

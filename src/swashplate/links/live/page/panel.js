@@ -108,6 +108,7 @@ export class Panel {
     $("controller").textContent = `Controller: ${hello.controller}, ${hello.rate.toFixed(0)} Hz.`;
     $("trust").textContent = `Where the card may be trusted: ${hello.trust}`;
     $("folder").textContent = `Recordings and reports go to the folder ${hello.folder}.`;
+    $("folder").hidden = !hello.folder; // a page that flies by itself saves to downloads
   }
 
   gamepad(name) {

@@ -1,0 +1,110 @@
+"""C of one period of the live page, law and physics, and the same as WebAssembly: what flies where no Python is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from swashplate.atomic import scratch_folder
+from swashplate.compiler import ran, ziglang
+from swashplate.engine.c_expression import body
+from swashplate.engine.equations import equations_of
+from swashplate.engine.fly import flight_code
+from swashplate.engine.law import FELT, print_function
+from swashplate.engine.roots import require_casadi
+from swashplate.engine.template import filled
+from swashplate.engine.trace import traced_force, traced_placing
+from swashplate.errors import ExportError
+from swashplate.extras import missing
+from swashplate.links.live.pilots import WANTED
+from swashplate.links.live.world import World
+
+EXPORTS = ("frame", "buffer", "delays", "memory")
+"""What the module shows."""
+_TARGET = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-nostartfiles", "-Wl,--no-entry", "-Wl,--strip-all")
+_OPTIONS = ("-O2", "-fno-math-errno", "-fno-trapping-math", "-w")
+_STACK = 1 << 18
+"""Bytes: a period of a vehicle with a hundred states needs a tenth of it."""
+
+
+def frame_code(world: World, *, crafts: int) -> str:
+    """C of `frame`: one period of the controller for one of some crafts (`templates/frame.c`).
+
+    Args:
+        world: what flies; its vehicle, law, delays and steps.
+        crafts: how many may fly beside each other.
+
+    Raises:
+        ExportError: for equations or a law that CasADi cannot trace.
+        MissingLibraryError: without CasADi.
+    """
+    require_casadi()
+    equations = equations_of(world.vehicle)
+    told = len(world.vehicle.state_names) + len(FELT) + 1
+    law = world.pilot.decide.graph(told, world.pilot.memory.size, world.pilot.gain_count)
+    printed, _ = print_function(law.function, "double")
+    force = placing = ""
+    if world.pilot.feels:
+        force = body(
+            traced_force(equations), real="double", precision="double", inputs=["x", "w", "p"], outputs=["felt"]
+        )
+    if not world.vehicle.traits.linear:
+        placing = body(
+            traced_placing(len(world.vehicle.state_names)),
+            real="double",
+            precision="double",
+            inputs=["x"],
+            outputs=["row"],
+        )
+    f, back = law.function, world.steps_back
+    return filled(
+        "frame.c",
+        {
+            "FLIGHT": flight_code(
+                equations, None, precision="double", lanes=1, quaternion=not world.vehicle.traits.linear
+            ),
+            "TRACED": printed,
+            "PLACE": placing,
+            "FEELS": int(world.pilot.feels),
+            "FORCE": force,
+            "NAME": f.name(),
+            "LONGEST": max(1, int(f.sz_w())),
+            "WHOLES": max(1, int(f.sz_iw())),
+            "ARGUMENTS": max(4, int(f.sz_arg())),
+            "RESULTS": max(1, int(f.sz_res())),
+            "PERIOD": len(back),
+            "DEPTH": 1 + int(np.max(back)),
+            "CARRIED": law.memory,
+            "ASKED": len(WANTED),
+            "GAINS": world.pilot.gain_count,
+            "DRAWN": law.draws,
+            "CRAFTS": crafts,
+            "STEP": repr(world.period / len(back)),
+        },
+    )
+
+
+def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS[:3]) -> bytes:
+    """A C source as a WebAssembly module that imports nothing.
+
+    Args:
+        source: C without a main.
+        exports: functions that it shows, beside its memory.
+
+    Raises:
+        MissingLibraryError: without ziglang, the extra `compiler`.
+        ExportError: where it refuses the source.
+    """
+    program = ziglang()
+    if program is None:
+        raise missing("ziglang", what="a page that flies by itself")
+    with scratch_folder() as folder:
+        text, made = folder / "frame.c", folder / "frame.wasm"
+        text.write_text(source, encoding="utf-8")
+        shown = [f"-Wl,--export={name}" for name in exports]
+        command = [*program, *_TARGET, f"-Wl,-z,stack-size={_STACK}", *_OPTIONS, *shown]
+        code, _, said = ran([*command, "-o", str(made), str(text)], where="WebAssembly")
+        if code != 0 or not made.is_file():
+            raise ExportError(f"ziglang refused the model's C: {said.strip()[:300]}", where="WebAssembly")
+        return made.read_bytes()

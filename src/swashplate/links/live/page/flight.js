@@ -1,0 +1,193 @@
+// One helicopter and what flies beside it, a period of the controller at a time: `links/live/world.py` over WebAssembly.
+const PARTS = ["x", "past", "carried", "inputs", "card", "wanted", "gains", "around", "added", "limits", "draws"];
+const OWN = 5; // of the parts, those that each craft has
+const HELD = 3; // m from a place that is held, beyond which it is not
+const LEAN = Math.PI / 3; // where a linear model tells nothing any more
+
+function normal() {
+  return Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
+}
+
+export class Flight {
+  constructor(instance, model) {
+    const { frame, buffer, delays, memory } = instance.exports;
+    this.model = model;
+    this.period = model.period;
+    this.frame = frame;
+    const { states, hello, sizes } = model, m = hello.inputs.length;
+    const long = { x: states.length, past: sizes.depth * m, carried: sizes.carried, inputs: m, card: model.card.length, wanted: 10,
+      gains: sizes.gains, around: 4, added: m, limits: 2 * m, draws: sizes.draws };
+    const array = (which, craft) => new Float64Array(memory.buffer, buffer(which, craft), long[PARTS[which]]);
+    this.places = Array.from({ length: sizes.crafts }, (_, craft) => Object.fromEntries(PARTS.slice(0, OWN).map((name, i) => [name, array(i, craft)])));
+    PARTS.slice(OWN).forEach((name, i) => (this[name] = array(OWN + i, 0)));
+    new Int32Array(memory.buffer, delays(), model.back.length).set(model.back);
+    this.limits.set([...hello.inputs.map(({ low }) => low), ...hello.inputs.map(({ high }) => high)]);
+    this.places.forEach(({ card }, i) => card.set(i < 2 ? model.card : model.draws[i - 2]));
+    this.setting = { mode: model.mode, decoupled: true, ghost: false, wind: [0, 0, 0], gusts: 0, voltage: model.voltage,
+      sticks: { roll: 0, pitch: 0, yaw: 0, heave: 0 }, number: 0 };
+    this.place = Object.fromEntries(["x", "y", "z", "u", "v", "phi", "theta", "psi"].map((name) => [name, states.findIndex(([n]) => n === name)]));
+    this.reset();
+  }
+
+  // ---- what the pilot does
+  reset() {
+    this.ticks = 0;
+    this.trouble = "";
+    this.maneuver = null;
+    this.setting.wind = [0, 0, 0];
+    this.setGusts(0);
+    this.#fresh(0);
+    if (this.setting.ghost) this.#fresh(1);
+    this.#take();
+    this.#beginFan();
+  }
+  #fresh(craft) {
+    const { x, past, carried, inputs } = this.places[craft], { trim } = this.model;
+    x.set(trim.x);
+    inputs.set(trim.u);
+    for (let k = 0; k < past.length; k += inputs.length) past.set(trim.u, k);
+    carried.set(this.model.carried);
+  }
+  #copy(to) {
+    for (const part of ["x", "past", "carried", "inputs"]) this.places[to][part].set(this.places[0][part]);
+  }
+  #take() {
+    const { x } = this.places[0], { place } = this;
+    this.target = [x[place.x], x[place.y], x[place.z], x[place.psi]];
+  }
+  #beginFan() {
+    this.fan = this.model.draws.map((_, i) => i + 2);
+    this.fan.forEach((craft) => this.#copy(craft));
+    this.fanBegun = this.ticks;
+  }
+  steer(fields) {
+    for (const axis of Object.keys(this.setting.sticks)) this.setting.sticks[axis] = fields[axis];
+    this.setting.number = fields.number;
+  }
+  setMode(mode) {
+    if (mode === this.setting.mode || !this.model.gains[mode]) return;
+    this.setting.mode = mode;
+    for (const { carried } of this.places) carried.set(this.model.carried);
+    this.#beginFan();
+    this.#take();
+  }
+  setGhost(on) {
+    this.setting.ghost = on;
+    if (on) this.#copy(1);
+  }
+  setGusts(sigma) {
+    this.setting.gusts = sigma;
+    this.air = sigma ? this.model.gusts.map(({ start }) => start.map((row) => row.reduce((sum, part) => sum + part * normal(), 0))) : null;
+  }
+  flyManeuver(kind, axis, size) {
+    this.maneuver = { shape: this.model.maneuvers[kind], vector: this.model.axes[axis].map((part) => part * size), begun: this.ticks };
+  }
+  get maneuverLeft() {
+    return this.maneuver ? Math.max(0, (this.maneuver.shape.length - (this.ticks - this.maneuver.begun)) * this.period) : 0;
+  }
+
+  // ---- time
+  step() {
+    if (this.trouble) return false;
+    const { setting, places, model, place } = this, own = places[0], before = [...own.x];
+    this.#ask();
+    this.#blow();
+    this.#add();
+    if (this.fan.length && (this.ticks - this.fanBegun) * this.period >= model.hello.fan_seconds) this.#beginFan();
+    for (const craft of [0, ...(setting.ghost ? [1] : []), ...this.fan]) {
+      for (let i = 0; i < this.draws.length; i += 1) this.draws[i] = normal();
+      this.gains.set(model.gains[setting.mode][setting.decoupled !== (craft === 1) ? 0 : 1]);
+      this.frame(craft);
+    }
+    this.fan = this.fan.filter((craft) => !this.#lost(places[craft].x));
+    this.trouble = this.#ended(before);
+    if (this.trouble) {
+      own.x.set(before);
+      return false;
+    }
+    if (setting.ghost && this.#lost(places[1].x)) setting.ghost = false;
+    this.latest = [...before, ...own.inputs, ...this.around];
+    this.ticks += 1;
+    return true;
+  }
+  #lost(x) {
+    return !x.every(Number.isFinite) || (this.model.linear ? this.#leans(x) : x[this.place.z] >= 0.5 - this.model.trim.x[this.place.z]);
+  }
+  #leans(x) {
+    return Math.max(Math.abs(x[this.place.phi]), Math.abs(x[this.place.theta])) > LEAN;
+  }
+  #ended(before) {
+    const { x } = this.places[0], { place, model } = this;
+    if (!x.every(Number.isFinite) || x.some((value, i) => Math.abs(value) > model.largest[i]))
+      return "The simulation left the range in which the equations hold. Reset to fly again.";
+    if (model.linear) return this.#leans(x) ? "Leans 60 deg, where a linear model tells nothing any more. Reset to fly again." : "";
+    const sink = (x[place.z] - before[place.z]) / this.period;
+    return x[place.z] > 0 && !model.ground ? `Touched the ground at ${sink.toFixed(1)} m/s. Reset to fly again.` : "";
+  }
+  // The reference row: sticks move what is held, or go through.
+  #ask() {
+    const { setting, model, target, period } = this, s = setting.sticks, row = new Array(10).fill(0);
+    if (setting.mode === "raw") {
+      this.#take();
+      row[8] = s.yaw;
+      row[9] = s.heave;
+    } else {
+      const height = target[2] - period * model.climb * s.heave;
+      target[2] = model.linear ? height : Math.min(height, -0.2);
+      target[3] += period * model.turn * s.yaw;
+    }
+    if (["raw", "held", "attitude"].includes(setting.mode)) [row[6], row[7]] = [s.roll, s.pitch];
+    else {
+      const ahead = model.speed * s.pitch, right = model.speed * s.roll;
+      [row[4], row[5]] = [ahead, right];
+      const c = Math.cos(target[3]), n = Math.sin(target[3]);
+      target[0] += period * (c * ahead - n * right);
+      target[1] += period * (n * ahead + c * right);
+    }
+    row.splice(0, 4, ...this.target);
+    this.wanted.set(row);
+  }
+  #blow() {
+    const wind = [...this.setting.wind];
+    this.air = this.air?.map((state, i) => {
+      const { step, noise, output } = this.model.gusts[i], shaken = state.map(normal);
+      wind[i] += this.setting.gusts * output.reduce((sum, part, k) => sum + part * state[k], 0);
+      return state.map((_, k) => step[k].reduce((sum, part, j) => sum + part * state[j] + noise[k][j] * shaken[j], 0));
+    });
+    this.around.set([...wind, this.setting.voltage]);
+  }
+  #add() {
+    const { maneuver } = this, now = maneuver ? maneuver.shape[this.ticks - maneuver.begun] : undefined;
+    if (now === undefined) this.maneuver = null;
+    this.added.set(now === undefined ? new Array(this.added.length).fill(0) : maneuver.vector.map((part) => part * now));
+  }
+
+  // ---- looking
+  crafts() {
+    const told = (craft) => {
+      const { x, inputs } = this.places[craft];
+      return { x: [...x.slice(0, 12)], u: [...inputs], ...this.#pose(x, inputs) };
+    };
+    return { own: told(0), ...(this.setting.ghost ? { ghost: told(1) } : {}) };
+  }
+  fanned() {
+    if (!this.model.draws.length) return null;
+    return { begun: this.fanBegun * this.period, x: this.model.draws.map((_, i) => (this.fan.includes(i + 2) ? [...this.places[i + 2].x.slice(0, 12)] : null)) };
+  }
+  // How rotors and bar stand, to first order about the hover: for the eye.
+  #pose(x, u) {
+    const { at, slopes, rotors, bar, tail } = this.model.pose, { trim } = this.model;
+    const away = [...x].map((value, i) => value - trim.x[i]).concat([...u].map((value, i) => value - trim.u[i]));
+    const flat = at.map((value, i) => value + slopes[i].reduce((sum, part, j) => sum + part * away[j], 0));
+    const discs = Array.from({ length: rotors }, (_, i) => flat.slice(6 * i, 6 * i + 6)), rest = flat.slice(6 * rotors);
+    return { rotors: discs, bar: bar ? rest.slice(0, 2) : null, tail: tail ? rest.slice(-2) : null };
+  }
+  remark() {
+    const { setting, model, place, target } = this, { x } = this.places[0], remarks = [];
+    const off = Math.hypot(x[place.x] - target[0], x[place.y] - target[1]);
+    if (setting.mode === "position" && off > HELD) remarks.push(`The place is not held, it is ${off.toFixed(0)} m away.`);
+    const speed = Math.hypot(x[place.u], x[place.v]);
+    if (model.fastest !== null && speed > model.fastest) remarks.push(`It moves at ${speed.toFixed(1)} m/s: the card may be trusted up to ${model.fastest} m/s.`);
+    return remarks.join(" ");
+  }
+}

@@ -1,0 +1,220 @@
+"""The live page as one HTML file that flies by itself, its modules, libraries and the model as WebAssembly in it."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import json
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.engine.equations import parameter_row
+from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.links.live.axes import STICKS
+from swashplate.links.live.frame_code import frame_code, web_assembly
+from swashplate.links.live.picture import inputs_of, picture, pose_of
+from swashplate.links.live.world import FAN_SECONDS, World, gust_filters
+from swashplate.links.web.libraries import PAGE, check_page
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.record import largest_states
+
+_MODULES = (
+    "vendor/three.core.min.js",
+    "vendor/three.module.min.js",
+    "vendor/uPlot.esm.js",
+    *("trail.js", "fan.js", "helicopter.js", "scene.js", "charts.js", "instruments.js", "pace.js", "panel.js"),
+    *("sticks.js", "flight.js", "alone.js", "live.js"),
+)
+"""In an order in which each comes after what it imports."""
+_KINDS = {"sweep": (30.0, (0.3, 5.0)), "doublet": (1.0, None), "3211": (3.5, None)}
+_CARD_HEAD = ("name", "value", "unit", "±", "source")
+
+
+def single_page(world: World, *, name: str, draws: Sequence[Vehicle] = (), made: Sequence[str] = ()) -> str:
+    """The text of the page.
+
+    Args:
+        world: what flies, at its start.
+        name: of the model, for what is recorded.
+        draws: models that a fit cannot tell from it, which fly beside it.
+        made: what it was made from, a line each: commit, card, data.
+
+    Raises:
+        SwashError: without the page's libraries, ziglang or CasADi, or for equations that become no C.
+    """
+    check_page()
+    code = web_assembly(frame_code(world, crafts=2 + len(draws)))
+    modules = [[name.rpartition("/")[2], _module(name)] for name in _MODULES]
+    styles = "".join((PAGE / name).read_text(encoding="utf-8") for name in ("vendor/uPlot.min.css", "style.css"))
+    script = (PAGE / "bundle.js").read_text(encoding="utf-8")
+    allowed = {
+        "default-src": "'none'",
+        "script-src": f"'sha256-{_digest(script)}' blob: 'wasm-unsafe-eval'",
+        "style-src": "'unsafe-inline'",
+        "img-src": "data: blob:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
+    policy = "; ".join(f"{what} {who}" for what, who in allowed.items())
+    page = (PAGE / "live.html").read_text(encoding="utf-8")
+    page = re.sub(r'<link rel="stylesheet"[^>]*>\n', "", page)
+    page = page.replace(
+        '<meta charset="utf-8">',
+        f'<meta charset="utf-8">\n<meta http-equiv="Content-Security-Policy" content="{html.escape(policy)}">',
+    )
+    page = page.replace("<title>swash live</title>", f"<title>{html.escape(world.vehicle.card.title)}</title>")
+    page = page.replace("</head>", f"<style>{styles}</style>\n</head>")
+    page = page.replace('<p id="folder"></p>', f'<p id="folder"></p>\n{_card(world.vehicle)}\n{_origin(made)}')
+    bodies = (
+        f'<script type="application/json" id="model">{_json(_model(world, name, draws))}</script>',
+        f'<script type="text/plain" id="flight">{_packed(code)}</script>',
+        f'<script type="text/plain" id="modules">{_packed(json.dumps(modules).encode())}</script>',
+        f"<script>{script}</script>",
+    )
+    return page.replace('<script type="module" src="/page/live.js"></script>', "\n".join(bodies))
+
+
+def _module(name: str) -> str:
+    text = (PAGE / name).read_text(encoding="utf-8")
+    return text.replace('"./connection.js"', '"./alone.js"') if name == "live.js" else text
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def _packed(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+
+
+def _json(document: Any) -> str:
+    """JSON that ends no script, whatever a card calls things."""
+    return json.dumps(document, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _model(world: World, name: str, draws: Sequence[Vehicle]) -> dict[str, Any]:
+    """All that `page/flight.js` must know."""
+    vehicle, pilot = world.vehicle, world.pilot
+    names = vehicle.input_names
+    nominal = world.nominal_voltage
+    around = world.environment()
+    law = pilot.decide.graph(len(vehicle.state_names) + 4, pilot.memory.size, pilot.gain_count)
+    steps = world.steps_back
+    return {
+        "name": name,
+        "hello": {
+            "title": vehicle.card.title,
+            "trust": vehicle.card.trust,
+            "about": vehicle.traits.about,
+            "wind": vehicle.traits.wind,
+            "bar": False,
+            "hows": [],
+            "controller": pilot.title,
+            "picture": picture(vehicle),
+            "inputs": inputs_of(vehicle),
+            "modes": list(pilot.modes),
+            "decoupling": pilot.decouples,
+            "voltages": None if nominal is None else [round(0.8 * nominal, 1), round(1.08 * nominal, 1)],
+            "rate": 1.0 / world.period,
+            "folder": "",
+            "estimates": [],
+            "fan": len(draws),
+            "fan_seconds": FAN_SECONDS,
+            "learns": False,
+        },
+        "states": [list(pair) for pair in zip(vehicle.state_names, vehicle.state_units, strict=True)],
+        "period": world.period,
+        "sizes": {
+            "depth": 1 + int(np.max(steps)),
+            "carried": pilot.memory.size,
+            "gains": pilot.gain_count,
+            "draws": law.draws,
+            "crafts": 2 + len(draws),
+        },
+        "back": steps.ravel().tolist(),
+        "trim": {"x": world.trim.state.tolist(), "u": np.asarray(world.trim.inputs).tolist()},
+        "carried": np.asarray(pilot.memory).tolist(),
+        "card": parameter_row(vehicle, around).tolist(),
+        "draws": [parameter_row(one, around).tolist() for one in draws],
+        "gains": {mode: [pilot.gains[mode, on].tolist() for on in (True, False)] for mode in pilot.modes},
+        "mode": world.setting.mode,
+        "voltage": world.setting.voltage,
+        "speed": pilot.speed,
+        "climb": pilot.climb,
+        "turn": pilot.turn,
+        "linear": vehicle.traits.linear,
+        "ground": bool(vehicle.card.options.get("ground")),
+        "fastest": vehicle.card.fastest,
+        "largest": largest_states(vehicle).tolist(),
+        "gusts": [
+            {part: np.atleast_1d(value).tolist() for part, value in one._asdict().items()}
+            for one in gust_filters(1.0, rate=1.0 / world.period)
+        ],
+        "maneuvers": {kind: _shape(kind, world.period) for kind in _KINDS},
+        "axes": {axis: _vector(world, axis, names) for axis in STICKS},
+        "pose": _pose(world),
+    }
+
+
+def _shape(kind: str, period: float) -> list[float]:
+    """One maneuver of the amplitude 1, a number a period."""
+    duration, band = _KINDS[kind]
+    maneuver = Maneuver(kind, ("axis",), duration, 1.0, band)
+    time = np.arange(0.0, duration, period)
+    return np.round(maneuver.offsets(time, inputs=["axis"])["axis"], 6).tolist()
+
+
+def _vector(world: World, axis: str, names: Sequence[str]) -> list[float]:
+    """What a maneuver of the usual size adds to each input at its largest."""
+    pilot, vehicle = world.pilot, world.vehicle
+    one = Maneuver("step", (pilot.excited[axis],), 1.0, pilot.amplitude[axis])
+    added = one.offsets(np.array([0.5]), inputs=names, axes=vehicle.stick_axes)
+    return [float(added[name][0]) for name in names]
+
+
+def _pose(world: World) -> dict[str, Any]:
+    """How rotors, bar and tail stand in the hover, and how states and inputs move that, to first order."""
+    pose, around = pose_of(world.vehicle), world.environment()
+    x, u = np.array(world.trim.state, dtype=float), np.array(world.trim.inputs, dtype=float)
+
+    def flat(row: Array) -> tuple[Array, dict[str, Any]]:
+        told = pose(row[: x.size].tolist(), row[x.size :].tolist(), around)
+        parts = [*told["rotors"], told["bar"] or [], told["tail"] or []]
+        return np.concatenate([np.asarray(part, dtype=float) for part in parts]), told
+
+    row = np.concatenate([x, u])
+    at, told = flat(row)
+    slopes = np.empty((at.size, row.size))
+    for k in range(row.size):
+        step = 1e-5 * max(1.0, abs(row[k]))
+        away = np.zeros(row.size)
+        away[k] = step
+        slopes[:, k] = (flat(row + away)[0] - flat(row - away)[0]) / (2.0 * step)
+    return {
+        "at": np.round(at, 7).tolist(),
+        "slopes": [[float(f"{v:.6g}") for v in line] for line in slopes],
+        "rotors": len(told["rotors"]),
+        "bar": told["bar"] is not None,
+        "tail": told["tail"] is not None,
+    }
+
+
+def _card(vehicle: Vehicle) -> str:
+    """The card's numbers with their bounds and sources, as a table that unfolds."""
+    rows = []
+    for name, one in vehicle.card.parameters.items():
+        spread = "" if one.sigma is None or not np.isfinite(one.sigma) else f"{one.sigma:.2g}"
+        cells = (name, f"{one.value:.6g}", one.unit, spread, one.source)
+        rows.append("<tr>" + "".join(f"<td>{html.escape(str(cell))}</td>" for cell in cells) + "</tr>")
+    head = "".join(f"<th>{name}</th>" for name in _CARD_HEAD)
+    return f"<details><summary>Numbers of the card</summary><table><tr>{head}</tr>{''.join(rows)}</table></details>"
+
+
+def _origin(made: Sequence[str]) -> str:
+    return "".join(f"<p>{html.escape(line)}</p>" for line in made)

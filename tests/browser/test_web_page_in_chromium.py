@@ -1,0 +1,136 @@
+"""A model exported as one HTML file, opened from the disk with the network off: it flies as it flies here."""
+
+from __future__ import annotations
+
+import csv
+import json
+import time
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import chromium
+import swashplate as sp
+from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.links.live.axes import STICKS
+from swashplate.links.live.world import World
+from swashplate.links.web.libraries import PAGE
+
+FLY = """plan => {
+  const { connection } = swash, { flight } = connection;
+  connection.runs = false;
+  flight.reset();
+  for (let k = 0; k < plan.sticks.length; k += 1) {
+    flight.setting.sticks = Object.fromEntries(plan.axes.map((axis, i) => [axis, plan.sticks[k][i]]));
+    if (k === plan.maneuver) flight.flyManeuver("3211", "roll", 1);
+    if (k === plan.mode) flight.setMode("velocity");
+    if (k === plan.blow && plan.wind) flight.setting.wind = [1, -0.5, 0];
+    flight.step();
+  }
+  return { x: [...flight.places[0].x], u: [...flight.places[0].inputs], trouble: flight.trouble };
+}"""
+MANEUVER, BLOW, MODE = 300, 500, 700
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    if not (PAGE / "vendor" / "three.module.min.js").is_file():
+        pytest.skip("the page's libraries are not here: python scripts/vendor_page.py (needs npm)")
+    if find_spec("ziglang") is None:
+        pytest.skip("the extra 'compiler' is not installed: nothing makes WebAssembly")
+    yield from chromium.running_browser(webgl=True)
+
+
+def opened(browser: Any, file: Path, size: tuple[int, int] = (1280, 860)) -> tuple[Any, list[str]]:
+    """The page, flying, and what it said and asked for elsewhere."""
+    context = browser.new_context(offline=True, viewport={"width": size[0], "height": size[1]})
+    page, said = context.new_page(), []
+    page.on("console", lambda message: said.append(f"{message.type}: {message.text}"))
+    page.on("pageerror", lambda error: said.append(f"error: {error}"))
+    page.on(
+        "request",
+        lambda request: said.append(f"error: asked for {request.url}") if request.url.startswith("http") else None,
+    )
+    page.goto(file.as_uri())
+    page.locator("html[data-drawn]").wait_for(state="attached", timeout=90_000)
+    return page, said
+
+
+def wait_until(page: Any, condition: str) -> None:
+    """Until an expression of the page holds; the page's own policy forbids playwright's way to ask."""
+    end = time.monotonic() + 90.0
+    while not page.evaluate(condition):
+        assert time.monotonic() < end, condition
+        page.wait_for_timeout(50)
+
+
+def plan_of(world: World) -> dict[str, Any]:
+    at = np.arange(round(10.0 / world.period)) * world.period
+    waves = (0.5 * np.sin(2.0 * at), 0.4 * np.sin(1.3 * at), 0.3 * np.cos(at), 0.2 * np.sin(0.7 * at))
+    known = {"axes": list(STICKS), "maneuver": MANEUVER, "mode": MODE, "blow": BLOW}
+    return {**known, "sticks": np.stack(waves, axis=1).tolist(), "wind": world.vehicle.traits.wind}
+
+
+def flown_here(world: World, plan: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    for k, sticks in enumerate(plan["sticks"]):
+        world.setting.sticks = dict(zip(STICKS, sticks, strict=True))
+        if k == MANEUVER:
+            pilot = world.pilot
+            world.fly_maneuver(Maneuver("3211", (pilot.excited["roll"],), 3.5, pilot.amplitude["roll"]))
+        if k == MODE:
+            world.set_mode("velocity")
+        if k == BLOW and plan["wind"]:
+            world.setting.wind = (1.0, -0.5, 0.0)
+        world.step()
+    own = world.moment().crafts["own"]
+    return np.array(own[0]), np.array(own[1])
+
+
+@pytest.mark.parametrize("name", ["coax", "raptor50", "crazyflie"])
+def test_it_flies_as_here_with_the_network_off(browser: Any, name: str, tmp_path: Path) -> None:
+    (file,) = sp.export_model(name, "web").save(tmp_path)
+    assert file.stat().st_size < 1_000_000
+    page, said = opened(browser, file)
+    world = World(sp.vehicle(name))
+    plan = plan_of(world)
+    found = page.evaluate(FLY, plan)
+    x, u = flown_here(world, plan)
+    assert found["trouble"] == world.trouble == ""
+    np.testing.assert_allclose(found["x"], x, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found["u"], u, rtol=1e-9, atol=1e-9)
+    assert not chromium.complaints(said)
+
+
+def test_a_recording_is_a_log(browser: Any, tmp_path: Path) -> None:
+    """On a telephone's screen; what is saved is read like any table, and holds what was flown."""
+    (file,) = sp.export_model("coax", "web").save(tmp_path)
+    page, said = opened(browser, file, (390, 844))
+    page.locator("#record").click()
+    page.locator("[data-maneuver=doublet]").click()
+    page.get_by_text("Stop and save").wait_for()
+    wait_until(page, "swash.now.recording >= 1.5")
+    with page.expect_download() as coming:
+        page.locator("#record").click()
+    coming.value.save_as(tmp_path / "coax.csv")
+    flight = sp.read(tmp_path / "coax.csv")
+    assert np.ptp(flight.values("servo_roll")) > 0.05, "the doublet is in it"
+    with (tmp_path / "coax.csv").open(encoding="utf-8") as text:
+        assert next(csv.reader(text))[:2] == ["time [s]", "x [m]"]
+    assert "coax.csv is saved" in page.locator("#trouble").text_content()
+    assert not chromium.complaints(said)
+
+
+def test_draws_fly_beside_it(browser: Any, tmp_path: Path) -> None:
+    coax = sp.vehicle("coax")
+    heavier = [coax.with_values({"mass": coax.card.values()["mass"] * share}) for share in (0.95, 1.05)]
+    (file,) = sp.export_model(coax, "web", draws=heavier).save(tmp_path)
+    page, said = opened(browser, file)
+    page.locator("#fan").wait_for(state="visible")
+    wait_until(page, "swash.now.t >= 0.5")
+    own, (light, heavy) = page.evaluate("[swash.now.own.x[2], swash.now.fan.x.map(x => x[2])]")
+    assert light < own < heavy, json.dumps([light, own, heavy])  # down is positive: the heavier one sinks
+    assert not chromium.complaints(said)
