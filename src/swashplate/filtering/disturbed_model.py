@@ -140,6 +140,11 @@ class StochasticModel:
         C = np.concatenate([by_state, np.zeros((*by_state.shape[:-1], g + d)), shaken], axis=-1)
         return A, C, self.process_noise(by_push, noise), diagonal(self.sensor_variances(noise))
 
+    def white(self, noise: Noise) -> Any:
+        """Intensities of white noise on the disturbed accelerations."""
+        tilt, yaw, horizontal, vertical = noise[:4]
+        return np.stack(on_axes(horizontal, vertical, tilt, yaw), axis=-1)
+
     def process_noise(self, by_push: Any, noise: Noise) -> Any:
         """Covariance of what a sample adds to states, gusts, drifts and the line.
 
@@ -148,13 +153,12 @@ class StochasticModel:
             noise: intensities.
         """
         n, g, d = by_push.shape[-2], self.n_gusts, N_DISTURBANCES
-        tilt, yaw, horizontal, vertical = noise[:4]
-        white = np.stack(on_axes(horizontal, vertical, tilt, yaw), axis=-1)
+        white = self.white(noise)
         tilt, yaw, horizontal, vertical = noise[4:8]
         gust = np.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind][:g], axis=-1)
         drift = np.stack(on_axes(*_shared_or_own(noise, "drift")), axis=-1)
         # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
-        spread = (by_push * (white**2 / self.dt)[..., None, :]) @ np.swapaxes(by_push, -1, -2) + self._floor(n)
+        spread = (by_push * (white**2 / self.dt)[..., None, :]) @ np.swapaxes(by_push, -1, -2) + np.diag(self.unexcited)
         gusts, drifts = (diagonal(row**2 * self.dt) for row in (gust, drift))
         rms = np.stack([noise.line_angle, noise.line_angle, noise.line_height, noise.line_height], axis=-1)
         line = diagonal((1.0 - self._line_kept(noise) ** 2)[..., None] * rms[..., : self.n_line] ** 2)
@@ -196,10 +200,11 @@ class StochasticModel:
         shaken = {"phi": pairs[0], "theta": pairs[1], "z": pairs[2]}
         return np.stack([shaken.get(name, 0.0 * pairs[0]) for name in self.output_names])[:, : self.n_line]
 
-    def _floor(self, n: int) -> Any:
-        """A little noise on the states that no disturbance reaches: rotor speeds [rad/s] and angles [rad]."""
+    @property
+    def unexcited(self) -> Array:
+        """A little variance per sample on states that no disturbance reaches: rotor speeds [rad/s] and angles [rad]."""
         speeds = [name.startswith("omega") for name in self.vehicle.state_names]
-        return np.diag(np.where(np.array(speeds), 1e-4, 1e-10)[:n])
+        return np.where(np.array(speeds), 1e-4, 1e-10)
 
     def sensor_variances(self, noise: Noise) -> Any:
         """Variances of the measured channels."""

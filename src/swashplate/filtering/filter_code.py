@@ -38,6 +38,38 @@ class Pushed(NamedTuple):
     push: Array
 
 
+class Following(NamedTuple):
+    """What filters whose gain follows begin with and depend on, by row.
+
+    Attributes:
+        states (rows, joined), covariances (rows, joined, joined): predicted for the first sample.
+        nuisance: of the record (rows, numbers).
+        fade, turn: what is left of gusts after a sample (rows, gusts), how the line turns (rows, line, line).
+        white: variance of the accelerations' white noise, held over a sample (rows, 6).
+        added: variance that a sample adds to gusts, drifts and the line (rows, all three).
+        sensors: variances of the readings (rows, outputs). numbers: of the equations (rows, numbers).
+    """
+
+    states: Array
+    covariances: Array
+    nuisance: Array
+    fade: Array
+    turn: Array
+    white: Array
+    added: Array
+    sensors: Array
+    numbers: Array
+
+
+class Followed(NamedTuple):
+    """Of some rows along a record: innovations (rows, n, outputs), their covariances, and the joined states after each
+    reading (rows, n, joined)."""
+
+    innovations: Array
+    covariances: Array
+    states: Array
+
+
 class FilterCode(Protocol):
     """A model's filter as it runs here: by C or by NumPy, the same numbers to rounding."""
 
@@ -80,4 +112,9 @@ class FilterCode(Protocol):
 
     def rates_and_slopes(self, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
         """Rates (..., n), slopes by the state (..., n, n) and by what drives it (..., n, driving)."""
+        ...
+
+    def follow(self, dt: float, begin: Following, series: RecordSeries) -> Followed:
+        """Filters whose gain follows, for models with a wind: readings that are no number tell nothing; commands by
+        row (n, rows, inputs)."""
         ...

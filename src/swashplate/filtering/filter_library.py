@@ -16,7 +16,7 @@ from swashplate.compiled import NATIVE, can_compile, loaded
 from swashplate.errors import ExportError
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_c import filter_source
-from swashplate.filtering.filter_code import FilterCode, Fixed, Pushed, RecordSeries
+from swashplate.filtering.filter_code import FilterCode, Fixed, Followed, Following, Pushed, RecordSeries
 from swashplate.filtering.filter_virtual import VirtualFilter
 
 _OPTIONS = ("-O2", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
@@ -41,6 +41,7 @@ _ARGUMENTS = {
     "run_rates": "l" + 4 * "*",
     "rates_and_slopes": "l" + 6 * "*",
 }
+_FOLLOWING = {"run_following": "lld" + 15 * "*"}
 
 
 class FilterLibrary:
@@ -58,7 +59,7 @@ class FilterLibrary:
 
     def __init__(self, model: StochasticModel) -> None:
         self._c = loaded(filter_source(model), options=(*_OPTIONS, *_QUIET))
-        for name, kinds in _ARGUMENTS.items():
+        for name, kinds in (_ARGUMENTS | (_FOLLOWING if model.windy else {})).items():
             function = getattr(self._c, name)
             function.argtypes, function.restype = [_KINDS[kind] for kind in kinds], None
         self._directions, self._roots = int(self._c.directions()), int(self._c.roots())
@@ -103,6 +104,13 @@ class FilterLibrary:
         here = after, *map(flat, pushed), flat(numbers), moved, *map(flat, d_pushed), flat(d_numbers)
         self._c.run_steps_moved(len(after), len(moved), dt, *here)
         return after, moved
+
+    def follow(self, dt: float, begin: Following, series: RecordSeries) -> Followed:
+        rows, n, y, joined = len(begin.states), len(series.readings), self._outputs, begin.states.shape[1]
+        told = Followed(np.empty((rows, n, y)), np.empty((rows, n, y, y)), np.empty((rows, n, joined)))
+        here = flat(series.readings), flat(series.commands.swapaxes(0, 1)), flat(series.voltage)
+        self._c.run_following(rows, n, dt, *map(flat, begin), *here, *told)
+        return told
 
     def rates(self, x: Array, w: Array, p: Array) -> Array:
         told = np.empty(x.shape)

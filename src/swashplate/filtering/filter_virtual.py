@@ -18,7 +18,8 @@ from swashplate.engine.roots import require_casadi
 from swashplate.engine.trace import unrolled_rates
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel
 from swashplate.filtering.filter_c import correction
-from swashplate.filtering.filter_code import Fixed, Pushed, RecordSeries
+from swashplate.filtering.filter_code import Fixed, Followed, Following, Pushed, RecordSeries
+from swashplate.filtering.following import followed
 
 _FRACTIONS, _WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 _STRETCH = 512
@@ -170,6 +171,9 @@ class VirtualFilter:
                 by_k[:, :, n + w + N_DISTURBANCES :] += by_p.reshape(len(x), n, own.size) @ moved[:, own].T
             total += weight * dt * by_k
         return total[:, :, : n + w + N_DISTURBANCES], total[:, :, n + w + N_DISTURBANCES :]
+
+    def follow(self, dt: float, begin: Following, series: RecordSeries) -> Followed:
+        return followed(self._model, self, begin, series)
 
     def rates(self, x: Array, w: Array, p: Array) -> Array:
         return self._rates(*(part.reshape(-1, part.shape[-1]) for part in (x, w, p)))[0].reshape(x.shape)

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swashplate.arrays import IMAGINARY, Array, Complex
+from swashplate.arrays import Array
 from swashplate.engine.equations import CONSTANTS
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.filter_library import filter_code
+from swashplate.filtering.following import measured_slopes
 from swashplate.filtering.nuisance import PUSHES, Nuisance
 from swashplate.filtering.riccati import steady_gain, steady_gain_moved
 from swashplate.identification.core.records import Record
@@ -197,33 +198,6 @@ def _slopes(model: StochasticModel, x: Array, inputs: Array, parameters: Array, 
     pushes = np.broadcast_to(np.eye(len(vehicle.state_names))[:, model.disturbed], (*by_x.shape[:2], N_DISTURBANCES))
     wind = len(vehicle.input_names) + np.arange(model.n_gusts - N_DISTURBANCES)
     return by_x, np.concatenate([pushes, by_driving[:, :, wind]], axis=2)
-
-
-def measured_slopes(model: StochasticModel, x: Array, nuisance: Nuisance) -> Array:
-    """Slopes of the measured channels by the states, by row: by complex steps in the angles, plain in the others."""
-    names = model.vehicle.state_names
-    measured = np.tile(np.eye(len(names))[[names.index(name) for name in model.output_names]], (len(x), 1, 1))
-    for place in (names.index(name) for name in ("phi", "theta", "psi")):
-        turned = x + 1j * IMAGINARY * np.eye(len(names))[place]
-        measured[:, :, place] = np.imag(model.measure(turned.T, nuisance, COMPLEX_ARRAYS)).T / IMAGINARY
-    return measured
-
-
-class _ComplexArrays(ArrayBackend):
-    """NumPy's operations, for arrays whose imaginary parts are slopes."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.atan2 = self._atan2
-
-    @staticmethod
-    def _atan2(y: Complex, x: Complex) -> Any:
-        slope = (np.real(x) * np.imag(y) - np.real(y) * np.imag(x)) / (np.real(x) ** 2 + np.real(y) ** 2)
-        return np.arctan2(np.real(y), np.real(x)) + 1j * slope
-
-
-COMPLEX_ARRAYS = _ComplexArrays()
-"""NumPy's operations, where imaginary parts are slopes."""
 
 
 def steady_rows(model: StochasticModel, parameters: Array, voltage: float, velocity: Array) -> tuple[Array, Array]:

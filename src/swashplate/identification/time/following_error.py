@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +19,8 @@ from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.block_matrices import diagonal
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel
-from swashplate.filtering.filter_code import Pushed
+from swashplate.filtering.disturbed_model import StochasticModel
+from swashplate.filtering.filter_code import Followed, Following, RecordSeries
 from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import steady_gain
@@ -34,7 +33,6 @@ from swashplate.identification.time.beginning import (
     FirstMotion,
     first_state,
     joined_at,
-    measured_slopes,
     numbers_and_constants,
     starting_rows,
     starting_samples,
@@ -46,30 +44,11 @@ from swashplate.identification.time.start_states import measured_start, slopes_a
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.discretisation import held_series
 
 _BODY, _ARRAYS = len(RigidBody._fields), ArrayBackend()
 
 _STEP = 1e-4
 """Of a scaled entry, for slopes by differences."""
-
-_AWAY = np.array([-2.22500, -0.97861, 0.97861, 2.22500])
-_SHARES = np.array([0.05036, 0.26179, 0.26179, 0.05036])
-"""Places in standard deviations, beside the mean itself, and their weights: averages over a normal distribution that
-are exact for parabolas, and within 0.7 % for the slope and 0.012 variances for the mean of x |x|, wherever its kink
-lies (found by least squares; the cubature of the third degree is 11 % off at the kink)."""
-
-_STILL = 1e-8
-"""Variance of an air speed that is known for sure [m^2/s^2]."""
-
-
-class Followed(NamedTuple):
-    """Of some rows along a record: innovations (rows, n, outputs), their covariances, and the states after each reading
-    (rows, n, ...)."""
-
-    innovations: Array
-    covariances: Array
-    states: FilterState
 
 
 class FollowingError(FilterError):
@@ -144,7 +123,7 @@ class FollowingError(FilterError):
                 counted=counted.astype(np.float64),
                 model=piece.outputs - run.innovations[0],
                 sigma=np.sqrt(np.diag(run.covariances[0][counted].mean(axis=0))),
-                states=np.asarray(run.states.x)[0][:, kept],
+                states=run.states[0][:, kept],
             )
             for piece, run, counted in zip(self.pieces, self._followed([row]), self.counted, strict=True)
         )
@@ -191,17 +170,39 @@ class FollowingError(FilterError):
             placed = [run.placed(*given, row * self.row.scale) for row in rows]
             commands = np.stack([reaching for reaching, _ in placed], axis=1)
             numbers = FilterNumbers(*map(np.stack, zip(*(numbers for _, numbers in placed), strict=True)))
-            beside, told = FollowingRows(self.model, numbers, run.seen, spread), []
-            for y, u, volts in zip(readings, commands, run.voltage, strict=True):
-                nu, S = beside.corrected(y)
-                told.append((nu, S, beside.state))
-                beside.predicted(u, float(volts))
-            innovations, covariances, states = zip(*told, strict=True)
-            parts = [
-                np.stack(part, axis=1) if isinstance(part[0], np.ndarray) else () for part in zip(*states, strict=True)
-            ]
-            followed.append(Followed(np.stack(innovations, axis=1), np.stack(covariances, axis=1), FilterState(*parts)))
+            begin = following_from(self.model, numbers, run.seen, spread)
+            followed.append(
+                filter_code(self.model).follow(self.model.dt, begin, RecordSeries(readings, commands, run.voltage))
+            )
         return followed
+
+
+def following_from(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Array) -> Following:
+    """What filters of a record begin with and depend on: a filter that has settled in steady flight, its first states
+    off as far as the spread says, and the air, of which nothing is known.
+
+    Args:
+        model: of the filters. numbers: by row. seen: of the record's beginning.
+        spread: how far off the states may be that it begins with, a second moment.
+    """
+    noise, n = Noise(*numbers.noise.T), len(spread)
+    matrices, fade = joined_at(model, numbers, seen), model.fade(noise)
+    covariances = np.array([steady_gain(*of_row)[2] for of_row in zip(*matrices, strict=True)])
+    here, added = slice(n, n + model.n_gusts), np.diagonal(matrices[2], axis1=1, axis2=2)[:, n:]
+    covariances[:, :n, :n] += spread
+    covariances[:, here, here] += diagonal(added[:, : model.n_gusts] / (1.0 - fade**2))
+    state = first_state(model, starting_rows(model, numbers, seen), numbers.nuisance)
+    return Following(
+        states=np.concatenate([part for part in state if not isinstance(part, tuple)], axis=1),
+        covariances=covariances,
+        nuisance=numbers.nuisance,
+        fade=fade,
+        turn=model.line_turn(noise),
+        white=model.white(noise) ** 2 / model.dt,
+        added=added,
+        sensors=model.sensor_variances(noise),
+        numbers=numbers_and_constants(model.vehicle, numbers.parameters),
+    )
 
 
 def _off(vehicle: Vehicle, piece: Record, run: RecordRun, went: Filtered) -> Array:
@@ -233,119 +234,3 @@ def _off(vehicle: Vehicle, piece: Record, run: RecordRun, went: Filtered) -> Arr
     if vehicle.traits.settled is None:  # found by Newton's method at the start, not here
         error[:, _BODY:] = states[:n, _BODY:] - states[:, _BODY:].mean(axis=0)
     return np.asarray(error.T @ error / n)
-
-
-class _Air(NamedTuple):
-    """How the air speed ahead and to the right (rows, 2) is made: of the states (2, states), and of the joined gusts,
-    drifts and line (rows, 2, all of them); `turn` takes north and east there."""
-
-    speeds: Array
-    wind: Array
-    turn: Array
-
-
-class FollowingRows:
-    """One record at some rows of numbers side by side: an extended Kalman filter for each.
-
-    Args:
-        model: of the filter. numbers: by row.
-        seen: of the record's beginning. spread: how far off the states may be that it begins with, a second moment.
-    """
-
-    def __init__(self, model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Array) -> None:
-        self._model, self._code = model, filter_code(model)
-        self._n, self._joined = (
-            len(model.vehicle.state_names),
-            len(spread) + model.n_gusts + N_DISTURBANCES + model.n_line,
-        )
-        self._noise, self._nuisance = Noise(*numbers.noise.T), Nuisance(*numbers.nuisance.T)
-        self._numbers = numbers_and_constants(model.vehicle, numbers.parameters)
-        self._fade, self._lasting = model.fade(self._noise), model.lasting(self._noise)
-        self._line_turn, self._sensors = model.line_turn(self._noise), model.sensor_variances(self._noise)
-        matrices = joined_at(model, numbers, seen)
-        self.state = first_state(model, starting_rows(model, numbers, seen), numbers.nuisance)
-        # That of a filter that has settled in steady flight, how far off the first states may be, and the air.
-        self.covariance = np.array([steady_gain(*of_row)[2] for of_row in zip(*matrices, strict=True)])
-        here = slice(self._n, self._n + model.n_gusts)
-        added = np.diagonal(matrices[2], axis1=1, axis2=2)[:, here] / (1.0 - self._fade**2)
-        self.covariance[:, : self._n, : self._n] += spread
-        self.covariance[:, here, here] += diagonal(added)
-
-    def corrected(self, y: Array) -> tuple[Array, Array]:
-        """After a reading (NaN: none, which tells nothing): the innovations and their covariances."""
-        model, n, P = self._model, self._n, self.covariance
-        expected = model.measure(self.state.x.T, self._nuisance, _ARRAYS).T
-        expected = expected + self.state.line @ model.line_seen.T if model.lined else expected
-        read = np.isfinite(y)
-        nu = np.where(read, y - expected, 0.0)
-        C = np.zeros((len(nu), len(y), self._joined))
-        C[:, :, :n] = measured_slopes(model, self.state.x, self._nuisance)
-        C[:, :, self._joined - model.n_line :] = model.line_seen
-        C *= read[:, None]
-        seen = C @ P
-        S = seen @ np.swapaxes(C, 1, 2) + diagonal(self._sensors)
-        K = np.swapaxes(np.linalg.solve(S, seen), 1, 2)
-        move = (K @ nu[:, :, None])[:, :, 0]
-        ends = np.cumsum([n, model.n_gusts, N_DISTURBANCES])
-        x, gust, drift, line = np.split(move, ends, axis=1)
-        state = self.state
-        line = state.line + line if model.lined else ()
-        self.state = FilterState(state.x + x, state.gust + gust, state.drift + drift, line)
-        self.covariance = P - K @ seen
-        return nu, S
-
-    def predicted(self, u: Array, volts: float) -> None:
-        """One sample later, averaged over what is not known of the air speed (u: by row)."""
-        model, n, g, d, P = self._model, self._n, self._model.n_gusts, N_DISTURBANCES, self.covariance
-        air, m = self._air(), u.shape[1]
-        whole = np.concatenate([np.broadcast_to(air.speeds, (len(u), 2, n)), air.wind], axis=2)
-        spread = np.sqrt(np.maximum(np.einsum("ris,rst,rit->ri", whole, P, whole, optimize=True), _STILL))
-        acting = self.state.gust + np.pad(self.state.drift, ((0, 0), (0, g - d)))
-        driving = np.zeros((len(u), m + 4))
-        driving[:, :m], driving[:, m : m + g - d], driving[:, m + 3] = u, acting[:, d:], volts
-        away = np.repeat(driving[:, None], 2 * len(_AWAY), axis=1).reshape(len(u), len(_AWAY), 2, m + 4)
-        away[..., m : m + 2] -= _AWAY[:, None, None] * (spread[:, :, None] * air.turn)[:, None]
-        front = away.shape[:3]
-        there = self._code.rates(
-            np.broadcast_to(self.state.x[:, None, None], (*front, n)),
-            away,
-            np.broadcast_to(self._numbers[:, None, None], (*front, self._numbers.shape[1])),
-        )
-        here, by_x, by_driving = self._code.rates_and_slopes(self.state.x, driving, self._numbers)
-        # What the spread of the air speed does on average, and averaged slopes (Stein 1981, lemma 1).
-        apart = np.einsum("k,rkin->rn", _SHARES, there - here[:, None, None])
-        by_air = np.einsum("k,rkin->rni", _SHARES * _AWAY, there) / spread[:, None]
-        by_gust = np.concatenate(
-            [np.broadcast_to(self._pushed, (len(u), n, d)), by_driving[:, :, m : m + g - d]], axis=2
-        )
-        more = by_air + by_gust[:, :, d : d + 2] @ np.swapaxes(air.turn, 1, 2)
-        by_x, by_gust = by_x + more @ air.speeds, by_gust + more @ air.wind[:, :, :g]
-        by_x, held = held_series(by_x, model.dt, np.eye(n))
-        by_gust = model.dt * held @ by_gust
-        after = self._code.step(model.dt, self.state.x, Pushed(driving, acting[:, :d]), self._numbers)
-        # Disturbances and the line go on by themselves: F is full in the states' rows alone.
-        rows = np.concatenate([by_x, by_gust, by_gust[:, :, :d], np.zeros((len(u), n, model.n_line))], axis=2)
-        led, kept = rows @ P, self._lasting
-        moved = np.empty_like(P)
-        moved[:, :n, :n] = led @ np.swapaxes(rows, 1, 2)
-        moved[:, :n, n:] = led[:, :, n:] @ np.swapaxes(kept, 1, 2)
-        moved[:, n:, :n] = np.swapaxes(moved[:, :n, n:], 1, 2)
-        moved[:, n:, n:] = kept @ P[:, n:, n:] @ np.swapaxes(kept, 1, 2)
-        moved += model.process_noise(by_gust[:, :, :d], self._noise)
-        state = self.state
-        line = (self._line_turn @ state.line[:, :, None])[:, :, 0] if model.lined else ()
-        self.state = FilterState(after + model.dt * apart, self._fade * state.gust, state.drift, line)
-        self.covariance = 0.5 * (moved + np.swapaxes(moved, 1, 2))
-
-    @cached_property
-    def _pushed(self) -> Array:
-        return np.eye(self._n)[:, self._model.disturbed]
-
-    def _air(self) -> _Air:
-        names = self._model.vehicle.state_names
-        psi = self.state.x[:, names.index("psi")]
-        c, s = np.cos(psi), np.sin(psi)
-        turn = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
-        wind = np.zeros((len(psi), 2, self._joined - self._n))
-        wind[:, :, N_DISTURBANCES : N_DISTURBANCES + 2] = -turn
-        return _Air(np.eye(self._n)[[names.index("u"), names.index("v")]], wind, turn)

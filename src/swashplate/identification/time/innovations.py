@@ -13,10 +13,10 @@ from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel
 from swashplate.filtering.filter_code import RecordSeries
+from swashplate.filtering.following import COMPLEX_ARRAYS
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.beginning import (
-    COMPLEX_ARRAYS,
     Begun,
     FilterNumbers,
     FirstMotion,

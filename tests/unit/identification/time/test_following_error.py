@@ -12,22 +12,20 @@ from scipy.special import erf
 
 import swashplate as sp
 from simulated_flights import FREE, TIE, ten_seconds
+from swashplate.compiled import can_compile
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
+from swashplate.filtering.filter_code import Followed, RecordSeries
+from swashplate.filtering.filter_library import filter_code
+from swashplate.filtering.filter_virtual import VirtualFilter
+from swashplate.filtering.following import AWAY, SHARES, FollowingRows
 from swashplate.identification.core import robust
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
-from swashplate.identification.time.beginning import FilterNumbers, numbers_and_constants, seen_at_start
+from swashplate.identification.time.beginning import FilterNumbers, FirstMotion, numbers_and_constants, seen_at_start
 from swashplate.identification.time.calibration import first_part
-from swashplate.identification.time.following_error import (
-    _AWAY,
-    _SHARES,
-    Followed,
-    FollowingError,
-    FollowingRows,
-    _off,
-)
+from swashplate.identification.time.following_error import FollowingError, _off, following_from
 from swashplate.identification.time.record_filter import record_filter
 from swashplate.identification.time.start_states import slopes_ahead
 
@@ -39,13 +37,18 @@ def _likelihood() -> FollowingError:
     return FollowingError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [first_part(record, 2.5)], noise=noise)
 
 
+def _rows(likelihood: FollowingError, numbers: FilterNumbers, seen: FirstMotion, spread: np.ndarray) -> FollowingRows:
+    model = likelihood.model
+    return FollowingRows(model, filter_code(model), following_from(model, numbers, seen, spread))
+
+
 def _beside(rows: int = 1) -> FollowingRows:
     """Rows of a filter somewhere along the flight, alike."""
     likelihood = _likelihood()
     run, start = likelihood._runs[0], likelihood.row.starts()
     numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), start)[1]
     many = FilterNumbers(*(np.repeat(np.asarray(part)[None], rows, axis=0) for part in numbers))
-    beside = FollowingRows(likelihood.model, many, run.seen, likelihood._spread[0])
+    beside = _rows(likelihood, many, run.seen, likelihood._spread[0])
     states = likelihood.constant.runs(start)[0].states
     beside.state = FilterState(*(np.repeat(part[100][None], rows, axis=0) for part in states))
     return beside
@@ -94,12 +97,12 @@ def test_averages_over_the_air_speed_are_those_of_a_normal_distribution() -> Non
     """x |x| about any mean: its average and its average slope (by parts: 2 |x|), in units of the spread."""
     mean = np.linspace(-4.0, 4.0, 81)
     inside, density = erf(mean / np.sqrt(2.0)), np.exp(-0.5 * mean**2) / np.sqrt(2.0 * np.pi)
-    places = np.append(_AWAY, 0.0) + mean[:, None]
-    values = places * np.abs(places) @ np.append(_SHARES, 1.0 - _SHARES.sum())
-    slopes = places[:, :-1] * np.abs(places[:, :-1]) @ (_SHARES * _AWAY)
+    places = np.append(np.array(AWAY), 0.0) + mean[:, None]
+    values = places * np.abs(places) @ np.append(np.array(SHARES), 1.0 - np.array(SHARES).sum())
+    slopes = places[:, :-1] * np.abs(places[:, :-1]) @ (np.array(SHARES) * np.array(AWAY))
     np.testing.assert_allclose(values, (mean**2 + 1.0) * inside + 2.0 * mean * density, atol=0.012)
     np.testing.assert_allclose(slopes, 2.0 * (mean * inside + 2.0 * density), rtol=0.007)
-    np.testing.assert_allclose(_SHARES @ _AWAY**2, 1.0, atol=1e-4)  # and parabolas are exact
+    np.testing.assert_allclose(np.array(SHARES) @ np.array(AWAY) ** 2, 1.0, atol=1e-4)  # and parabolas are exact
 
 
 def test_what_was_not_read_tells_nothing() -> None:
@@ -134,7 +137,7 @@ def test_a_record_that_begins_in_a_maneuver_says_how_far_off_its_states_may_be()
         np.testing.assert_allclose([part[place] for part in slopes_ahead(piece)], [seen.value, seen.rate], atol=1e-9)
         numbers = went.numbers._replace(inputs=went.commands[place : place + 50].mean(axis=0))
         rows = FilterNumbers(*(np.asarray(row)[None] for row in numbers))
-        begun = FollowingRows(likelihood.model, rows, run.seen._replace(value=seen.value, rate=seen.rate), spread)
+        begun = _rows(likelihood, rows, run.seen._replace(value=seen.value, rate=seen.rate), spread)
         off.append(begun.state.x[0] - went.states.x[place])
         sure = begun.covariance[0].copy()
         sure[:n, :n] -= spread
@@ -167,7 +170,7 @@ def test_scores_are_slopes_of_the_cost_whatever_the_filter(name: str, monkeypatc
         nu = rng.standard_normal((count, outputs)) + 0.3 * turned[:, :count]
         root = np.eye(outputs) + 0.03 * np.tril(turned[:, count:])
         S = np.repeat((root @ np.swapaxes(root, 1, 2))[:, None], count, axis=1)
-        return [Followed(nu, S, FilterState(*[nu] * 4))]
+        return [Followed(nu, S, nu)]
 
     monkeypatch.setattr(likelihood, "_followed", some)
     row = likelihood.row.starts() + 0.05 * np.random.default_rng(1).standard_normal(len(likelihood.row))
@@ -206,6 +209,23 @@ def test_rows_side_by_side_are_those_one_after_the_other() -> None:
         for found, expected in ((beside.innovations, one.innovations), (beside.covariances, one.covariances)):
             # Slopes and equilibria of rows beside the first are one step of Newton's method away from its own.
             np.testing.assert_allclose(found[k], expected[0], rtol=1e-6, atol=1e-7 * np.abs(expected).max())
+
+
+@pytest.mark.skipif(not can_compile(), reason="no C compiler")
+def test_in_c_it_is_the_same() -> None:
+    """With a gap, a line and rows of other numbers."""
+    likelihood = _likelihood()
+    row, run, readings = likelihood.row.starts(), likelihood._runs[0], likelihood._readings[0].copy()
+    readings[40:44] = np.nan
+    given = likelihood.table.card_row, np.array(likelihood.noise)
+    placed = [run.placed(*given, one * likelihood.row.scale) for one in (row, row + 0.01)]
+    numbers = FilterNumbers(*map(np.stack, zip(*(each for _, each in placed), strict=True)))
+    series = RecordSeries(readings, np.stack([commands for commands, _ in placed], axis=1), run.voltage)
+    begin = following_from(likelihood.model, numbers, run.seen, likelihood._spread[0])
+    codes = filter_code(likelihood.model), VirtualFilter(likelihood.model)
+    assert [code.compiled_by for code in codes] == ["C", "NumPy"]
+    for found, expected in zip(*(code.follow(likelihood.model.dt, begin, series) for code in codes), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-11 * np.abs(expected).max())
 
 
 @pytest.mark.proof

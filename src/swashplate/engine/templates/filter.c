@@ -1,0 +1,234 @@
+#include <math.h>
+#include <string.h>
+
+@VECTORS@
+enum { N = @N@, M = @M@, W = M + 4, P = @P@, G = @G@, Y = @Y@, S = @S@, A = @A@, R = @R@, CP = @CP@, C = @C@ };
+static const int pushed[6] = {@PUSHED@};
+static const double fractions[4] = {0, 0.5, 0.5, 1}, weights[4] = {1. / 6, 1. / 3, 1. / 3, 1. / 6};
+
+static void correct(const double *s, const double *y, const double *g, double *nu, double *corrected,
+                    double *acting, double *rest) {
+@CORRECT@}
+
+static void correct_moved(const double *s, const double *y, const double *g, double *nu, double *corrected,
+                          double *acting, double *rest, const vec *ds, const vec *dg, vec *dnu, vec *dcorrected,
+                          vec *dacting, vec *drest) {
+@CORRECT_MOVED@}
+
+static void of_card(const double *p, double *cp) {
+  (void)p, (void)cp;
+@OF_CARD@}
+
+static void of_card_moved(const double *p, double *cp, const vec *dp, vec *dcp) {
+  (void)p, (void)cp, (void)dp, (void)dcp;
+@OF_CARD_MOVED@}
+
+static void of_inputs(const double *w, const double *p, const double *cp, double *c) {
+  (void)w, (void)p, (void)cp, (void)c;
+@OF_INPUTS@}
+
+static void of_inputs_moved(const double *w, const double *p, const double *cp, double *c, const vec *dw, const vec *dp,
+                            const vec *dcp, vec *dc) {
+  (void)w, (void)p, (void)cp, (void)c, (void)dw, (void)dp, (void)dcp, (void)dc;
+@OF_INPUTS_MOVED@}
+
+static void moving(const double *x, const double *w, const double *p, const double *cp, const double *c, double *root,
+                   int known, double *k) {
+  (void)x, (void)w, (void)p, (void)cp, (void)c, (void)root, (void)known;
+@MOVING@}
+
+static void moving_moved(const double *x, const double *w, const double *p, const double *cp, const double *c,
+                         const double *root, double *k, const vec *dx, const vec *dw, const vec *dp, const vec *dcp,
+                         const vec *dc, vec *dk) {
+  (void)x, (void)w, (void)p, (void)cp, (void)c, (void)root, (void)dx, (void)dw, (void)dp, (void)dcp, (void)dc;
+@MOVING_MOVED@}
+
+static void driving(const double *u, const double *acting, double volts, double *w) {
+  memcpy(w, u, M * sizeof *u);
+  w[M] = @WINDY@ ? acting[6] : 0;
+  w[M + 1] = @WINDY@ ? acting[7] : 0;
+  w[M + 2] = 0;
+  w[M + 3] = volts;
+}
+
+/* root: of each of the four stages. */
+static void step(double *x, const double *w, const double *push, const double *p, const double *cp, double dt,
+                 double (*root)[R]) {
+  double at[N], k[N] = {0}, sum[N] = {0}, c[C];
+  of_inputs(w, p, cp, c);
+  for (int j = 0; j < 4; ++j) {
+    for (int i = 0; i < N; ++i) at[i] = x[i] + fractions[j] * dt * k[i];
+    if (j) memcpy(root[j], root[j - 1], sizeof root[j]);
+    moving(at, w, p, cp, c, root[j], j, k);
+    for (int i = 0; i < 6; ++i) k[pushed[i]] += push[i];
+    for (int i = 0; i < N; ++i) sum[i] += weights[j] * dt * k[i];
+  }
+  for (int i = 0; i < N; ++i) x[i] += sum[i];
+}
+
+static void step_moved(double *x, const double *w, const double *push, const double *p, const double *cp, double dt,
+                       double (*root)[R], vec *dx, const vec *dw, const vec *dpush, const vec *dp, const vec *dcp) {
+  double at[N], k[N] = {0}, sum[N] = {0}, c[C];
+  vec dat[N], dk[N] = {0}, dsum[N] = {0}, dc[C];
+  of_inputs_moved(w, p, cp, c, dw, dp, dcp, dc);
+  for (int j = 0; j < 4; ++j) {
+    for (int i = 0; i < N; ++i) at[i] = x[i] + fractions[j] * dt * k[i], dat[i] = dx[i] + fractions[j] * dt * dk[i];
+    moving_moved(at, w, p, cp, c, root[j], k, dat, dw, dp, dcp, dc, dk);
+    for (int i = 0; i < 6; ++i) k[pushed[i]] += push[i], dk[pushed[i]] += dpush[i];
+    for (int i = 0; i < N; ++i) sum[i] += weights[j] * dt * k[i], dsum[i] += weights[j] * dt * dk[i];
+  }
+  for (int i = 0; i < N; ++i) x[i] += sum[i], dx[i] += dsum[i];
+}
+
+/* V of `count` rows of so many numbers from row `first` on, side by side; zeros beyond the last. */
+static void gathered(vec *to, const double *rows, long size, long first, long count) {
+  for (long i = 0; i < size; ++i)
+    for (int l = 0; l < V; ++l) to[i][l] = first + l < count ? rows[(first + l) * size + i] : 0;
+}
+
+/* The same of row `i` of `rows` in every direction. */
+static void gathered_row(vec *to, const double *from, long size, long rows, long i, long first, long count) {
+  for (long j = 0; j < size; ++j)
+    for (int l = 0; l < V; ++l) to[j][l] = first + l < count ? from[((first + l) * rows + i) * size + j] : 0;
+}
+
+void run_along(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
+               const double *commands, const double *voltage, double *innovations, double *states, double *roots);
+void run_moved(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
+               const double *commands, const double *voltage, const double *roots, long first, long count,
+               const double *d_start, const double *d_g, const double *d_p, long arriving, long late,
+               const double *d_commands, double *out, long marks, const long *at, double *d_states);
+void run_steps(long rows, double dt, long each, double *x, const double *w, const double *push, const double *p);
+void run_steps_moved(long rows, long count, double dt, double *x, const double *w, const double *push, const double *p,
+                     double *dx, const double *d_w, const double *d_push, const double *d_p);
+void run_rates(long rows, const double *x, const double *w, const double *p, double *k);
+void rates_and_slopes(long rows, const double *x, const double *w, const double *p, double *k, double *by_x,
+                      double *by_w);
+int directions(void);
+int roots(void);
+
+/* Innovations (n, Y) and corrected states (n, S); roots (n, 4, R) for `run_moved`. */
+void run_along(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
+               const double *commands, const double *voltage, double *innovations, double *states, double *roots) {
+  double s[S], acting[A], rest[S - N + 1], w[W], cp[CP];
+  memcpy(s, start, sizeof s);
+  of_card(p, cp);
+  for (long i = 0; i < n; ++i) {
+    correct(s, readings + i * Y, g, innovations + i * Y, states + i * S, acting, rest);
+    memcpy(s, states + i * S, N * sizeof *s);
+    memcpy(s + N, rest, (S - N) * sizeof *s);
+    driving(commands + i * M, acting, voltage[i], w);
+    step(s, w, acting, p, cp, dt, (double (*)[R])(roots + i * 4 * R));
+  }
+}
+
+/* Slopes of the innovations (count, n, Y) along V directions from `first` on; commands of directions `arriving` and the
+   `late` - 1 after it move (late, n, M). Slopes of the corrected states at the samples `at` (count, marks, S). */
+void run_moved(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
+               const double *commands, const double *voltage, const double *roots, long first, long count,
+               const double *d_start, const double *d_g, const double *d_p, long arriving, long late,
+               const double *d_commands, double *out, long marks, const long *at, double *d_states) {
+  long mark = 0;
+  double s[S], corrected[S], acting[A], rest[S - N + 1], w[W], cp[CP], nu[Y];
+  vec ds[S], dcorrected[S], dacting[A], drest[S - N + 1], dw[W], dcp[CP], dnu[Y], dg[G], dp[P];
+  memset(dw, 0, sizeof dw);
+  memcpy(s, start, sizeof s);
+  gathered(ds, d_start, S, first, count);
+  gathered(dg, d_g, G, first, count);
+  gathered(dp, d_p, P, first, count);
+  of_card_moved(p, cp, dp, dcp);
+  for (long i = 0; i < n; ++i) {
+    correct_moved(s, readings + i * Y, g, nu, corrected, acting, rest, ds, dg, dnu, dcorrected, dacting, drest);
+    for (int l = 0; l < V && first + l < count; ++l)
+      for (int o = 0; o < Y; ++o) out[((first + l) * n + i) * Y + o] = dnu[o][l];
+    for (; mark < marks && at[mark] == i; ++mark)
+      for (int l = 0; l < V && first + l < count; ++l)
+        for (int j = 0; j < S; ++j) d_states[((first + l) * marks + mark) * S + j] = dcorrected[j][l];
+    memcpy(s, corrected, N * sizeof *s), memcpy(ds, dcorrected, N * sizeof *ds);
+    memcpy(s + N, rest, (S - N) * sizeof *s), memcpy(ds + N, drest, (S - N) * sizeof *ds);
+    driving(commands + i * M, acting, voltage[i], w);
+    for (int l = 0; l < V; ++l) {
+      const long place = first + l - arriving;
+      for (int j = 0; j < M; ++j) dw[j][l] = place >= 0 && place < late ? d_commands[(place * n + i) * M + j] : 0;
+    }
+    for (int j = 6; j < A; ++j) dw[M + j - 6] = dacting[j];
+    step_moved(s, w, acting, p, cp, dt, (double (*)[R])(roots + i * 4 * R), ds, dw, dacting, dp, dcp);
+  }
+}
+
+/* States (rows, N) one sample later, under commands and air (rows, W) and push (rows, 6); numbers of all, or of
+   `each`. */
+void run_steps(long rows, double dt, long each, double *x, const double *w, const double *push, const double *p) {
+  double cp[CP], root[4][R];
+  for (long i = 0; i < rows; ++i) {
+    if (!i || each) of_card(p + i * each * P, cp);
+    step(x + i * N, w + i * W, push + i * 6, p + i * each * P, cp, dt, root);
+  }
+}
+
+/* The same, with slopes of states (count, rows, N) along directions of commands and air (count, rows, W), of the push
+   (count, rows, 6) and of the numbers (count, P), which are those of all. */
+void run_steps_moved(long rows, long count, double dt, double *x, const double *w, const double *push, const double *p,
+                     double *dx, const double *d_w, const double *d_push, const double *d_p) {
+  double at[N], cp[CP], root[4][R];
+  vec v[N], vw[W], vpush[6], vp[P], vcp[CP];
+  for (long first = 0; first < count; first += V) {
+    gathered(vp, d_p, P, first, count);
+    of_card_moved(p, cp, vp, vcp);
+    for (long i = 0; i < rows; ++i) {
+      memcpy(at, x + i * N, sizeof at);
+      step(at, w + i * W, push + i * 6, p, cp, dt, root);
+      memcpy(at, x + i * N, sizeof at);
+      gathered_row(v, dx, N, rows, i, first, count);
+      gathered_row(vw, d_w, W, rows, i, first, count);
+      gathered_row(vpush, d_push, 6, rows, i, first, count);
+      step_moved(at, w + i * W, push + i * 6, p, cp, dt, root, v, vw, vpush, vp, vcp);
+      for (int l = 0; l < V && first + l < count; ++l)
+        for (int j = 0; j < N; ++j) dx[((first + l) * rows + i) * N + j] = v[j][l];
+    }
+  }
+  run_steps(rows, dt, 0, x, w, push, p);
+}
+
+/* Rates k (N), and their slopes by the states (N, N) and by `count` of what drives them from `from` on (N, count). */
+static void slopes_at(const double *x, const double *w, const double *p, const double *cp, int from, int count, double *k,
+                      double *by_x, double *by_w) {
+  double c[C], root[R];
+  vec dx[N], dw[W], dp[P], dcp[CP], dc[C], dk[N];
+  of_inputs(w, p, cp, c), moving(x, w, p, cp, c, root, 0, k);
+  memset(dp, 0, sizeof dp), memset(dcp, 0, sizeof dcp);
+  for (int first = 0; first < N + count; first += V) {
+    memset(dx, 0, sizeof dx), memset(dw, 0, sizeof dw);
+    for (int l = 0; l < V && first + l < N + count; ++l)
+      if (first + l < N) dx[first + l][l] = 1;
+      else dw[from + first + l - N][l] = 1;
+    of_inputs_moved(w, p, cp, c, dw, dp, dcp, dc);
+    moving_moved(x, w, p, cp, c, root, k, dx, dw, dp, dcp, dc, dk);
+    for (int i = 0; i < N; ++i)
+      for (int l = 0; l < V && first + l < N + count; ++l)
+        if (first + l < N) by_x[i * N + first + l] = dk[i][l];
+        else by_w[i * count + first + l - N] = dk[i][l];
+  }
+}
+
+/* By row: the rates (N). */
+void run_rates(long rows, const double *x, const double *w, const double *p, double *k) {
+  double cp[CP], c[C], root[R];
+  for (long i = 0; i < rows; ++i) {
+    of_card(p + i * P, cp), of_inputs(w + i * W, p + i * P, cp, c);
+    moving(x + i * N, w + i * W, p + i * P, cp, c, root, 0, k + i * N);
+  }
+}
+
+/* By row: the rates (N), and their slopes by the states (N, N) and by inputs and wind (N, W). */
+void rates_and_slopes(long rows, const double *x, const double *w, const double *p, double *k, double *by_x,
+                      double *by_w) {
+  double cp[CP];
+  for (long i = 0; i < rows; ++i) {
+    of_card(p + i * P, cp);
+    slopes_at(x + i * N, w + i * W, p + i * P, cp, 0, W, k + i * N, by_x + i * N * N, by_w + i * N * W);
+  }
+}
+@FOLLOWING@
+int directions(void) { return V; }
+int roots(void) { return R; }
