@@ -13,9 +13,9 @@ from swashplate.reporting import sections_data, sections_fit, sections_prior, se
 from swashplate.reporting.figures_validation import key_picture
 from swashplate.reporting.glossary import PARAMETERS
 from swashplate.reporting.sections_verification import verification_section
-from swashplate.reporting.structure import Cell, Figure, Report, Section, Table, Text
+from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.summary import banners, summary
-from swashplate.reporting.terms import terms_in
+from swashplate.reporting.terms import with_terms
 from swashplate.reporting.versions import date, versions
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.modes import Mode
@@ -89,28 +89,6 @@ def _made(fit: Result[Any, Any] | None, validation: Validation | None) -> Sectio
         *sections_data.made_with(fit, validation),
     )
     return Section("made", "How was this made?", blocks, folded=True)
-
-
-def with_terms(sections: Sequence[Section], lines: Sequence[tuple[str, str, str]] = ()) -> tuple[Section, ...]:
-    """Sections with one more at the end: what the words in them mean."""
-    texts = [words for line in lines for words in line[:2]]
-    for section in sections:
-        texts.append(section.title)
-        for block in section.blocks:
-            if isinstance(block, Table):
-                texts += [
-                    block.caption,
-                    block.note,
-                    *block.columns,
-                    *(cell.words for row in block.rows for cell in row),
-                ]
-            elif isinstance(block, Figure):
-                texts.append(block.caption)
-            else:
-                texts += [block.words] if isinstance(block, Text) else block.items
-    rows = tuple((Cell(term), Cell(words)) for term, words in terms_in(texts).items())
-    table = Table("Words of this page", ("word", "meaning"), rows)
-    return (*sections, Section("words", "What do the words mean?", (table,), folded=True)) if rows else tuple(sections)
 
 
 def hover_modes(

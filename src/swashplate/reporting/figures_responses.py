@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from swashplate.arrays import Array
 from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.flights.schema import channel
-from swashplate.identification.frequency.reading_accuracy import Answers
 from swashplate.identification.frequency.unnoticeable_dynamics import Mismatch, envelopes
-from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse, decibel, unwrapped_degrees
+from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.reporting.downsample import kept
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (
@@ -35,7 +32,6 @@ from swashplate.reporting.theme import (
     phase_ticks,
     shown,
     stacked,
-    unit_words,
 )
 from swashplate.validation.verification import Trace
 
@@ -43,107 +39,6 @@ _ERROR = "rgba(0,0,0,0.15)"
 _BOUND = "rgba(0,114,178,0.18)"
 _DB = 20.0 / np.log(10.0)
 _COLORS = (MODEL, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
-
-
-def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answers | None = None) -> Figure:
-    """Magnitude, phase and coherence of one pair with +-2 random errors; a model with +-2 sigma beside it.
-
-    Args:
-        responses: measured.
-        output, input: the pair.
-        model: a fitted model's response.
-    """
-    h, coherence, error = responses.pair(output, input)
-    hertz = responses.omega / TWO_PI
-    gain, phase = np.asarray(decibel(h)), unwrapped_degrees(h, coherent=coherence >= 0.6)
-    if model is not None:  # where the model is, the flight's count of turns is the model's
-        phase = beside_model(phase, responses.omega, model.omega, unwrapped_degrees(model.response))
-    spread = np.minimum(error, 3.0)
-    layout = over_frequency([f"{output}/{input} [dB]", "phase [deg]", "coherence [-]"], height=140, unit="Hz")
-    layout["yaxis2"] |= phase_ticks(phase)
-    layout["yaxis3"]["range"] = [0, 1.02]
-    known = np.isfinite(gain)
-    traces: list[dict[str, Any]] = []
-    up, down = 20.0 * np.log10(1.0 + 2.0 * spread), 20.0 * np.log10(np.maximum(1.0 - 2.0 * spread, 0.1))
-    lag = np.degrees(2.0 * spread)
-    for number, middle, above, below in (("", gain, up, down), ("2", phase, lag, -lag)):
-        edges = (middle + below)[known], (middle + above)[known]
-        traces.append(_band(hertz[known], *edges, color=_ERROR, name="±2ε", axis=number))
-    hover = "%{x:.3g} Hz, %{y:.4g}"
-    traces += [
-        line(hertz, gain, name="flight", color=FLIGHT, hover=hover),
-        line(hertz, phase, name="flight", color=FLIGHT, hover=hover, axis="2"),
-        line(hertz, coherence, name="coherence", color=FLIGHT, hover=hover, axis="3"),
-        line(hertz[[0, -1]], [0.6, 0.6], name="0.6", color=GREY, dash="dot", axis="3"),
-    ]
-    keys = [Key("flight", FLIGHT), Key("±2 random errors", _ERROR, "band")]
-    if model is not None:
-        omega, answer = model.omega, model.response
-        turned = unwrapped_degrees(answer)
-        wide = [(2.0 * _DB * model.gain, decibel(answer), ""), (np.degrees(2.0 * model.phase), turned, "2")]
-        for half, middle, number in wide:
-            if np.isfinite(half).all():
-                edges = middle - half, middle + half
-                traces.append(_band(omega / TWO_PI, *edges, color=_BOUND, name="±2 σ", axis=number))
-        traces += [
-            line(omega / TWO_PI, decibel(answer), name="model", color=MODEL, dash="dash", width=2.0, hover=hover),
-            line(omega / TWO_PI, turned, name="model", color=MODEL, dash="dash", width=2.0, hover=hover, axis="2"),
-        ]
-        keys.insert(1, Key("model", MODEL, "dash"))
-        if np.isfinite(model.gain).all():
-            keys.append(Key("±2 σ of the model", _BOUND, "band"))
-    band_found = responses.band(output, input)
-    told = (
-        "no coherent band" if band_found is None else f"coherent from {_hz(band_found[0])} to {_hz(band_found[1])} Hz"
-    )
-    return Figure(
-        identifier=f"bode-{_plain(output)}-{_plain(input)}",
-        spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
-        caption=f"Response of {output} to {input}: {told}. {_zero_words(responses, output, input)}Below a coherence of "
-        "0.6 the response is not to be used.",
-        alt=f"Bode diagram of {output} over {input} with coherence; {told}.",
-        keys=tuple(keys),
-    )
-
-
-def beside_model(phase: Array, omega: Array, model_omega: Array, model_phase: Array) -> Array:
-    """A flight's phase [deg] with the model's count of whole turns, line by line where the model is.
-
-    At a notch a flight's phase may turn either way; beyond the model's lines the turns of its ends stay.
-    """
-    inside = (omega >= model_omega[0] * (1.0 - 1e-9)) & (omega <= model_omega[-1] * (1.0 + 1e-9))
-    places = np.flatnonzero(inside & np.isfinite(phase))
-    if places.size == 0:
-        return phase
-    reference = np.interp(omega, model_omega, model_phase)
-    turns = np.round((reference - phase) / 360.0)
-    nearest = places[np.clip(np.searchsorted(places, np.arange(phase.size)), 0, places.size - 1)]
-    return np.asarray(phase + 360.0 * turns[nearest])
-
-
-def _band(x: Array, below: Array, above: Array, *, color: str, name: str, axis: str) -> dict[str, Any]:
-    """A filled band between two curves."""
-    edges = np.concatenate([above, below[::-1]])
-    band = line(np.concatenate([x, x[::-1]]), edges, name=name, color=color, width=0, axis=axis)
-    return {**band, "fill": "toself", "fillcolor": color, "hoverinfo": "skip", "hovertemplate": None}
-
-
-def _zero_words(responses: FrequencyResponse, output: str, input: str) -> str:
-    """What 0 dB are."""
-    if not (responses.output_units and responses.input_units):
-        return ""
-    o, i = responses.place(output, input)
-    above, below = unit_words(responses.output_units[o]), unit_words(responses.input_units[i])
-    return f"0 dB are 1 {above} for {f'1 {below}' if below else f'a {input} of 1'}. "
-
-
-def _hz(omega: float) -> str:
-    return f"{omega / TWO_PI:.3g}"
-
-
-def _plain(name: str) -> str:
-    return "".join(c if c.isalnum() else "-" for c in name)
 
 
 def excitation(responses: FrequencyResponse) -> Figure:

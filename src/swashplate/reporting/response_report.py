@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from swashplate.errors import SwashError
@@ -13,7 +14,8 @@ from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.sections_search import search_section
 from swashplate.reporting.sections_verification import verification_section
-from swashplate.reporting.structure import Report
+from swashplate.reporting.structure import Figure, Report
+from swashplate.reporting.terms import with_terms
 from swashplate.reporting.versions import date, versions
 from swashplate.reporting.words import listed
 
@@ -33,6 +35,7 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
     if not (m.responses or m.transfer_functions or m.fit or m.verification or m.time_fit):
         raise SwashError("there is nothing to report.")
     parts = [
+        sections_responses.gains_section(m.gains) if m.gains else None,
         verification_section(m.verification, m.rival) if m.verification else None,
         search_section(m.search) if m.search else None,
         sections_responses.fit_parameters_section(m.fit) if m.fit else None,
@@ -42,15 +45,17 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
         sections_responses.bodes_section(m) if m.responses else None,
         sections_responses.excitation_section(m.responses) if m.responses else None,
         sections_responses.handling_section(m),
-        sections_responses.gains_section(m.gains) if m.gains else None,
         sections_responses.made_section(),
     ]
+    sections, lines = [part for part in parts if part is not None], _summary(m)
+    picture = next((b for section in sections if section.folded for b in section.blocks if isinstance(b, Figure)), None)
+    told = with_terms(sections, lines)
     return Report(
         title=title or _title(m),
         banners=_banners(m),
-        summary=_summary(m),
-        picture=None,
-        sections=tuple(part for part in parts if part is not None),
+        summary=lines,
+        picture=picture,
+        sections=tuple(replace(one, blocks=tuple(b for b in one.blocks if b is not picture)) for one in told),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 

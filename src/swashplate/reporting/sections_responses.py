@@ -14,7 +14,7 @@ from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.frequency.handling import Handling
 from swashplate.identification.frequency.handling_readings import handling_lines
 from swashplate.identification.frequency.mode_accuracy import ModeAccuracy
-from swashplate.identification.frequency.reading_accuracy import Fitted, answers, has_pair
+from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, INDISTINGUISHABLE, Target
 from swashplate.identification.frequency.search_result import StructureSearch
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
@@ -27,7 +27,7 @@ from swashplate.identification.time.record_fit import TimeDetails
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.reporting.figures.bode_matrix import of_fit, of_responses
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
-from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure, rate_steps_figure
+from swashplate.reporting.figures_responses import excitation, mismatch_figure, rate_steps_figure
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
@@ -143,7 +143,7 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
     if len(fit.history) > 1:
         words = "Half the sum of J over all responses, after each iteration."
         blocks.append(replace(cost_history(fit.history), caption=words))
-    return Section("parameters", "Parameters", tuple(blocks))
+    return Section("parameters", "Which numbers came out, and how sure are they?", tuple(blocks), folded=True)
 
 
 def _mode_table(modes: Sequence[ModeAccuracy]) -> Table:
@@ -189,7 +189,7 @@ def time_fit_section(fit: Result[StateSpaceModel, TimeDetails]) -> Section:
         )
     )
     blocks.append(eigenvalues({"identified": _modes(fit.solution.eigenvalues())}))
-    return Section("parameters", "Parameters", tuple(blocks))
+    return Section("parameters", "Which numbers came out, and how sure are they?", tuple(blocks), folded=True)
 
 
 def _modes(values: Complex) -> tuple[Mode, ...]:
@@ -224,7 +224,7 @@ def fit_costs_section(fit: StateSpaceFit) -> Section:
     blocks: list[Block] = [_cost_table(fit.targets, fit.costs), of_fit(fit), mismatch_figure(misses)]
     if fit.details.left_out:
         blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.details.left_out)}."))
-    return Section("costs", "Responses, flight against model", tuple(blocks))
+    return Section("costs", "How well does the model follow each response?", tuple(blocks), folded=True)
 
 
 def transfer_functions_section(m: ResponseMaterial) -> Section:
@@ -255,54 +255,55 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
                 note="Suggested: the fewest parameters that can all be estimated and cost hardly more than the best.",
             )
         )
-    return Section("transfer-functions", "Transfer functions", tuple(blocks))
+    return Section("transfer-functions", "Which transfer functions, and how sure are they?", tuple(blocks), folded=True)
 
 
 def bodes_section(m: ResponseMaterial) -> Section:
-    """Where each response may be used, and its Bode plot with the models beside it."""
+    """Where each response may be used, and the Bode plots of those that no fit shows beside its model."""
     r = m.responses
     assert r is not None
-    rows, figures = [], []
-    fits = m.fits
-    for output in r.outputs:
-        for name in r.inputs:
-            band = r.band(output, name)
-            h, coherence, error = r.pair(output, name)
-            if band is None:
-                best = float(np.nanmax(coherence)) if np.isfinite(coherence).any() else float("nan")
-                rows.append(
-                    (
-                        Cell(f"{output} / {name}"),
-                        Cell("none", tone="caution"),
-                        Cell(value_words(best), number=True),
-                        Cell("–", number=True),
-                    )
-                )
-                continue
-            inside = (r.omega >= band[0]) & (r.omega <= band[1]) & np.isfinite(h)
-            rows.append(
-                (
-                    Cell(f"{output} / {name}"),
-                    Cell(f"{band[0] / TWO_PI:.3g} to {band[1] / TWO_PI:.3g} Hz"),
-                    Cell(f"{np.median(coherence[inside]):.2f}", number=True),
-                    Cell(f"{20 * np.log10(1 + np.median(error[inside])):.2f}", number=True),
-                )
+    rows = []
+    for output, name in ((o, i) for o in r.outputs for i in r.inputs):
+        band = r.band(output, name)
+        h, coherence, error = r.pair(output, name)
+        inside = np.isfinite(h) if band is None else (r.omega >= band[0]) & (r.omega <= band[1]) & np.isfinite(h)
+        told = coherence[inside & np.isfinite(coherence)]
+        level = np.nan if told.size == 0 else np.max(told) if band is None else np.median(told)
+        rows.append(
+            (
+                Cell(f"{output} / {name}"),
+                Cell("none", tone="caution") if band is None else Cell(f"{_hz(band[0])} to {_hz(band[1])} Hz"),
+                Cell(value_words(float(level)) if band is None else f"{level:.2f}", number=True),
+                Cell("–" if band is None else f"{20 * np.log10(1 + np.median(error[inside])):.2f}", number=True),
+                Cell(_zero_words(r, output, name)),
             )
-            fitted = next((f for f in fits if has_pair(f, output, name)), None)
-            model = None if fitted is None else answers(fitted, output, name, r.omega)
-            figures.append(bode(r, output, name, model=model))
+        )
+    shown = {(t.output, t.input) for fit in m.fits for t in fit.targets}
+    left = [pair for o in r.outputs for i in r.inputs if (pair := (o, i)) not in shown and r.band(*pair) is not None]
     blocks: list[Block] = [Text(text, tone="bad") for text in r.problems]
     blocks += [Points(r.warnings, title="What to beware of")] if r.warnings else []
-    blocks.append(
-        Table("Where the responses may be used", ("response", "coherent band", "coherence", "error [dB]"), tuple(rows))
-    )
-    matrix = (of_responses(r, fits=fits),) if len(figures) > 1 else ()
-    return Section("responses", "Frequency responses", (*blocks, *matrix, *figures))
+    columns = ("response", "coherent band", "coherence", "error [dB]", "0 dB")
+    blocks.append(Table("Where the responses may be used", columns, tuple(rows)))
+    blocks += [of_responses(r, without=shown)] if left or not shown else []
+    return Section("responses", "Where may the responses be used?", tuple(blocks), folded=True)
+
+
+def _hz(omega: float) -> str:
+    return f"{omega / TWO_PI:.3g}"
+
+
+def _zero_words(responses: FrequencyResponse, output: str, input: str) -> str:
+    """What 0 dB are."""
+    if not (responses.output_units and responses.input_units):
+        return ""
+    o, i = responses.place(output, input)
+    above, below = unit_words(responses.output_units[o]), unit_words(responses.input_units[i])
+    return f"1 {above} for {f'1 {below}' if below else f'a {input} of 1'}"
 
 
 def excitation_section(r: FrequencyResponse) -> Section:
     """Input power and cross-control correlation: what was excited and what was mixed."""
-    return Section("excitation", "What was excited", (excitation(r),), folded=True)
+    return Section("excitation", "What was excited?", (excitation(r),), folded=True)
 
 
 def gains_section(gains: Sequence[Suggestion]) -> Section:
@@ -346,7 +347,7 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
     )
     return Section(
         "gains",
-        "Suggested rate-loop gains",
+        "Which gains, with which margins?",
         (
             *(words if refused else ()),
             *(table for table in tables if table.rows),
@@ -360,7 +361,7 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
 def made_section() -> Section:
     """Versions of what made the report."""
     rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
-    return Section("versions", "Versions", (Table("Versions", ("package", "version"), rows),), folded=True)
+    return Section("versions", "How was this made?", (Table("Versions", ("package", "version"), rows),), folded=True)
 
 
 def handling_section(m: ResponseMaterial) -> Section | None:
@@ -393,4 +394,4 @@ def handling_section(m: ResponseMaterial) -> Section | None:
         "frequencies with the square root of the size (Froude). ± of the flight: random error; of the model: what "
         "the standard deviations of its parameters make of it.",
     )
-    return Section("handling", "Handling qualities", (table,), folded=True)
+    return Section("handling", "Which bandwidth and phase delay has each attitude?", (table,), folded=True)

@@ -17,4 +17,6 @@ def search_section(search: StructureSearch) -> Section:
         for c, row in zip(search.tried, rows, strict=True)
     )
     why = Points(tuple(text.strip() for text in search.reasons), title="Why this one")
-    return Section("structures", "Structures that were tried", (why, Table("Structures", tuple(head), cells)))
+    return Section(
+        "structures", "Which structures were tried?", (why, Table("Structures", tuple(head), cells)), folded=True
+    )

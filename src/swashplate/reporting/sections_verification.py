@@ -66,4 +66,4 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
         twins = [t for t in rival.traces if t.source == trace.source] if rival is not None else []
         other = (rival.model.name, twins[0], [o.output for o in rival.outputs]) if rival and twins else None
         blocks.append(verification_figure(trace, outputs, v.inputs, number=k, units=v.units, rival=other))
-    return Section("verification", "Verification in time", tuple(blocks))
+    return Section("verification", "Does it follow flights in time?", tuple(blocks), folded=True)

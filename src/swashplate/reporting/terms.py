@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+from swashplate.reporting.structure import Cell, Figure, Section, Table, Text
 
 TERMS: dict[str, str] = {
     "at its bound": "a parameter ended at a limit that physics sets; the equations lack something that it stands for",
@@ -67,3 +69,25 @@ def terms_in(texts: Iterable[str]) -> dict[str, str]:
         for term, words in sorted(TERMS.items(), key=lambda item: item[0].lower())
         if re.search(rf"(?<!\w){re.escape(term)}(?:s|es)?(?!\w)", whole, 0 if len(term) < 3 else re.IGNORECASE)
     }
+
+
+def with_terms(sections: Sequence[Section], lines: Sequence[tuple[str, str, str]] = ()) -> tuple[Section, ...]:
+    """Sections with one more at the end: what the words in them mean."""
+    texts = [words for line in lines for words in line[:2]]
+    for section in sections:
+        texts.append(section.title)
+        for block in section.blocks:
+            if isinstance(block, Table):
+                texts += [
+                    block.caption,
+                    block.note,
+                    *block.columns,
+                    *(cell.words for row in block.rows for cell in row),
+                ]
+            elif isinstance(block, Figure):
+                texts.append(block.caption)
+            else:
+                texts += [block.words] if isinstance(block, Text) else block.items
+    rows = tuple((Cell(term), Cell(words)) for term, words in terms_in(texts).items())
+    table = Table("Words of this page", ("word", "meaning"), rows)
+    return (*sections, Section("words", "What do the words mean?", (table,), folded=True)) if rows else tuple(sections)

@@ -13,7 +13,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.identification.responses.frequency_response import FrequencyResponse, unwrapped_degrees
 from swashplate.models.conventional.derivative_table import DerivativeTable
 from swashplate.physics.environment import Environment
-from swashplate.reporting.figures_responses import beside_model
+from swashplate.reporting.figures.bode_matrix import beside_model
 from swashplate.simulation.derivatives_over_speed import Derivatives
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim_curve import TrimCurve, trim_curve

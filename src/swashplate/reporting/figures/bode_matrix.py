@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array, Complex
-from swashplate.identification.frequency.reading_accuracy import Answers, Fitted, answers, has_pair
+from swashplate.identification.frequency.reading_accuracy import Answers, Fitted, answers
 from swashplate.identification.responses.frequency_response import (
     LEAST_COHERENCE,
     TWO_PI,
@@ -17,11 +17,13 @@ from swashplate.identification.responses.frequency_response import (
     decibel,
     unwrapped_degrees,
 )
-from swashplate.reporting.figures_responses import beside_model
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import BLACK, FLIGHT, GREY, MODEL, axis, base_layout, line, phase_ticks
+from swashplate.reporting.words import counted
 
 _ERROR = "rgba(0,0,0,0.15)"
+_BOUND = "rgba(0,114,178,0.18)"
+_DB = 20.0 / np.log(10.0)
 _HEIGHTS = (130, 110, 70)
 """Of magnitude, phase and coherence [px]."""
 _HEAD, _FOOT, _BETWEEN = 26, 50, 14
@@ -50,32 +52,35 @@ class Pair:
 
 
 def of_responses(
-    responses: FrequencyResponse, pairs: Sequence[tuple[str, str]] | None = None, fits: Sequence[Fitted] = ()
+    responses: FrequencyResponse,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    *,
+    without: Container[tuple[str, str]] = (),
 ) -> Figure:
-    """Measured responses, a model beside each that one of the fits has.
+    """Measured responses.
 
     Args:
         responses: measured.
         pairs: (output, input) side by side; where None the matrix of all outputs and inputs that answer coherently.
-        fits: models of them.
+        without: pairs whose place in the matrix stays empty.
 
     Raises:
         IdentificationError: a channel that is not in the responses.
     """
     if pairs is None:
-        coherent = [(o, i) for o in responses.outputs for i in responses.inputs if responses.band(o, i) is not None]
-        coherent = coherent or [(responses.outputs[0], responses.inputs[0])]
+        every = [(o, i) for o in responses.outputs for i in responses.inputs if (o, i) not in without]
+        coherent = [pair for pair in every if responses.band(*pair) is not None] or every[:1]
         outputs, inputs = ({pair[k] for pair in coherent} for k in (0, 1))
         rows = [[(o, i) for i in responses.inputs if i in inputs] for o in responses.outputs if o in outputs]
     else:
         rows = [list(pairs)]
 
-    def made(output: str, input: str) -> Pair:
-        fit = next((f for f in fits if has_pair(f, output, input)), None)
-        model = None if fit is None else answers(fit, output, input, responses.omega)
-        return Pair(output, input, responses.omega, *responses.pair(output, input), model=model)
+    def cell(output: str, input: str) -> Pair | None:
+        if (output, input) in without:
+            return None
+        return Pair(output, input, responses.omega, *responses.pair(output, input))
 
-    return bode_matrix([[made(*pair) for pair in row] for row in rows])
+    return bode_matrix([[cell(*pair) for pair in row] for row in rows])
 
 
 def of_fit(fit: Fitted) -> Figure:
@@ -151,7 +156,7 @@ def bode_matrix(rows: Sequence[Sequence[Pair | None]], *, identifier: str = "bod
         identifier,
         {"data": traces, "layout": layout},
         total,
-        f"Magnitude, phase and coherence of {len(cells)} responses; grey where the coherence is below "
+        f"Magnitude, phase and coherence of {counted(len(cells), 'response')}; grey where the coherence is below "
         f"{LEAST_COHERENCE:g} and the response is not to be used.",
         f"Bode diagrams of {', '.join(f'{p.output} over {p.input}' for p in cells)}.",
         keys=_keys(cells),
@@ -185,7 +190,24 @@ def _keys(cells: Sequence[Pair]) -> tuple[Key, ...]:
         keys.append(Key("±2 random errors", _ERROR, "band"))
     if any(p.model is not None for p in cells):
         keys.append(Key("model", MODEL, "dash"))
+    if any(p.model is not None and np.isfinite(p.model.gain).all() for p in cells):
+        keys.append(Key("±2 σ of the model", _BOUND, "band"))
     return tuple(keys)
+
+
+def beside_model(phase: Array, omega: Array, model_omega: Array, model_phase: Array) -> Array:
+    """A flight's phase [deg] with the model's count of whole turns, line by line where the model is.
+
+    At a notch a flight's phase may turn either way; beyond the model's lines the turns of its ends stay.
+    """
+    inside = (omega >= model_omega[0] * (1.0 - 1e-9)) & (omega <= model_omega[-1] * (1.0 + 1e-9))
+    places = np.flatnonzero(inside & np.isfinite(phase))
+    if places.size == 0:
+        return phase
+    reference = np.interp(omega, model_omega, model_phase)
+    turns = np.round((reference - phase) / 360.0)
+    nearest = places[np.clip(np.searchsorted(places, np.arange(phase.size)), 0, places.size - 1)]
+    return np.asarray(phase + 360.0 * turns[nearest])
 
 
 def _phase(pair: Pair) -> Array:
@@ -224,7 +246,17 @@ def _traces(pair: Pair, numbers: Sequence[str]) -> list[dict[str, Any]]:
         traces.append(line(hertz, np.where(good, values, np.nan), name=name, color=BLACK, axis=n, hover=hover))
     if pair.model is not None:
         omega, answer = pair.model.omega, pair.model.response
-        for n, values in zip(numbers, (np.asarray(decibel(answer)), unwrapped_degrees(answer)), strict=False):
+        middles = (np.asarray(decibel(answer)), unwrapped_degrees(answer))
+        for n, values, half in zip(
+            numbers, middles, (2.0 * _DB * pair.model.gain, np.degrees(2.0 * pair.model.phase)), strict=False
+        ):
+            if np.isfinite(half).all():
+                x, edge = (np.concatenate([a, b[::-1]]) for a, b in ((omega, omega), (values + half, values - half)))
+                band = line(x / TWO_PI, edge, name="±2 σ of the model", color=_BOUND, width=0, axis=n)
+                traces.append(
+                    {**band, "fill": "toself", "fillcolor": _BOUND, "hoverinfo": "skip", "hovertemplate": None}
+                )
+        for n, values in zip(numbers, middles, strict=False):
             traces.append(
                 line(
                     omega / TWO_PI,

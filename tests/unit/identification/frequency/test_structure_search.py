@@ -150,7 +150,7 @@ def test_the_verb_searches_prints_and_has_a_page() -> None:
     assert study.to_document()["search"]["picked"] == "heave+yaw+inflow+torque"
     assert not study.structure.parameters["tau_ped"].free
     page = study.page()
-    assert any(section.title == "Structures that were tried" for section in page.sections)
+    assert any(section.title == "Which structures were tried?" for section in page.sections)
     with pytest.raises(CardError, match="no parameter of any structure of this search"):
         sp.fit_ss(None, heave_and_yaw(), search=True, fixed={"tau_pedd": 0.0})
     with pytest.raises(SwashError, match="takes one structure"):
