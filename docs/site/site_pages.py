@@ -5,6 +5,7 @@
 * A link to a file of the repository's root leads to its page (`OF_THE_ROOT`).
 * A link into research/, which is no part of the site, becomes the name of its file.
 * `<!-- include -->` before a link to a file of the repository's root shows that file there, with links that hold.
+* `<!-- fly NAME -->` becomes the vehicle's exported page (`--format web`), where ziglang is installed.
 * `<!-- python reference -->` becomes every public name with its signature and docstring (`site_reference`).
 * A page of docs/notebooks is offered as a Jupyter notebook too.
 """
@@ -15,6 +16,7 @@ import json
 import posixpath
 import re
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +26,13 @@ import site_reference
 from pygments.lexers.special import TextLexer
 from sphinx.search.en import SearchEnglish
 
+import swashplate as sp
+
 NAVIGATION = "<!-- navigation -->"
 REFERENCE = "<!-- python reference -->"
 NOTEBOOKS = "notebooks/"
+FLYING = "fly"
+"""Folder of the exported pages."""
 OF_THE_ROOT = {
     "README.md": "index.md",
     "ARCHITECTURE.md": "developers/architecture.md",
@@ -39,6 +45,7 @@ OF_THE_ROOT = {
 _INCLUDE = re.compile(r"^<!-- include -->\[[^\]]+\]\((?:\.\./)+(\w+\.md)\)$", re.MULTILINE)
 _TO_THE_ROOT = re.compile(r"\]\((?:\.\./)+([A-Z]+\.md)\)")
 _TO_RESEARCH = re.compile(r"\[([^\[\]]*)\]\((?:\.\./)+(research/[\w./-]+\.md)(?:#[^)]*)?\)")
+_FLY = re.compile(r"^<!-- fly (\w+) -->$", re.MULTILINE)
 _LINK = re.compile(r"\[([^\[\]]*)\]\((?!https?:|#)([^)\s]+)\)")
 _HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 _ITEM = re.compile(r"^(?:[*-]|\d+\.) +\**\[[^\]]+\]\(([^)#]+)\.md\)", re.MULTILINE)
@@ -102,11 +109,22 @@ def notebook(text: str) -> dict[str, Any]:
     return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
 
 
+def flying(name: str, here: str) -> str:
+    """A vehicle's exported page inside a page of a folder; nothing where no ziglang makes one."""
+    if find_spec("ziglang") is None:
+        return ""
+    place = posixpath.relpath(f"{FLYING}/{name}.html", here)
+    may = 'loading="lazy" sandbox="allow-scripts allow-downloads"'
+    frame = f'<iframe class="flying" src="{place}" title="{name}, flying" {may}></iframe>'
+    return f'```{{raw}} html\n{frame}\n<p><a href="{place}">Fly {name} in the whole window</a></p>\n```'
+
+
 def _read(app: Any, name: str, source: list[str]) -> None:
     text = _INCLUDE.sub(lambda match: included(match[1], f"{name}.md"), source[0])
     here = posixpath.dirname(name) or "."
     text = _TO_THE_ROOT.sub(lambda match: f"]({posixpath.relpath(OF_THE_ROOT[match[1]], here)})", text)
     text = _TO_RESEARCH.sub(r"\1 (`\2`)", text)
+    text = _FLY.sub(lambda match: flying(match[1], here), text)
     if REFERENCE in text:
         text = text.replace(REFERENCE, site_reference.reference())
     if name.startswith(NOTEBOOKS):
@@ -120,6 +138,10 @@ def _read(app: Any, name: str, source: list[str]) -> None:
 def _finish(app: Any, exception: Exception | None) -> None:
     if exception is not None or app.builder.format != "html":
         return
+    if find_spec("ziglang") is not None:
+        pages = (page.read_text(encoding="utf-8") for page in Path(app.srcdir).rglob("*.md"))
+        for name in sorted({name for text in pages for name in _FLY.findall(text)}):
+            sp.export_model(name, "web").save(Path(app.outdir) / FLYING)
     for page in sorted((Path(app.srcdir) / NOTEBOOKS).glob("*.md")):
         made = json.dumps(notebook(page.read_text(encoding="utf-8")), indent=1)
         (Path(app.outdir) / NOTEBOOKS / f"{page.stem}.ipynb").write_text(made + "\n", encoding="utf-8")

@@ -13,6 +13,7 @@ import shutil
 import subprocess
 from collections.abc import Iterator, Mapping
 from html import unescape
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -100,6 +101,16 @@ def test_every_page_is_on_the_site_and_every_link_leads_somewhere(whole: Path) -
     pages = {Path(name).with_suffix(".html") for name in PAGES}
     assert {page for page in pages if not (whole / page).is_file()} == set()
     assert dead_links(whole) == []
+
+
+def test_a_page_of_a_vehicle_flies_it(site: Path) -> None:
+    page = (site / "doors" / "get-a-model.html").read_text(encoding="utf-8")
+    if find_spec("ziglang") is None:
+        assert "<iframe" not in page, "nothing leads to a page that is not there"
+        return
+    assert 'src="../fly/raptor50.html"' in page
+    assert "Content-Security-Policy" in (site / "fly" / "raptor50.html").read_text(encoding="utf-8")
+    assert dead_links(site / "fly") == []
 
 
 def _headings(page: str) -> list[tuple[int, str]]:
