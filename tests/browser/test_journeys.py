@@ -74,10 +74,21 @@ def test_a_dropped_log_gives_gains_within_a_minute_and_four_clicks(
         assert took < MINUTE
         assert visit.of("window.clicks") <= FEW
         assert "NO verification" in told, "this log holds nothing but its sweep"
+        margin = "document.querySelector('[data-loop=RLL] tbody').innerText"
+        before, drawn = visit.of(margin), visit.of("document.querySelector('.tune').dataset.drawn")
+        slide = "(s => { s.value = 0.5 * s.value; s.dispatchEvent(new Event('input')); })"
+        visit.of(f"{slide}(document.querySelector('[data-loop=RLL] [data-gain=P]'))")
+        visit.until(f"document.querySelector('.tune').dataset.drawn !== '{drawn}'")
+        assert visit.of(margin) != before, "the margins move with the slider"
+        assert "Against flown" in visit.text("[data-loop=RLL] .verdict")
+        with visit.page.expect_download() as mine:
+            visit.page.click("[data-loop=RLL] [data-mine]")
+        assert mine.value.suggested_filename == "mine.param"
+        assert "\nATC_RAT_RLL_P,0.0" in Path(mine.value.path()).read_text()
         titles = visit.of("[...document.querySelectorAll('.curves strong')].map(e => e.textContent)")
         assert titles[:2] == ["Step of the target", "Disturbance: 0.1 of the command"]
         assert "Coherence, from 0.6 on it counts" in titles
-        assert visit.of("document.querySelectorAll('.curves canvas').length") == len(titles)
+        assert visit.of("document.querySelectorAll('.curves :is(canvas, .nyquist)').length") == len(titles)
         keep("journey-gains.png", visit.page.screenshot())
         with visit.page.expect_download() as download:
             visit.page.click("a[href='/download/gains.param']")

@@ -170,7 +170,7 @@ def test_a_card_opens_a_flight_that_ships_and_names_its_command(browser: Any, ad
     visit.until("document.getElementById('map').dataset.drawn")
     visit.page.keyboard.press("Escape")
     visit.until("!/Δ/.test(document.getElementById('map').innerText)")
-    visit.until("document.querySelectorAll('#sweeps button').length === 2")
+    visit.until("document.querySelector('#sweeps button')?.textContent === 'Identify them together'")
     visit.view("code")
     codes = visit.of("[...document.querySelectorAll('[data-code=\"Command line\"]')].map(e => e.textContent)")
     assert "swash inspect examples/helicopter_sweeps.bin" in codes

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from swashplate.arrays import Array
@@ -87,6 +89,28 @@ def rate_loop_steps(
     return RateSteps(time, step, shaken, stable, float(np.maximum(0.0, np.max(step) - 1.0)), float(step[-1]))
 
 
+class HeldModel(NamedTuple):
+    """From a command that is held over each step to a rate: matrices (n, n), (n, m), (n,), (m,), and delays [steps]."""
+
+    ad: Array
+    bd: Array
+    cd: Array
+    dd: Array
+    late: NDArray[np.int64]
+
+
+def held_model(model: StateSpaceModel, rate: str, command: str) -> HeldModel:
+    """A model stepped at the loop's rate, exact between steps; m is at how many delays the command acts."""
+    model, owner = model.wide  # one input for every time at which the command acts
+    a, b, c, d = model.explicit()
+    driven = [k for k, j in enumerate(owner) if model.inputs[j] == command]
+    o, n, dt = model.outputs.index(rate), a.shape[0], 1.0 / RATE
+    held = expm(np.block([[a, b[:, driven]], [np.zeros((len(driven), n + len(driven)))]]) * dt)
+    # One step at least: commands act after it.
+    late = np.array([max(1, round(model.delay(rate, model.inputs[k]) * RATE)) for k in driven], dtype=np.int64)
+    return HeldModel(held[:n, :n], held[:n, n:], c[o], d[o, driven], late)
+
+
 def stepped(
     model: StateSpaceModel,
     gains: Mapping[str, Array],
@@ -109,14 +133,8 @@ def stepped(
         for name in ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD", "FLTG")
     }
     m = max(value.size for value in k.values())
-    model, owner = model.wide  # one input for every time at which the command acts
-    a, b, c, d = model.explicit()
-    driven = [k for k, j in enumerate(owner) if model.inputs[j] == command]
-    o, n, dt = model.outputs.index(rate), a.shape[0], 1.0 / RATE
-    held = expm(np.block([[a, b[:, driven]], [np.zeros((len(driven), n + len(driven)))]]) * dt)
-    ad, bd, cd, dd = held[:n, :n], held[:n, n:], c[o], d[o, driven]
-    # One step at least: commands act after it.
-    late = np.array([max(1, round(model.delay(rate, model.inputs[k]) * RATE)) for k in driven])
+    ad, bd, cd, dd, late = held_model(model, rate, command)
+    n, dt = ad.shape[0], 1.0 / RATE
     given = np.zeros((int(late.max()), m))
     wanted, slow, filtered, sloped, before, summed, x = *np.zeros((6, m)), np.zeros((n, m))
     target_share, error_share, slope_share, gyro_share = (

@@ -133,15 +133,14 @@ def identified(
     references: Sequence[str],
     band: tuple[float, float],
     seen: Sequence[tuple[Read, float, float, bool]],
-    *,
-    gains: Sequence[bool],
+    fits: Sequence[tuple[str, tuple[float, float], bool]],
 ) -> Code:
     """From sweeps to gains, axis by axis.
 
     Args:
         parts: of the logs that are fitted. chosen: input, output and reference of each axis.
         seen: what each axis' model is flown along, and whether the fit has not seen that; else the lines say so.
-        gains: whether gains are asked for, by axis.
+        fits: form, band [Hz] and whether gains are asked for, by axis.
     """
     inputs, outputs = ([one[k] for one in chosen] for k in (0, 1))
     told = "# The fit has seen this stretch: it verifies nothing."
@@ -161,22 +160,19 @@ def identified(
     lines.append(f"records = sp.uniform_records({listed}, {names!r})")
     given = f"references={list(references)!r}, " if references else ""
     lines.append(f"responses = sp.respond(records, inputs={inputs!r}, outputs={outputs!r}, {given}band={band!r})")
-    for k, ((moved, answer, _), (other, start, stop, unseen), wanted) in enumerate(
-        zip(chosen, seen, gains, strict=True)
-    ):
+    for k, (axis, stretch, fit) in enumerate(zip(chosen, seen, fits, strict=True)):
+        (moved, answer, _), (other, start, stop, unseen), (form, (low, high), wanted) = axis, stretch, fit
         end = "" if len(chosen) == 1 else f"-{answer}"
-        one = f" --outputs {answer}" if len(chosen) > 1 else ""
         shell += [] if unseen else [told]
-        shell.append(
-            f"swash fit-tf responses --input {moved}{one}{' --gains' if wanted else ''} "
-            f"--hold-out {other.named(start, stop)} --out study{end} {other.words}".rstrip()
-        )
-        stretch, study = "unseen" if unseen else "fitted", "study" if len(chosen) == 1 else f"study_{k + 1}"
+        asked = f"--input {moved} --outputs {answer} --form {form} --band {low:g}-{high:g}{' --gains' * wanted}"
+        unseen_part = f"--hold-out {other.named(start, stop)} --out study{end} {other.words}".rstrip()
+        shell.append(f"swash fit-tf responses {asked} {unseen_part}")
+        called, study = "unseen" if unseen else "fitted", "study" if len(chosen) == 1 else f"study_{k + 1}"
         lines += [other.python("other"), *([] if unseen else [told])]
         lines += [
-            f"{stretch} = other.between({start:.10g}, {stop:.10g})",
-            f"{study} = sp.fit_tf(responses, input={moved!r}, outputs=[{answer!r}], gains={wanted}, "
-            f"hold_out={stretch})",
+            f"{called} = other.between({start:.10g}, {stop:.10g})",
+            f"{study} = sp.fit_tf(responses, input={moved!r}, outputs=[{answer!r}], form={form!r}, "
+            f"band=({low:g}, {high:g}), gains={wanted}, hold_out={called})",
             f"print({study})",
             f'{study}.save("study{end}")',
         ]

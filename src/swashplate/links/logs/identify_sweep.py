@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_bytes, write_text
+from swashplate.control.analysis.rate_gain_names import ROTORFLIGHT
 from swashplate.errors import SwashError
 from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight
@@ -20,6 +21,7 @@ from swashplate.flights.schema import channel
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.alone import alone
 from swashplate.links.logs.hold_out import Part, hold_out
+from swashplate.links.logs.loop_page import loop_of
 from swashplate.links.logs.opened import Opened
 from swashplate.links.logs.sweep_channels import Channels
 from swashplate.links.logs.sweep_set import Swept, together
@@ -103,12 +105,12 @@ def identify_sweep(
             tell(doing, begin + width * done / (total or 1e9))
 
         held = hold_out(one.opened, one.sweep, one.chosen.input, one.chosen.output, others)
-        study, gained = _study(responses, one.chosen, held.flight.between(held.start, held.stop), say)
-        axes.append(_axis(one, responses, study, held, gained))
+        made = _study(responses, one.chosen, held.flight.between(held.start, held.stop), say)
+        axes.append(_axis(one, responses, made.study, held, made.gained))
         if len(swept) > 1:
             own = (_digits(one.sweep.low), _digits(one.sweep.high))
-            axes[-1]["alone"] = alone(records[k], one.chosen, responses, band=own, form=axes[-1]["fit"]["form"])
-        studies.append(study)
+            axes[-1]["alone"] = alone(records[k], one.chosen, responses, band=own, form=made.form)
+        studies.append(made)
         seen.append(held)
     tell("closing the loops with the gains", 0.88)
     code = code_lines.identified(
@@ -117,9 +119,9 @@ def identify_sweep(
         references,
         band,
         [(held.read, held.start, held.stop, held.unseen) for held in seen],
-        gains=[axis["no_gains"] == "" for axis in axes],
+        [(made.form, made.band, not made.gained) for made in studies],
     )
-    files = _files(studies, [one.chosen.output for one in swept], responses, records, swept, folder)
+    files = _files([made.study for made in studies], responses, records, swept, folder)
     document = {
         "words": " ".join(f"{one.sweep}." for one in swept),
         "joined": _joined(swept),
@@ -158,18 +160,29 @@ def _axis(one: Swept, responses: Any, study: Any, held: Part, gained: str) -> di
             *(study.fit.warnings if study.fit else ()),
         ],
         "verification": _verified(study, one.chosen, held),
-        "gains": [_gains(suggestion) for suggestion in study.material.gains if not suggestion.refused],
+        "gains": [loop_of(suggestion) for suggestion in study.material.gains if not suggestion.refused],
         "no_gains": " ".join(filter(None, (gained, *refused))),
         "alone": None,
     }
 
 
-def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., None]) -> tuple[Any, str]:
-    """The fit with its verification and gains, and why there are no gains where there are none."""
-    fit_tf = resolve("fit_tf")
-    study = fit_tf(responses, input=chosen.input, outputs=[chosen.output], say=say)
-    form = str(study.material.transfer_functions[0].details.form.text)
-    band = study.fit.settings.get("band_hz")
+class _Chosen(NamedTuple):
+    """A fit with its verification and gains, why there are no gains (""), its form, and the band that it holds in."""
+
+    study: Any
+    gained: str
+    form: str
+    band: tuple[float, float]
+
+
+def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., None]) -> _Chosen:
+    fit_tf, outputs = resolve("fit_tf"), [chosen.output]
+    study = fit_tf(responses, input=chosen.input, outputs=outputs, say=say)
+    fitted = study.material.transfer_functions[0]
+    form = str(fitted.details.form.text)
+    # What a model does outside of the lines that it was fitted to, nobody has told: it is judged within them.
+    ends = fitted.targets[0].omega[[0, -1]] / (2.0 * np.pi)
+    band = (float(np.floor(1e3 * ends[0]) / 1e3), float(np.ceil(1e3 * ends[1]) / 1e3))
     held = (part,) if study.structure is not None else ()
     words, gains = "", True
     try:
@@ -177,11 +190,8 @@ def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., No
     except SwashError as error:
         words, gains = f"{error.problem} {error.hint or ''}", False
     # Once more with the form that was chosen: the same fit, with what is asked of it.
-    made = fit_tf(
-        responses, input=chosen.input, outputs=[chosen.output], form=form, band=band, gains=gains, hold_out=held
-    )
-    made = replace(made, material=replace(made.material, transfer_functions=(study.fit,)))
-    return made, words
+    made = fit_tf(responses, input=chosen.input, outputs=outputs, form=form, band=band, gains=gains, hold_out=held)
+    return _Chosen(made, words, form, band)
 
 
 def _decibels(h: Complex) -> Array:
@@ -247,47 +257,12 @@ def _verified(study: Any, chosen: Channels, seen: Part) -> dict[str, Any] | None
     }
 
 
-def _margin(reading: Any) -> list[float]:
-    return [float(reading.value), float(reading.sigma)]
-
-
 def _refused(suggestion: Any) -> str:
     return f"{suggestion.axis}: {suggestion.refused}" if suggestion.refused else ""
 
 
-def _gains(suggestion: Any) -> dict[str, Any]:
-    """Gains before and after with what they are worth and what the loop answers with each."""
-    names = list(suggestion.parameters) or list(suggestion.flown)
-    rows = [[name, suggestion.flown.get(name), suggestion.parameters.get(name)] for name in names]
-    steps = suggestion.steps()
-    answers: dict[str, dict[str, Any] | None] = {"before": None, "after": None}
-    for label, which, figures in (
-        ("before", "flown", suggestion.figures_flown),
-        ("after", "suggested", suggestion.figures_suggested),
-    ):
-        if which in steps:
-            answer = steps[which]
-            answers[label] = {
-                "time": answer.time,
-                "step": answer.step,
-                "disturbance": np.degrees(answer.disturbance),
-                "stable": answer.stable,
-                "overshoot": answer.overshoot,
-                "phase_margin": _margin(figures.margins.phase_margin),
-                "gain_margin": _margin(figures.margins.gain_margin),
-                "delay_margin": [1e3 * number for number in _margin(figures.margins.delay_margin)],
-                "crossover": _margin(figures.margins.crossover),
-                "peak": figures.peak,
-                "bandwidth": figures.bandwidth,
-                "rejection": figures.rejection,
-            }
-    words = " ".join((suggestion.words, *(f"{line[0].upper()}{line[1:]}." for line in suggestion.trade)))
-    return {"axis": suggestion.axis, "rows": rows, "words": words, **answers}
-
-
 def _files(
     studies: Sequence[Any],
-    called: Sequence[str],
     responses: Any,
     records: Sequence[Sequence[Flight]],
     swept: Sequence[Swept],
@@ -301,10 +276,18 @@ def _files(
             study.save(place)
         return place / name
 
+    # Rotorflight takes lines of its command line, ArduPilot a file of parameters.
+    spoken = any(one.axis in ROTORFLIGHT for study in studies for one in study.material.gains)
+    named = "gains.txt" if spoken else "gains.param"
+
     def parameters() -> Path:
         gains = [one for study in studies for one in study.material.gains]
-        lines = [f"{name},{value:.6g}" for one in gains for name, value in one.parameters.items()]
-        return write_text(folder / "gains.param", "\n".join(lines) + "\n")
+        told = [(name, value) for one in gains for name, value in one.parameters.items()]
+        if spoken:
+            lines = [*(f"set {name} = {value:.0f}" for name, value in told), "save"]
+        else:
+            lines = [f"{name},{value:.6g}" for name, value in told]
+        return write_text(folder / named, "\n".join(lines) + "\n")
 
     def measured() -> Path:
         responses.save(folder / "responses.nc")
@@ -319,9 +302,9 @@ def _files(
 
     files: dict[str, Make] = {}
     if any(one.parameters for study in studies for one in study.material.gains):
-        files["gains.param"] = parameters
+        files[named] = parameters
     for k, study in enumerate(studies):
-        end = f"-{called[k]}" if len(studies) > 1 else ""
+        end = f"-{swept[k].chosen.output}" if len(studies) > 1 else ""
         place = folder / f"study{end}"
         wanted = {"report": "report.html", "fit": "fit.json"}
         wanted |= {"model": "model.toml"} if study.structure is not None else {}

@@ -49,17 +49,15 @@ function progress() {
 
 // Sweeps of several inputs are estimated together, whichever of them is asked for.
 const several = () => new Set(ready().flatMap((log) => log.sweeps.map((sweep) => sweep.axis))).size > 1;
-const WORDS = { one: "Identify this", all: "Identify with the others" };
-const verb = () => (several() ? WORDS.all : WORDS.one);
 const label = (sweep) => `${sweep.axis}, ${+sweep.low.toPrecision(3)} to ${+sweep.high.toPrecision(3)} Hz`;
 
+const begin_button = (log, sweep, words) => make("button", { class: "first", "data-identify": `${log.id} ${sweep.number}`, disabled: last?.state === "running", onclick: () => begin_with(log, sweep) }, words);
+
 function list() {
-  const rows = ready().flatMap((log) => log.sweeps.map((sweep) =>
-    make("li", { class: "fine" }, make("b", {}, label(sweep)), make("div", { class: "soft" }, `${ready().length > 1 ? `${log.name}, ` : ""}${sweep.words.split(": ").slice(1).join(": ")}`),
-      make("button", { class: "first", "data-identify": `${log.id} ${sweep.number}`, disabled: last?.state === "running", onclick: () => begin_with(log, sweep) }, verb()))));
-  if (rows.length) return make("ul", { class: "cards" }, ...rows);
-  const waiting = ready().some((log) => !log.checked);
-  return make("p", { class: "soft" }, waiting ? "Sweeps are being looked for …" : NO_SWEEP);
+  const all = ready().flatMap((log) => log.sweeps.map((sweep) => [log, sweep])), together = several();
+  if (!all.length) return make("p", { class: "soft" }, ready().some((log) => !log.checked) ? "Sweeps are being looked for …" : NO_SWEEP);
+  const rows = all.map(([log, sweep]) => make("li", { class: "fine" }, make("b", {}, label(sweep)), make("div", { class: "soft" }, `${ready().length > 1 ? `${log.name}, ` : ""}${sweep.words.split(": ").slice(1).join(": ")}`), together ? "" : begin_button(log, sweep, "Identify this")));
+  return make("div", {}, make("ul", { class: "cards" }, ...rows), together ? begin_button(...all[0], "Identify them together") : "");
 }
 
 // Other channels than those that the sweep's axis names.
@@ -92,9 +90,10 @@ function show() {
 
 // Buttons above the plots, one for each sweep that is marked there.
 function shortcuts() {
-  $("sweeps").replaceChildren(...ready().flatMap((log) => log.sweeps.map((sweep) =>
-    make("div", { class: "sweep" }, make("span", {}, `Sweep ${label(sweep)}${ready().length > 1 ? ` (${log.name})` : ""}`),
-      make("button", { class: "first", onclick: () => begin_with(log, sweep) }, verb())))));
+  const all = ready().flatMap((log) => log.sweeps.map((sweep) => [log, sweep]));
+  const row = (words, log, sweep, verb) => make("div", { class: "sweep" }, make("span", {}, words), make("button", { class: "first", onclick: () => begin_with(log, sweep) }, verb));
+  if (several()) $("sweeps").replaceChildren(row(`Sweeps ${all.map(([, sweep]) => label(sweep)).join("; ")}`, ...all[0], "Identify them together"));
+  else $("sweeps").replaceChildren(...all.map(([log, sweep]) => row(`Sweep ${label(sweep)}${ready().length > 1 ? ` (${log.name})` : ""}`, log, sweep, "Identify this")));
 }
 
 export function begin() {

@@ -1,45 +1,8 @@
 // What came of a sweep: gains first, then what they rest on: answers in time, verification, fit, frequency response.
 import { block } from "./code.js";
 import { curves } from "./curve.js";
+import { gains } from "./gains.js";
 import { make, short } from "./make.js";
-
-// A number with its bound: as many decimals as the bound has with one digit.
-function pm([value, sigma]) {
-  if (value === null) return "–";
-  if (!sigma) return short(value);
-  const decimals = Math.max(0, Math.min(6, -Math.floor(Math.log10(sigma))));
-  return `${value.toFixed(decimals)} ± ${sigma.toFixed(decimals)}`.replaceAll(" ", "\u00a0"); // on one line, on a telephone too
-}
-
-const percent = (answer) => make("td", { class: "number" }, answer ? (answer.stable ? `${(100 * answer.overshoot).toFixed(0)} %` : "unstable") : "–");
-const overshoot = (axis) => make("tr", {}, make("td", {}, "overshoot of a step"), percent(axis.before), percent(axis.after));
-
-function gains(home, found) {
-  for (const axis of found.gains) {
-    const head = make("tr", {}, make("th", {}, "parameter"), make("th", { class: "number" }, "flown"), make("th", { class: "number" }, "suggested"));
-    const number = (value) => make("td", { class: "number" }, value === null ? "–" : String(+(+value).toPrecision(4)));
-    const rows = axis.rows.map(([name, flown, suggested]) => make("tr", {}, make("td", {}, name), number(flown), make("td", { class: "number" }, make("b", {}, suggested === null ? "–" : String(+(+suggested).toPrecision(4))))));
-    const read = (value) => (value === undefined || value === null ? "–" : typeof value === "number" ? short(value) : pm(value)); // null: there is none
-    const margin = (name, key) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, read(axis[when]?.[key]))));
-    home.append(make("table", { class: "gains" }, make("thead", {}, head), make("tbody", {}, ...rows,
-      margin("phase margin [deg]", "phase_margin"), margin("gain margin [dB]", "gain_margin"), margin("delay margin [ms]", "delay_margin"), margin("crossover [rad/s]", "crossover"), margin("largest sensitivity", "peak"), margin("bandwidth [rad/s]", "bandwidth"), margin("disturbance rejection [rad/s]", "rejection"), overshoot(axis))));
-    home.append(make("p", {}, axis.words));
-    answers(home, axis, found);
-  }
-  if (found.no_gains) home.append(make("p", { class: "warn", role: "alert", "data-no-gains": "" }, `No gains. ${found.no_gains}`));
-}
-
-function answers(home, axis, found) {
-  const those = [["before", "as flown", 7, [6, 4]], ["after", "suggested", 0, []]].filter(([when]) => axis[when]);
-  if (!those.length) return;
-  if (axis.after && !axis.after.stable) home.append(make("p", { class: "warn", role: "alert" }, "The suggested gains are unstable on this model. Do not fly them."));
-  if (axis.before && !axis.before.stable) home.append(make("p", { class: "warn", role: "alert" }, "On this model the flown gains do not settle, and the aircraft flew with them: do not trust the model."));
-  const x = axis[those[0][0]].time;
-  const lines = (key) => those.map(([when, name, tint, dash]) => ({ name, values: axis[when][key], colour: tint, dash }));
-  curves(home, { title: "Step of the target", x, xLabel: "time [s]", yLabel: "rate / target [1]", lines: lines("step"), level: 1 });
-  curves(home, { title: "Disturbance: 0.1 of the command", x, xLabel: "time [s]", yLabel: `${found.output} [deg/s]`, lines: lines("disturbance") });
-  home.append(make("p", { class: "soft" }, "The loop is closed on the model at 400 Hz. The target steps at once; ArduPilot's own shaping of the target is not in it."));
-}
 
 function verification(home, found) {
   const seen = found.verification;
@@ -96,7 +59,12 @@ export function result(home, found) {
     if (several) part.append(make("h2", {}, `${axis.output} / ${axis.input}`));
     if (axis.alone) part.append(make("p", { class: "soft", "data-alone": "" }, axis.alone.words));
     if (axis.warnings.length) part.append(make("ul", { class: "plain" }, ...axis.warnings.map((text) => make("li", { class: "warn" }, text))));
-    gains(part, axis);
+    for (const loop of axis.gains) {
+      const home = make("section", { class: "tune", "data-loop": loop.axis });
+      part.append(home);
+      gains(home, loop);
+    }
+    if (axis.no_gains) part.append(make("p", { class: "warn", role: "alert", "data-no-gains": "" }, `No gains. ${axis.no_gains}`));
     verification(part, axis);
     fit(part, axis);
     bode(part, axis);
