@@ -107,7 +107,7 @@ def section(learnt: str, predicted: str, fit: sp.Result[Any, Any], validation: s
         "What the scores stand beside ([what each row means](explanation/validation.md)):",
         beside(validation, CHANNELS, 0.5),
         beside(validation, CHANNELS, 1.0),
-        "\n".join(f"* {law.words}" for law in validation.laws),
+        "\n".join(f"* {law.summary_text}" for law in validation.laws),
         "\n".join(f"* {v.axis}: **{v.level}**. {v.words}" for v in validation.verdict),
     ]
     return "\n\n".join(lines)

@@ -109,7 +109,7 @@ def test_the_bands_hold_what_they_promise_where_the_model_class_explains_the_fli
                 ]
                 rows.append([title, horizon, promised, float(np.mean(held)), min(held), max(held), ", ".join(missed)])
     off = [abs(row[3] - row[2]) for row in rows if row[0] == "explained"]
-    wrong = [band.words for band in found if "too" in band.level]
+    wrong = [band.summary_text for band in found if "too" in band.level]
     seen = {band.channel for band in narrow if band.level == "too narrow" or band.wider > 1.3}
     blamed = {band.channel for band in foreign if band.level == "too narrow"}
     tilted = {"phi", "theta", "p", "q"}

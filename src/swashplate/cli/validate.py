@@ -140,7 +140,10 @@ def validate(
         if drawn:
             typer.echo(f"\nWhat the bands of {len(drawn)} drawn models hold [%]")
             screen.print(bands_table(validation))
-        for words in (*(one.words for one in validation.contacts), *(law.words for law in validation.laws)):
+        for words in (
+            *(one.summary_text for one in validation.contacts),
+            *(law.summary_text for law in validation.laws),
+        ):
             typer.echo(f"\n{words}")
         typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))
         if out is not None:

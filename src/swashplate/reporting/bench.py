@@ -55,7 +55,7 @@ def compose_bench(bench: Bench) -> Report:
         ("Checks", _doubts(doubts), "caution" if doubts else "good"),
         ("Agreement", agreement, "caution" if apart else "plain"),
     )
-    sections = (*card, *(_procedure(result, bench) for result in bench.details.results), _made(bench))
+    sections = (*card, *(_procedure(result, bench) for result in bench.details.results), _provenance(bench))
     picture = next((b for r in bench.details.results if r.procedure == "swashplate" for b in _figures(r, "key-")), None)
     return Report(
         title=f"{bench.model.card.vehicle} on the test bench" if bench.names else "On the test bench",
@@ -118,12 +118,12 @@ def _procedure(result: BenchResult, bench: Bench) -> Section:
     if rows:
         blocks.append(Table(f"{result.title}: result", ("quantity", "unit", "value", "σ"), tuple(rows)))
     blocks += [
-        Table(rows.title, rows.columns, tuple(tuple(Cell(words, number=True) for words in row) for row in rows.rows))
+        Table(rows.title, rows.columns, tuple(tuple(Cell(text, number=True) for text in row) for row in rows.rows))
         for rows in result.tables
     ]
     doubts = [check.words for check in result.checks if not check.good]
     if doubts:
-        blocks += [Text(words, tone="caution") for words in doubts]
+        blocks += [Text(text, tone="caution") for text in doubts]
     if result.left_out:
         blocks.append(Points(result.left_out, title="Points left out"))
     blocks.append(Points(tuple(c.words for c in result.checks if c.good), title="Checked"))
@@ -132,10 +132,10 @@ def _procedure(result: BenchResult, bench: Bench) -> Section:
 
 def _figures(result: BenchResult, prefix: str = "") -> list[Figure]:
     """One figure for each title; curves of one title share it."""
-    made = []
+    figures = []
     for number, (_, group) in enumerate(groupby(result.curves, key=lambda curve: curve.title)):
-        made.append(_figure(f"{prefix}{result.procedure}-{number}", list(group)))
-    return made
+        figures.append(_figure(f"{prefix}{result.procedure}-{number}", list(group)))
+    return figures
 
 
 def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
@@ -185,7 +185,7 @@ def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
     )
 
 
-def _made(bench: Bench) -> Section:
+def _provenance(bench: Bench) -> Section:
     lines = [f"{name} {version}" for name, version in versions().items()]
     cards = {"published": bench.start.card, "measured": bench.model.card}
     lines += [f"{name} card SHA-256 {card_hash(card)}" for name, card in cards.items()]

@@ -84,7 +84,7 @@ def compose_campaign(
     lost = sum(task.count for task in failed)
     banners = [("bad", f"{counted(lost, rows)} could not be computed and are in no figure below")] if failed else []
     sections = [
-        Section(f"table-{k}", caption, (_plain(caption, head, cells),))
+        Section(f"table-{k}", caption, (_text_table(caption, head, cells),))
         for k, (caption, head, cells) in enumerate(tables)
     ]
     if shapes:
@@ -97,7 +97,7 @@ def compose_campaign(
         sections.append(Section("failed", "What failed", (_failed(failed, folder),)))
     return Report(
         title=title,
-        banners=(*banners, *(("bad", words) for words in refused), *(("caution", words) for words in careful)),
+        banners=(*banners, *(("bad", text) for text in refused), *(("caution", text) for text in careful)),
         summary=(("Standing", standing, "plain"), (f"{rows.capitalize()}s", f"{count:,}", "plain"), *summary),
         picture=None,
         sections=tuple(sections),
@@ -109,13 +109,11 @@ def _label(shape: Shape) -> str:
     return f"{shape.name} [{shape.unit}]" if shape.unit else shape.name
 
 
-def _plain(caption: str, head: tuple[str, ...], cells: tuple[tuple[str, ...], ...]) -> Block:
+def _text_table(caption: str, head: tuple[str, ...], cells: tuple[tuple[str, ...], ...]) -> Block:
     return Table(
         caption,
         head,
-        tuple(
-            tuple(Cell(words, number=k > 0 and words[:1] in _DIGITS) for k, words in enumerate(row)) for row in cells
-        ),
+        tuple(tuple(Cell(text, number=k > 0 and text[:1] in _DIGITS) for k, text in enumerate(row)) for row in cells),
     )
 
 
@@ -126,7 +124,7 @@ def _quantiles(shapes: Sequence[Shape], shares: Sequence[float], rows: str) -> T
         for at, low, high in shape.quantiles:
             row += [Cell(f"{at:.4g}", True), Cell(f"{low:.4g} to {high:.4g}", True, "quiet")]
         cells.append(tuple(row))
-    names = tuple(words for share in shares for words in (f"{100 * share:g} %", "95 % interval"))
+    names = tuple(heading for share in shares for heading in (f"{100 * share:g} %", "95 % interval"))
     return Table(
         f"Quantiles over all {rows}s, each with its interval.",
         ("figure", *names),

@@ -32,7 +32,7 @@ def compare_responses(cases: Mapping[str, FrequencyResponse]) -> CaseParts:
     if not (outputs and inputs):
         listed = "; ".join(f"{n}: {', '.join(r.outputs)} over {', '.join(r.inputs)}" for n, r in cases.items())
         raise SwashError(f"share no pair ({listed}).", channel="cases")
-    rows, curves, document, told = [], {}, {}, []
+    rows, curves, document, remarks = [], {}, {}, []
     for pair in ((o, i) for o in outputs for i in inputs):
         if all(r.band(*pair) is None for r in every):
             continue
@@ -51,18 +51,18 @@ def compare_responses(cases: Mapping[str, FrequencyResponse]) -> CaseParts:
             numbers = (Cell(cell, number=True, tone=tone) for cell in cells)
             rows.append((Cell(f"{pair[0]} / {pair[1]}"), Cell(name), Cell(ends), *numbers))
             if far is not None and far["J"] > _LARGE:
-                told.append(f"{pair[0]} / {pair[1]}: {name} differs from {names[0]} by J = {far['J']:.0f}.")
+                remarks.append(f"{pair[0]} / {pair[1]}: {name} differs from {names[0]} by J = {far['J']:.0f}.")
         document[f"{pair[0]}/{pair[1]}"] = entry
     shared = {(o, i) for o in outputs for i in inputs}
     alone = sorted({f"{o} / {i}" for r in every for o in r.outputs for i in r.inputs if (o, i) not in shared})
     if alone:
-        told.append(f"Not in all cases, and left out: {', '.join(alone)}.")
+        remarks.append(f"Not in all cases, and left out: {', '.join(alone)}.")
     if not curves:
         raise SwashError("no pair is coherent in any case.", channel="cases")
     head = ("output / input", "case", "coherent band [Hz]", "magnitude [dB]", "phase [deg]", "J", "sigmas")
     note = f"Against {names[0]}, root mean squares over the lines where both are coherent (above {LEAST_COHERENCE:g})."
     table = Table("Responses", head, tuple(rows), note=note)
-    return CaseParts((table,), (bode_overlay(curves),), tuple(told), {"responses": document})
+    return CaseParts((table,), (bode_overlay(curves),), tuple(remarks), {"responses": document})
 
 
 def _coherent(one: FrequencyResponse, pair: tuple[str, str]) -> Complex:
@@ -78,9 +78,9 @@ def apart(first: FrequencyResponse, other: FrequencyResponse, pair: tuple[str, s
     if wanted is None or wanted.omega.size < 2:
         return None
     h, sigma = _at(other, pair, wanted.omega)
-    _, own = _at(first, pair, wanted.omega)
+    _, reference = _at(first, pair, wanted.omega)
     error = np.log(h / wanted.measured)
-    spread = np.sqrt(own**2 + sigma**2)
+    spread = np.sqrt(reference**2 + sigma**2)
     known = spread > 0.0
     away = np.abs(error[known]) / spread[known] / np.sqrt(2.0)  # two parts, each with this deviation
     return {

@@ -22,7 +22,7 @@ def compare_estimates(cases: Mapping[str, Result[Any, Any]]) -> CaseParts:
     """
     names = list(cases)
     parameters = list(dict.fromkeys(e.name for result in cases.values() for e in result.estimates))
-    rows, document, told = [], {}, []
+    rows, document, remarks = [], {}, []
     for parameter in parameters:
         by_case = {n: next((e for e in r.estimates if e.name == parameter), None) for n, r in cases.items()}
         first = by_case[names[0]]
@@ -37,23 +37,23 @@ def compare_estimates(cases: Mapping[str, Result[Any, Any]]) -> CaseParts:
                 continue
             away = distance(first, e)
             far = abs(away) > APART
-            words = "" if np.isnan(away) else f"{away:+.1f}"
-            cells.append(Cell(words, number=True, tone="caution" if far else "plain"))
+            difference = "" if np.isnan(away) else f"{away:+.1f}"
+            cells.append(Cell(difference, number=True, tone="caution" if far else "plain"))
             if e is not None:
                 entry[name]["away"] = _finite(away)
             if far:
-                told.append(f"{parameter}: {name} differs from {names[0]} by {abs(away):.1f} standard deviations.")
+                remarks.append(f"{parameter}: {name} differs from {names[0]} by {abs(away):.1f} standard deviations.")
         rows.append((*cells,))
         document[parameter] = entry
     units = {p: {e.unit for r in cases.values() for e in r.estimates if e.name == p} for p in parameters}
-    told += [f"{p} has different units: {', '.join(sorted(u))}." for p, u in units.items() if len(u) > 1]
-    told += _shared_data(cases)
+    remarks += [f"{p} has different units: {', '.join(sorted(u))}." for p, u in units.items() if len(u) > 1]
+    remarks += _shared_data(cases)
     head = ["parameter", "unit"]
     for name in names:
         head += [name, "CR [%]"] + (["sigmas away"] if name != names[0] else [])
     note = f"Sigmas away: difference from {names[0]} over that of independent fits; beyond {APART:g} they disagree."
     table = Table("Parameters", tuple(head), tuple(rows), note=note)
-    return CaseParts((table,), told=tuple(told), document={"parameters": document})
+    return CaseParts((table,), told=tuple(remarks), document={"parameters": document})
 
 
 def distance(first: Estimate | None, other: Estimate | None) -> float:
@@ -68,8 +68,8 @@ def _of(e: Estimate | None) -> list[Cell]:
     if e is None:
         return [Cell("-", number=True), Cell("")]
     known = e.free and np.isfinite(e.best_sigma) and e.value
-    words = f"{100.0 * e.best_sigma / abs(e.value):.1f}" if known else "fixed" if e.fixed else ""
-    percent = f"= {e.tie}" if e.tie else words
+    sigma = f"{100.0 * e.best_sigma / abs(e.value):.1f}" if known else "fixed" if e.fixed else ""
+    percent = f"= {e.tie}" if e.tie else sigma
     return [Cell(f"{e.value:.5g}", number=True), Cell(percent, number=True)]
 
 
@@ -79,8 +79,8 @@ def _finite(value: float) -> float | None:
 
 def _shared_data(cases: Mapping[str, Result[Any, Any]]) -> list[str]:
     """Fits that have seen the same data: their differences are less certain to be chance than the sigmas say."""
-    seen = {n: {s.signals or f"{s.sha256} {s.name}": s.name for s in r.data} for n, r in cases.items()}
-    pairs = [(a, b, sorted({seen[a][k] for k in seen[a].keys() & seen[b].keys()})) for a, b in combinations(cases, 2)]
+    logs = {n: {s.signals or f"{s.sha256} {s.name}": s.name for s in r.data} for n, r in cases.items()}
+    pairs = [(a, b, sorted({logs[a][k] for k in logs[a].keys() & logs[b].keys()})) for a, b in combinations(cases, 2)]
     return [
         f"{a} and {b} have seen the same data ({', '.join(both)}): their differences are more significant than the "
         "sigmas of independent fits say."

@@ -46,8 +46,8 @@ def compose(
         raise SwashError("there is nothing to report: neither a fit nor a validation was given.")
     at_hover, problems = (modes, []) if modes is not None else hover_modes(fit, validation)
     hover = sections_sight.hover(at_hover, problems)
-    seen = fit if fit and fit.in_time else None
-    one_step = seen is not None and GAINS.get(seen.method, "none") != "none" and validation is not None
+    fit_in_time = fit if fit and fit.in_time else None
+    one_step = fit_in_time is not None and GAINS.get(fit_in_time.method, "none") != "none" and validation is not None
     parts: list[Section | None] = [
         sections_validation.verdict(validation) if validation else None,
         sections_validation.prediction(validation) if validation else None,
@@ -55,14 +55,14 @@ def compose(
         sections_prior.prior(fit) if fit else None,
         sections_sight.sight(fit) if fit else None,
         # One sample ahead any model lies on the flight: where a flight is predicted, that is what is looked at.
-        sections_fit.comparison(seen) if seen and not one_step else None,
+        sections_fit.comparison(fit_in_time) if fit_in_time and not one_step else None,
         verification_section(verification) if verification else None,
-        sections_fit.residuals(seen) if seen else None,
+        sections_fit.residuals(fit_in_time) if fit_in_time else None,
         sections_validation.innovations(validation) if validation and validation.innovations else None,
         hover,
         sections_data.data(fit, validation),
         sections_fit.meanings(fit, PARAMETERS) if fit else None,
-        _made(fit, validation),
+        _provenance(fit, validation),
     ]
     sections = tuple(part for part in parts if part is not None)
     lines = summary(fit, validation)
@@ -81,7 +81,7 @@ _FIRST = {"Verdict": 0, "Warnings": 1}
 """Lines of the summary that a page begins with."""
 
 
-def _made(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
+def _provenance(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
     noise = sections_fit.noise(fit) if fit else None
     blocks = (
         *sections_data.asked(fit, validation),

@@ -38,15 +38,15 @@ def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:
         _steps(check),
         _gusts(check),
         _boundaries(check),
-        _made(check),
+        _provenance(check),
     ]
     slowest = check.slowest
-    words = f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s, at {check.rate:g} Hz"
+    slowest_mode = f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s, at {check.rate:g} Hz"
     return Report(
         title=title or f"A controller on {check.vehicle.name}",
-        banners=tuple(("bad", f"PROBLEM: {words}") for words in check.problems),
+        banners=tuple(("bad", f"PROBLEM: {slowest_mode}") for slowest_mode in check.problems),
         summary=(
-            ("Modes", words, "bad" if check.problems else "good"),
+            ("Modes", slowest_mode, "bad" if check.problems else "good"),
             ("Margins", *_margins_line(check)),
             ("Rejection", *_rejection_line(check)),
             ("Handling", *_handling_line(check)),
@@ -112,17 +112,17 @@ def _handling_line(check: ControlCheck) -> tuple[str, str]:
         return (
             "not computed with an observer." if not check.omega.size else "no bandwidth could be read off."
         ), "caution"
-    words = [
+    parts = [
         f"{figures.ATTITUDE_WORDS[a.state]} {h.bandwidth.value:.3g} rad/s, Level {a.level or '–'}" for a, h in rows
     ]
-    return f"{'; '.join(words)} (boundaries scaled, not checked).", _tone([a.level for a, _ in rows])
+    return f"{'; '.join(parts)} (boundaries scaled, not checked).", _tone([a.level for a, _ in rows])
 
 
 def _coupling_line(check: ControlCheck) -> tuple[str, str]:
-    words = [f"{c.name.split(' (')[0]} {value_words(c.value)} {c.unit}" for c in check.couplings]
+    parts = [f"{c.name.split(' (')[0]} {value_words(c.value)} {c.unit}" for c in check.couplings]
     judged = [c.level for c in check.couplings if c.level]
-    beside = f" {len(judged)} of {len(words)} have a standard." if len(judged) < len(words) else ""
-    return f"{'; '.join(words) or 'no step was flown'}.{beside}", _tone(judged)
+    beside = f" {len(judged)} of {len(parts)} have a standard." if len(judged) < len(parts) else ""
+    return f"{'; '.join(parts) or 'no step was flown'}.{beside}", _tone(judged)
 
 
 def _level(level: int | None) -> Cell:
@@ -140,13 +140,13 @@ def _loops(check: ControlCheck) -> Section:
         for a in check.margins.axes:
             least = f"6 dB, 45°, {delay_words(check.delay_boundary.level1 / 1e3)}"
             good = _axis_level(a, check) == 1
-            told = (f"meets {least}", "good") if good else (f"below one of {least}", "caution")
+            judgement = (f"meets {least}", "good") if good else (f"below one of {least}", "caution")
             rows.append(
                 (Cell(a.name), _number(_decibel(a.gain_down), ".1f"), _number(_decibel(a.gain), "+.1f"),
                  _number(math.degrees(a.phase), ".0f"), _number(a.crossover), Cell(delay_words(a.delay), number=True),
                  _number(a.disc.alpha, ".2f"),
                  _number(_decibel(a.sensitivity), ".1f"),
-                 Cell(told[0], tone=told[1]))
+                 Cell(judgement[0], tone=judgement[1]))
             )  # fmt: skip
         t = check.margins.together
         columns = (
@@ -284,7 +284,7 @@ def _boundaries(check: ControlCheck) -> Section:
              _number(second), Cell("yes", tone="good") if b.checked else Cell("no", tone="caution"), Cell(b.source))
         )  # fmt: skip
     columns = ("quantity", "", "Level 1, full size", "scaled", "Level 2, scaled", "checked", "source")
-    words = (
+    boundary_note = (
         f"Frequencies are scaled by √N with N = {check.scale:.3g}: the rotor radius of the UH-60 ({REFERENCE_RADIUS} "
         "m) over this one's, unless a scale was given (Froude). The boundaries are for manned helicopters."
     )
@@ -292,10 +292,10 @@ def _boundaries(check: ControlCheck) -> Section:
         "checked: whether the number was compared with the standard's text. Where it says no, treat it as provisional."
     )
     table = Table("Boundaries that were used", columns, tuple(rows), note=note)
-    return Section("boundaries", "Where the boundaries come from", (Text(words), table), folded=True)
+    return Section("boundaries", "Where the boundaries come from", (Text(boundary_note), table), folded=True)
 
 
-def _made(check: ControlCheck) -> Section:
+def _provenance(check: ControlCheck) -> Section:
     lines = [f"{name} {version}" for name, version in versions().items()]
     lines.append(f"card of {check.vehicle.name}, SHA-256 {card_hash(check.vehicle.card)}")
     lines.append(f"{counted(len(check.steps), 'step')} flown; task of the boundaries: {check.task}")

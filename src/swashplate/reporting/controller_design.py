@@ -34,14 +34,14 @@ def compose_design(
     plan, card = made.plan, made.vehicle.card
     slowest = max((a.modes[0] for a in analyses), key=lambda mode: mode.real)
     least = min(a.margins.least_delay for a in analyses)
-    told = ", ".join(map(str, plan.sensors)) or "the states themselves"
+    sensors = ", ".join(map(str, plan.sensors)) or "the states themselves"
     return Report(
         title=title or f"{'LQG' if plan.sensors else 'LQR'} controller of {card.title}",
         banners=(
             ("caution", "Results of linear models at the trims, not of a flight: `swash control check` flies it."),
         ),
         summary=(
-            ("Told", f"{told}, {plan.rate:g} steps a second", "plain"),
+            ("Told", f"{sensors}, {plan.rate:g} steps a second", "plain"),
             ("Commands are late by", late, "plain"),
             *((("Loops that are fast for that", fast, "caution"),) if fast else ()),
             ("Modes", f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s", "plain"),

@@ -33,8 +33,8 @@ def kept(values: Array, *, limit: int = MAX_POINTS) -> NDArray[np.int64]:
     lowest = np.where(finite, rows, np.inf).argmin(axis=1)
     highest = np.where(finite, rows, -np.inf).argmax(axis=1)
     first = np.arange(rows.shape[0]) * width
-    seen = finite.any(axis=1)
-    return np.unique(np.concatenate([[0, n - 1], gaps, (first + lowest)[seen], (first + highest)[seen]])).astype(
+    drawn = finite.any(axis=1)
+    return np.unique(np.concatenate([[0, n - 1], gaps, (first + lowest)[drawn], (first + highest)[drawn]])).astype(
         np.int64
     )
 

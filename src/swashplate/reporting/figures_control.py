@@ -83,8 +83,8 @@ def rejection_figure(check: ControlCheck) -> Figure:
         traces.append(line(r.omega, 20.0 * np.log10(r.size), name=r.state, color=color, dash=dash, hover=hover))
         keys.append(Key(r.state, color, dash))
     ends = check.rejections[0].omega[[0, -1]]
-    for level, words in ((-3.0, "-3 dB: bandwidth"), (5.0, "5 dB: Level 1 peak")):
-        traces.append(line(ends, [level, level], name=words, color=GREY, dash="dot", hover=words))
+    for level, label in ((-3.0, "-3 dB: bandwidth"), (5.0, "5 dB: Level 1 peak")):
+        traces.append(line(ends, [level, level], name=label, color=GREY, dash="dot", hover=label))
     keys.append(Key("-3 dB (bandwidth) and 5 dB (peak)", GREY, "dot"))
     return Figure(
         identifier="rejection-curves",
@@ -154,16 +154,16 @@ def bandwidth_chart(check: ControlCheck) -> Figure:
         bandwidth, delay = a.handling.bandwidth.value, a.handling.phase_delay.value
         first, second = check.boundary(a.state).scaled(check.scale)
         right = 1.3 * max(bandwidth, first)
-        for low, high, color, words in (
+        for low, high, color, label in (
             (first, right, "rgba(0,158,115,0.18)", "Level 1"),
             (second, first, "rgba(230,159,0,0.18)", "Level 2"),
             (0.0, second, "rgba(213,94,0,0.18)", "Level 3"),
         ):
             around = ([low, high, high, low, low], [0.0, 0.0, highest, highest, 0.0])
-            box = line(*around, name=words, color=GREY, width=1.0, axis=number)
+            box = line(*around, name=label, color=GREY, width=1.0, axis=number)
             traces.append({**box, "fill": "toself", "fillcolor": color, "hoverinfo": "skip", "hovertemplate": None})
             layout["annotations"].append(
-                {"text": words, "x": 0.5 * (low + high), "y": 0.93 * highest, "xref": f"x{number}",
+                {"text": label, "x": 0.5 * (low + high), "y": 0.93 * highest, "xref": f"x{number}",
                  "yref": f"y{number}", "showarrow": False, "font": {"size": 10}}
             )  # fmt: skip
         traces.append(
@@ -218,9 +218,9 @@ def modes_figure(check: ControlCheck) -> Figure:
     good = [complex(m) for m in check.modes if m.real <= 1e-6]
     traces = [
         {"type": "scatter", "mode": "markers", "x": [m.real for m in group], "y": [m.imag for m in group],
-         "name": words, "marker": {"color": color, "symbol": "x", "size": 8},
+         "name": label, "marker": {"color": color, "symbol": "x", "size": 8},
          "hovertemplate": "%{x:.3g} %{y:+.3g}j 1/s<extra></extra>"}
-        for group, words, color in ((good, "dies out", MODEL), (bad, "grows", VERMILION)) if group
+        for group, label, color in ((good, "dies out", MODEL), (bad, "grows", VERMILION)) if group
     ]  # fmt: skip
     return Figure(
         identifier="modes-plane",

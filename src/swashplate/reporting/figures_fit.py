@@ -156,7 +156,7 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
     layout["xaxis"] = axis("", tickangle=-60, ticks="", tickfont={"size": 11}, showgrid=False)
     layout["yaxis"] = axis("", autorange="reversed", ticks="", tickfont={"size": 11}, showgrid=False)
     shares = np.asarray(correlation, dtype=np.float64)
-    words = [
+    hover = [
         [f"{value:.2f}".replace("0.", ".") if i != j else "" for j, value in enumerate(row)]
         for i, row in enumerate(shares)
     ]
@@ -169,7 +169,7 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
         "zmin": -1,
         "zmax": 1,
         "colorscale": [[0, "#B2182B"], [0.25, "#F4A582"], [0.5, "#FFFFFF"], [0.75, "#92C5DE"], [1, "#2166AC"]],
-        "text": words,
+        "text": hover,
         "texttemplate": "%{text}" if n <= 20 else "",
         "textfont": {"size": 10},
         "xgap": 1,

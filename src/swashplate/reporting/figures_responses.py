@@ -59,10 +59,10 @@ def excitation(responses: FrequencyResponse) -> Figure:
     for i, one in enumerate(responses.inputs):
         for j, other in enumerate(responses.inputs[:i]):
             style, color = styles[number % 4], _COLORS[number % len(_COLORS)]
-            words = f"{other} with {one}"
+            label = f"{other} with {one}"
             values = responses.input_coherence[:, i, j]
-            traces.append(line(hertz, values, name=words, color=color, dash=style, axis="2"))
-            keys.append(Key(words, color, style))
+            traces.append(line(hertz, values, name=label, color=color, dash=style, axis="2"))
+            keys.append(Key(label, color, style))
             number += 1
     return Figure(
         identifier="input-spectra",

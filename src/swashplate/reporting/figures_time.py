@@ -209,11 +209,11 @@ def _hover(name: str) -> str:
 
 def _band(pieces: Sequence[tuple[Array, Array, Array]], *, axis: str) -> dict[str, object]:
     """The region model +-2 sigma, a closed shape per piece."""
-    whole = [run for piece in pieces for run in _unbroken(*piece)]
-    limit = max(8, MAX_POINTS // (2 * max(1, len(whole))) - 1)
+    runs = [run for piece in pieces for run in _unbroken(*piece)]
+    limit = max(8, MAX_POINTS // (2 * max(1, len(runs))) - 1)
     xs: list[float | None] = []
     ys: list[float | None] = []
-    for time, values, sigma in whole:
+    for time, values, sigma in runs:
         places = kept(values, limit=limit)
         spread = 2.0 * sigma[places]
         xs += [*numbers(time[places]), *numbers(time[places][::-1]), None]

@@ -57,7 +57,7 @@ def key_picture(validation: Validation) -> Figure:
     for predictor in reversed([p for p in PREDICTORS if p != "hold"]):
         rows = [scores[name, predictor] for name in names if (name, predictor) in scores]
         color, _, symbol = PREDICTOR_STYLE[predictor]
-        words = PREDICTOR_WORDS[predictor]
+        label = PREDICTOR_WORDS[predictor]
         traces.append(
             {
                 "type": "scatter",
@@ -65,7 +65,7 @@ def key_picture(validation: Validation) -> Figure:
                 "x": numbers([max(s.fit, _FLOOR) for s in rows]),
                 "y": [s.channel for s in rows],
                 "customdata": numbers([s.fit for s in rows]),
-                "name": words,
+                "name": label,
                 "marker": {
                     "color": color,
                     "size": 12 if predictor == "model" else 10,
@@ -73,7 +73,7 @@ def key_picture(validation: Validation) -> Figure:
                     "line": {"width": 2, "color": color},
                 },
                 "cliponaxis": False,
-                "hovertemplate": f"%{{y}}, {words}<br>fit %{{customdata:.1f}} %<extra></extra>",
+                "hovertemplate": f"%{{y}}, {label}<br>fit %{{customdata:.1f}} %<extra></extra>",
             }
         )
     best = [

@@ -29,7 +29,7 @@ _STEP = 2.0
 
 def compose_linear_decoupling(
     model: HasMatrices,
-    made: Mapping[str, Decoupling | None],
+    decouplings: Mapping[str, Decoupling | None],
     *,
     name: str,
     inputs: Sequence[str],
@@ -51,28 +51,28 @@ def compose_linear_decoupling(
     """
     axes = {"inputs": list(inputs), "outputs": list(outputs)}
     w = np.geomspace(_LOW, _HIGH, _POINTS)
-    ratios = {words: coupling(model, w, by=by, **axes) for words, by in made.items()}
+    ratios = {law: coupling(model, w, by=by, **axes) for law, by in decouplings.items()}
     pairs = [(i, k) for i in range(len(outputs)) for k in range(len(outputs)) if i != k]
     near = int(np.argmin(np.abs(w - frequency)))
-    worst = {words: max(float(ratio[i, k, near]) for i, k in pairs) for words, ratio in ratios.items()}
-    told = "; ".join(f"{_WORDS[words]} {100.0 * value:.3g} %" for words, value in worst.items())
+    worst = {law: max(float(ratio[i, k, near]) for i, k in pairs) for law, ratio in ratios.items()}
+    summary = "; ".join(f"{_WORDS[law]} {100.0 * value:.3g} %" for law, value in worst.items())
     return Report(
         title=title or f"{name}: decoupling of {', '.join(outputs)}",
         banners=(("caution", f"No filter: {problem}"),) if problem else (),
         summary=(
             ("Axes", ", ".join(f"{i} moves {o}" for i, o in zip(inputs, outputs, strict=True)), "plain"),
-            ("Coupling", f"largest off-axis over on-axis response at {frequency:g} rad/s: {told}.", "plain"),
+            ("Coupling", f"largest off-axis over on-axis response at {frequency:g} rad/s: {summary}.", "plain"),
             ("Judged", "on its own model, where the filter is exact; flown, it is as good as that model.",
              "caution"),
         ),
         picture=_ratio_figure(w, ratios, pairs, outputs),
-        sections=(_steps(model, made, axes), _numbers(made, axes, frequency)),
+        sections=(_steps(model, decouplings, axes), _numbers(decouplings, axes, frequency)),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )  # fmt: skip
 
 
-def _keys(made: Sequence[str]) -> tuple[Key, ...]:
-    return tuple(Key(_WORDS[words], *style(number)) for number, words in enumerate(made))
+def _keys(names: Sequence[str]) -> tuple[Key, ...]:
+    return tuple(Key(_WORDS[name], *style(number)) for number, name in enumerate(names))
 
 
 def _ratio_figure(
@@ -82,12 +82,12 @@ def _ratio_figure(
     traces = []
     for panel, (i, k) in enumerate(pairs):
         layout[f"yaxis{'' if panel == 0 else panel + 1}"]["type"] = "log"
-        for number, (words, ratio) in enumerate(ratios.items()):
+        for number, (name, ratio) in enumerate(ratios.items()):
             color, dash = style(number)
             shown = 100.0 * np.maximum(ratio[i, k], 1e-5)  # an exact filter leaves rounding
-            hover = f"{_WORDS[words]}<br>%{{x:.3g}} rad/s, %{{y:.3g}} %"
+            hover = f"{_WORDS[name]}<br>%{{x:.3g}} rad/s, %{{y:.3g}} %"
             axis = "" if panel == 0 else str(panel + 1)
-            traces.append(line(w, shown, name=words, color=color, dash=dash, hover=hover, axis=axis))
+            traces.append(line(w, shown, name=name, color=color, dash=dash, hover=hover, axis=axis))
     return Figure(
         identifier="key-picture",
         spec={"data": traces, "layout": layout},
@@ -98,13 +98,15 @@ def _ratio_figure(
     )
 
 
-def _steps(model: HasMatrices, made: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[str]]) -> Section:
+def _steps(
+    model: HasMatrices, decouplings: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[str]]
+) -> Section:
     """Both outputs on a step of each axis, scaled so that the on-axis answer's largest is one."""
     outputs = axes["outputs"]
     time = np.linspace(0.0, _STEP, 201)
     titles = [f"{o} on {axis}'s axis [-]" for axis in outputs for o in outputs]
     layout, traces = stacked(titles, height=95), []
-    for number, by in enumerate(made.values()):
+    for number, by in enumerate(decouplings.values()):
         color, dash = style(number)
         system = in_series(by or unmixed(**axes), model)
         for k in range(len(outputs)):
@@ -121,14 +123,16 @@ def _steps(model: HasMatrices, made: Mapping[str, Decoupling | None], axes: Mapp
         height=int(layout["height"]),
         caption=f"A step of each axis for {_STEP:g} s, in units of the largest on-axis answer.",
         alt="Answers of all outputs to a step of each axis.",
-        keys=_keys(list(made)),
+        keys=_keys(list(decouplings)),
     )
     return Section("steps", "Steps", (figure,))
 
 
-def _numbers(made: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[str]], frequency: float) -> Section:
+def _numbers(
+    decouplings: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[str]], frequency: float
+) -> Section:
     blocks: list[Block] = []
-    matrix, filtered = made["matrix"], made.get("filter")
+    matrix, filtered = decouplings["matrix"], decouplings.get("filter")
     if matrix is not None:
         rows = tuple(
             (Cell(name), *(Cell(f"{value:+.4f}", number=True) for value in row))

@@ -44,16 +44,16 @@ def compose_monte_carlo(
         remarks: what may surprise.
     """
     lost = spread.lost
-    words = f"{lost} of {counted(spread.flights, 'flight')} lost" if lost else f"none of {spread.flights} lost"
+    losses = f"{lost} of {counted(spread.flights, 'flight')} lost" if lost else f"none of {spread.flights} lost"
     when = float(spread.lost_after[spread.worst])
-    own = f"lost after {when:.2f} s" if math.isfinite(when) else "not lost, furthest from its place"
+    ending = f"lost after {when:.2f} s" if math.isfinite(when) else "not lost, furthest from its place"
     numbers = [f"{name} = {value:.5g}" for name, value in drawn.items()]
     return Report(
         title=title,
-        banners=(("bad", f"LOST: {words}; {_by(spread)}"),) if lost else (),
+        banners=(("bad", f"LOST: {losses}; {_by(spread)}"),) if lost else (),
         summary=(
-            ("Lost", f"{words} (limits: {spread.limits.words()})", "bad" if lost else "good"),
-            ("Worst", f"number {spread.worst}, {own}", "plain"),
+            ("Lost", f"{losses} (limits: {spread.limits.words()})", "bad" if lost else "good"),
+            ("Worst", f"number {spread.worst}, {ending}", "plain"),
             ("Commands are late by", late, "plain"),
         ),
         picture=None,

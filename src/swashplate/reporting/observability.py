@@ -14,13 +14,13 @@ def compose_observability(
 ) -> Report:
     """The report's structure, a section for each speed [m/s]."""
     hidden = sum(len(one.hidden) for one in studies)
-    words = f"{hidden} directions leave no trace" if hidden else "nothing that lasts stays unseen"
+    summary = f"{hidden} directions leave no trace" if hidden else "nothing that lasts stays unseen"
     return Report(
         title=title or f"What sensors see of {model}",
         banners=(),
         summary=(
             ("Sensors", ", ".join(map(str, studies[0].sensors)), "plain"),
-            ("Hidden", words, "caution" if hidden else "good"),
+            ("Hidden", summary, "caution" if hidden else "good"),
         ),
         picture=None,
         sections=tuple(
@@ -34,9 +34,9 @@ def compose_observability(
 def _blocks(one: Observability) -> tuple[Text | Points | Table, ...]:
     rows = tuple((Cell(k.name), Cell(f"{k.sigma:.3g}", True), Cell(f"{k.before:.3g}", True)) for k in one.known)
     caption = f"How well each is known after {one.seconds:g} s (standard deviation)."
-    told: list[Text | Points | Table] = []
+    blocks: list[Text | Points | Table] = []
     if one.hidden:
-        told.append(Points(tuple(map(in_words, one.hidden)), "Not seen at all, and it does not fade"))
+        blocks.append(Points(tuple(map(in_words, one.hidden)), "Not seen at all, and it does not fade"))
     if one.faint:
-        told.append(Points(tuple(map(in_words, one.faint)), "Seen, but by less than the readings' noise"))
-    return (*told, Table(caption, ("state", "known to", "without any reading"), rows))
+        blocks.append(Points(tuple(map(in_words, one.faint)), "Seen, but by less than the readings' noise"))
+    return (*blocks, Table(caption, ("state", "known to", "without any reading"), rows))

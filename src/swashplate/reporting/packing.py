@@ -78,12 +78,12 @@ def read_figures(text: str) -> list[dict[str, Any]]:
         ValueError: where it unpacks to more than `LARGEST`; and whatever damaged text leads to.
     """
     machine = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)  # with gzip's header
-    whole = machine.decompress(base64.b64decode(text), LARGEST)
+    unpacked = machine.decompress(base64.b64decode(text), LARGEST)
     if not machine.eof:
         raise ValueError(f"they are cut off, or unpack to more than {LARGEST:,} bytes")
-    size = int.from_bytes(whole[:4], "little")
-    rows = whole[4 + size :]
-    specs: list[dict[str, Any]] = json.loads(whole[4 : 4 + size])
+    size = int.from_bytes(unpacked[:4], "little")
+    rows = unpacked[4 + size :]
+    specs: list[dict[str, Any]] = json.loads(unpacked[4 : 4 + size])
     for spec in specs:
         for trace in spec["data"]:
             for side in ("x", "y"):
@@ -107,18 +107,18 @@ def _spec(spec: Mapping[str, Any], rows: bytearray) -> dict[str, Any]:
     """A figure whose long rows lie in `rows`."""
     data = []
     for trace in spec["data"]:
-        moved = {}
+        restored = {}
         for side in ("x", "y"):
             axis = spec["layout"].get(f"{side}axis{trace.get(f'{side}axis', side)[1:]}", {})
             if not (isinstance(row := trace.get(side), Mapping) and "bdata" in row):
                 continue
             values = unpacked(row)
-            moved[side] = _levels(values, rows) if axis.get("type") != "log" else _plain(values)
-        data.append({**trace, **moved})
+            restored[side] = _levels(values, rows) if axis.get("type") != "log" else _as_list(values)
+        data.append({**trace, **restored})
     return {"data": data, "layout": spec["layout"]}
 
 
-def _plain(values: Array) -> list[float | None]:
+def _as_list(values: Array) -> list[float | None]:
     return [float(f"{value:.6g}") if np.isfinite(value) else None for value in values]
 
 

@@ -58,7 +58,7 @@ def page_series(path: str | Path) -> Flight:
 
 
 def _lines(spec: dict[str, Any]) -> list[tuple[str, tuple[Array, Array, str]]]:
-    layout, made = spec["layout"], []
+    layout, series = spec["layout"], []
     if not any(_title(axis) == _TIME for name, axis in layout.items() if name.startswith("xaxis")):
         return []
     for trace in spec["data"]:
@@ -76,8 +76,8 @@ def _lines(spec: dict[str, Any]) -> list[tuple[str, tuple[Array, Array, str]]]:
         for number, (stamps, numbers) in enumerate(pieces, start=1):
             called = re.sub(r"[^\w]+", "_", label).strip("_") + (f"_{number}" if len(pieces) > 1 else "")
             if stamps.size > 1:
-                made.append((f"{spec['name']}/{called}", (stamps, numbers, "1" if unit == "-" else unit)))
-    return made
+                series.append((f"{spec['name']}/{called}", (stamps, numbers, "1" if unit == "-" else unit)))
+    return series
 
 
 def _title(axis: Any) -> str:

@@ -105,8 +105,8 @@ def _of_one(shown: object, title: str | None) -> Report:
     section = own_section(shown)
     if section is None:
         raise SwashError("has nothing that a page could show.", channel=type(shown).__name__, hint="Print it.")
-    made = f"swashplate {versions()['swashplate']}, {date()}"
-    return Report(title or section.title, (), (), None, (replace(section, identifier="shown"),), made)
+    version = f"swashplate {versions()['swashplate']}, {date()}"
+    return Report(title or section.title, (), (), None, (replace(section, identifier="shown"),), version)
 
 
 def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:

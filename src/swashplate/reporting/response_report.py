@@ -49,13 +49,13 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
     ]
     sections, lines = [part for part in parts if part is not None], _summary(m)
     picture = next((b for section in sections if section.folded for b in section.blocks if isinstance(b, Figure)), None)
-    told = with_terms(sections, lines)
+    explained = with_terms(sections, lines)
     return Report(
         title=title or _title(m),
         banners=_banners(m),
         summary=lines,
         picture=picture,
-        sections=tuple(replace(one, blocks=tuple(b for b in one.blocks if b is not picture)) for one in told),
+        sections=tuple(replace(one, blocks=tuple(b for b in one.blocks if b is not picture)) for one in explained),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
@@ -93,13 +93,13 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         r = m.responses
         pairs = [(o, i) for o in r.outputs for i in r.inputs if r.band(o, i) is not None]
         have = "response has" if len(r.outputs) * len(r.inputs) == 1 else "responses have"
-        words = f"{len(pairs)} of {len(r.outputs) * len(r.inputs)} {have} a coherent band ({r.method} estimate)"
-        rows.append(("Responses", f"{words}, from {listed(r.sources, most=4)}.", "plain"))
+        sentence = f"{len(pairs)} of {len(r.outputs) * len(r.inputs)} {have} a coherent band ({r.method} estimate)"
+        rows.append(("Responses", f"{sentence}, from {listed(r.sources, most=4)}.", "plain"))
     if m.transfer_functions:
-        words = "; ".join(
+        sentence = "; ".join(
             f"{model!r} (J {c:.0f})" for f in m.transfer_functions for model, c in zip(f.solution, f.costs, strict=True)
         )
-        rows.append(("Model", words, sections_responses.tone(max(c for f in m.transfer_functions for c in f.costs))))
+        rows.append(("Model", sentence, sections_responses.tone(max(c for f in m.transfer_functions for c in f.costs))))
     if m.fit:
         f = m.fit
         rows.append(
@@ -131,7 +131,7 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
     elif m.fit or m.transfer_functions:
         rows.append(("In time", "not verified: give a flight that the fit has not seen.", "caution"))
     data = [*(m.time_fit.data if m.time_fit else ()), *(m.fit.data if m.fit and not m.responses else ())]
-    told = [
+    warnings = [
         *scale_words(data),
         *(m.time_fit.warnings if m.time_fit else ()),
         *(m.responses.warnings if m.responses else ()),
@@ -140,6 +140,10 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         *problem_words(data),
     ]
     rows.append(
-        ("Warnings", " ".join(told[:3]) or "no problem was found in these flights.", "caution" if told else "plain")
+        (
+            "Warnings",
+            " ".join(warnings[:3]) or "no problem was found in these flights.",
+            "caution" if warnings else "plain",
+        )
     )
     return tuple(rows)

@@ -80,10 +80,14 @@ def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section
     twice = used_twice(fit, validation)
     roles = [("used for the fit", f) for f in fitted]
     for flight in tested:
-        seen = flight in twice
+        used_for_fit = flight in twice
         if flight not in fitted:
             role = (
-                "predicted; a log that the fit used" if seen else "kept from the fit, predicted" if fit else "predicted"
+                "predicted; a log that the fit used"
+                if used_for_fit
+                else "kept from the fit, predicted"
+                if fit
+                else "predicted"
             )
             roles.append((role, flight))
     rows = tuple(
@@ -130,12 +134,12 @@ def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> tu
     """Versions and hashes: enough to know whether two reports say the same about the same data."""
     rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
     hashes: list[tuple[str, str]] = []
-    seen: set[str] = set()
+    named: set[str] = set()
     for flight in (*(fit.data if fit else ()), *(validation.data if validation else ())):
         name = flight.name or "unnamed"
-        if name not in seen:
+        if name not in named:
             hashes.append((f"flight {name}", flight.sha256 or "none: simulated or made in memory"))
-            seen.add(name)
+            named.add(name)
     cards = {label: vehicle.card for label, vehicle in vehicles(fit, validation).items()}
     hashes += [(f"{label} card", card_hash(card)) for label, card in cards.items()]
     results: list[tuple[str, dict[str, Any]]] = [("fit", _numbers(fit))] if fit else []

@@ -80,14 +80,14 @@ def noise(fit: Result[Any, Any]) -> Table | None:
     """The noise model, None where the method has none."""
     if fit.noise is None:
         return None
-    told = noise_told({name: float(value) for name, value in fit.noise._asdict().items()})
+    intensities = noise_told({name: float(value) for name, value in fit.noise._asdict().items()})
     return Table(
         "Noise that the method assumed or estimated",
         ("intensity", "value"),
-        tuple((Cell(name), Cell(value_words(value), number=True)) for name, value in told.items()),
+        tuple((Cell(name), Cell(value_words(value), number=True)) for name, value in intensities.items()),
         note="white_*: rad/s² or m/s² per √Hz; gust_* and drift_*: rad/s³ or m/s³ per √Hz; tau_*: s; sensor_*: "
         "standard deviation per sample in m or rad"
-        + ("; wind: m/s² per √Hz; speed: horizontal, flown, rms in m/s." if "wind" in told else "."),
+        + ("; wind: m/s² per √Hz; speed: horizontal, flown, rms in m/s." if "wind" in intensities else "."),
     )
 
 
@@ -118,22 +118,22 @@ def _relative(change: float, published: float) -> str:
 
 
 def _remarks(fit: Result[Any, Any], e: Estimate) -> tuple[str, bool, str]:
-    words = []
+    remarks = []
     if e.at_bound:
         entry = fit.start.card.parameters.get(e.name)
         bounds = f" [{value_words(entry.lower)}, {value_words(entry.upper)}]" if entry else ""
-        words.append(f"at its physical bound{bounds}")
+        remarks.append(f"at its physical bound{bounds}")
     if e.tie:
-        words.append(f"tied: = {e.tie}")
+        remarks.append(f"tied: = {e.tie}")
     if e.prior_mean is not None and e.prior_sigma is not None:
-        words.append(f"prior {value_words(e.prior_mean, e.prior_sigma)} ± {sigma_words(e.prior_sigma)}")
-    return "; ".join(words), False, "bad" if e.at_bound else "plain"
+        remarks.append(f"prior {value_words(e.prior_mean, e.prior_sigma)} ± {sigma_words(e.prior_sigma)}")
+    return "; ".join(remarks), False, "bad" if e.at_bound else "plain"
 
 
 def comparison(fit: Result[Any, Any]) -> Section:
     """Flight against model for every channel, one pair of figures per flight."""
     one_step = GAINS.get(fit.method, "none") != "none"
-    words = "one-step prediction" if one_step else "simulation on the recorded inputs"
+    model_label = "one-step prediction" if one_step else "simulation on the recorded inputs"
     intro = (
         "Each model sample was predicted one sample ahead from everything measured before it, so the lines should "
         "lie on top of each other and only the residuals below tell how good they are. How the model does seconds "
@@ -156,7 +156,7 @@ def comparison(fit: Result[Any, Any]) -> Section:
             fit.model.input_names,
             identifier=f"fit-{i + 1}",
             source=source,
-            model_words=words,
+            model_words=model_label,
         )
     return Section("comparison", "Does it follow the flight it was fitted to?", tuple(blocks), folded=True)
 
@@ -189,39 +189,39 @@ def _series(fit: Result[Any, Any], pieces: Sequence[Comparison]) -> dict[str, li
 
 def _nuisance(fit: Result[Any, Any], log: str) -> Nuisance:
     """The log's own delays, trims, lever and level, the mean ones where it has none."""
-    own = {e.name: e.value for e in fit.constants if e.record == log and e.name in Nuisance._fields}
-    return (fit.nuisance or Nuisance())._replace(**own)
+    of_log = {e.name: e.value for e in fit.constants if e.record == log and e.name in Nuisance._fields}
+    return (fit.nuisance or Nuisance())._replace(**of_log)
 
 
 def residuals(fit: Result[Any, Any]) -> Section:
     """What the model left over: over time, and its autocorrelation."""
     names = fit.in_time[0].record.output_names
     timed: dict[str, list[tuple[Array, Array]]] = {name: [] for name in names}
-    plain: dict[str, list[Array]] = {name: [] for name in names}
+    residuals_of: dict[str, list[Array]] = {name: [] for name in names}
     for piece in fit.in_time:
         counted = np.asarray(piece.counted) > 0
         for j, name in enumerate(names):
             rows = piece.residuals[:, j]
             timed[name].append((piece.record.time, np.where(counted, rows, np.nan)))
-            plain[name].append(rows[counted])
+            residuals_of[name].append(rows[counted])
     sigma = {name: float(np.mean([c.sigma[j] for c in fit.in_time])) for j, name in enumerate(names)}
-    plain = {name: [rows for rows in pieces if rows.size > 1] for name, pieces in plain.items()}
+    residuals_of = {name: [rows for rows in pieces if rows.size > 1] for name, pieces in residuals_of.items()}
     dt = fit.in_time[0].record.dt
     return Section(
         "residuals",
         "Is what is left over only noise?",
-        (residual_time(timed, sigma), residual_correlation(plain, dt)),
+        (residual_time(timed, sigma), residual_correlation(residuals_of, dt)),
         folded=True,
     )
 
 
-def meanings(fit: Result[Any, Any], words: Mapping[str, str]) -> Section:
+def meanings(fit: Result[Any, Any], glossary: Mapping[str, str]) -> Section:
     """What each number means and where its first value comes from."""
     published = fit.start.card.parameters
     rows = [
         (
             Cell(e.name, anchor=f"meaning-{e.name}"),
-            Cell(words.get(e.name, "") or "–"),
+            Cell(glossary.get(e.name, "") or "–"),
             Cell(f"{published[e.name].source} ({published[e.name].status})"),
             Cell(f"{_limit(published[e.name].lower)} to {_limit(published[e.name].upper)}"),
         )
@@ -231,7 +231,7 @@ def meanings(fit: Result[Any, Any], words: Mapping[str, str]) -> Section:
     rows += [
         (
             Cell(name, anchor=f"meaning-{name}"),
-            Cell(words.get(name, "") or "–"),
+            Cell(glossary.get(name, "") or "–"),
             Cell("estimated for each flight"),
             Cell("–"),
         )
@@ -248,8 +248,8 @@ def _limit(value: float | None) -> str:
 
 def warnings(fit: Result[Any, Any]) -> Points | None:
     """What a reader must know before using the numbers, None where there is nothing."""
-    words = [f"{e.name} ended at its physical bound." for e in fit.estimates if e.at_bound]
+    texts = [f"{e.name} ended at its physical bound." for e in fit.estimates if e.at_bound]
     heavy = [e.name for e in fit.estimates if e.prior_share > PRIOR_HEAVY and not e.tie]
     if heavy:
-        words.append(f"The prior, not the flight, decided {', '.join(heavy)}.")
-    return Points(tuple(words), title="Before you use the numbers") if words else None
+        texts.append(f"The prior, not the flight, decided {', '.join(heavy)}.")
+    return Points(tuple(texts), title="Before you use the numbers") if texts else None

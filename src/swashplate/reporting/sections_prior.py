@@ -19,16 +19,16 @@ def prior(fit: Result[Any, Any]) -> Section | None:
     if not estimates and not held:
         return None
     apart = [e for e in estimates if math.isfinite(e.disagreement) and abs(e.disagreement) > APART]
-    seen = [e for e in estimates if math.isfinite(e.disagreement)]
+    comparable = [e for e in estimates if math.isfinite(e.disagreement)]
     verdict = (
         f"Flight and prior disagree by more than {APART:g} σ in {listed(e.name for e in apart)}. Either "
         "they measure different things, or one standard deviation is too small; the joined value agrees with neither."
         if apart
-        else f"Flight and prior agree within {APART:g} σ in what both can see: {listed(e.name for e in seen)}."
-        if seen
+        else f"Flight and prior agree within {APART:g} σ in what both can see: {listed(e.name for e in comparable)}."
+        if comparable
         else "The flight says nothing beyond the prior, so the two cannot disagree."
     )
-    blocks: list[Block] = [Text(verdict, tone="bad" if apart else "good" if seen else "plain")]
+    blocks: list[Block] = [Text(verdict, tone="bad" if apart else "good" if comparable else "plain")]
     if estimates:
         blocks.append(
             Table(

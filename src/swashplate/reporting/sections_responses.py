@@ -75,8 +75,8 @@ def weak(p: Estimate) -> bool:
 
 
 def _percent(value: float, limit: float) -> Cell:
-    words = f"{value:.1f} %" if value < 1000.0 else "not seen"
-    return Cell(words, number=True, tone="good" if value <= limit else "caution" if value <= 2 * limit else "bad")
+    text = f"{value:.1f} %" if value < 1000.0 else "not seen"
+    return Cell(text, number=True, tone="good" if value <= limit else "caution" if value <= 2 * limit else "bad")
 
 
 def parameter_table(parameters: Sequence[Estimate]) -> Table:
@@ -141,8 +141,8 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
     if len(fit.names) > 1:
         blocks.append(correlation_matrix(fit.names, fit.correlation))
     if len(fit.history) > 1:
-        words = "Half the sum of J over all responses, after each iteration."
-        blocks.append(replace(cost_history(fit.history), caption=words))
+        caption = "Half the sum of J over all responses, after each iteration."
+        blocks.append(replace(cost_history(fit.history), caption=caption))
     return Section("parameters", "Which numbers came out, and how sure are they?", tuple(blocks), folded=True)
 
 
@@ -235,8 +235,10 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
         blocks += [_cost_table(fit.targets, fit.costs), parameter_table(fit.estimates)]
         blocks += [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
         misses = [mismatch(model.response(t.omega), t) for model, t in zip(fit.solution, fit.targets, strict=True)]
-        own = "" if k == 0 else f"-{k + 1}"
-        blocks += [replace(one, identifier=f"{one.identifier}{own}") for one in (of_fit(fit), mismatch_figure(misses))]
+        suffix = "" if k == 0 else f"-{k + 1}"
+        blocks += [
+            replace(one, identifier=f"{one.identifier}{suffix}") for one in (of_fit(fit), mismatch_figure(misses))
+        ]
     if m.trials:
         chosen = m.transfer_functions[0].details.form if m.transfer_functions else None
         blocks.append(
@@ -267,8 +269,8 @@ def bodes_section(m: ResponseMaterial) -> Section:
         band = r.band(output, name)
         h, coherence, error = r.pair(output, name)
         inside = np.isfinite(h) if band is None else (r.omega >= band[0]) & (r.omega <= band[1]) & np.isfinite(h)
-        told = coherence[inside & np.isfinite(coherence)]
-        level = np.nan if told.size == 0 else np.max(told) if band is None else np.median(told)
+        coherences = coherence[inside & np.isfinite(coherence)]
+        level = np.nan if coherences.size == 0 else np.max(coherences) if band is None else np.median(coherences)
         rows.append(
             (
                 Cell(f"{output} / {name}"),
@@ -321,16 +323,16 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
         (
             Cell(g.axis),
             Cell(what),
-            *(Cell(text.replace("+-", "±"), number=True) for text in (suggested, flown)),
+            *(Cell(text.replace("+-", "±"), number=True) for text in (suggested, logged)),
         )
         for g in gains
         if np.isfinite(g.peak) or np.isfinite(g.flown_peak)
-        for what, suggested, flown in g.table()
+        for what, suggested, logged in g.table()
     )
     said = dict.fromkeys(g.words for g in gains)
     firmware = "Rotorflight" if any(g.axis in ROTORFLIGHT for g in gains) else "ArduPilot"
     refused = {g.words for g in gains if g.refused}
-    words = tuple(
+    advice = tuple(
         Text(f"{', '.join(g.axis for g in gains if g.words == w)}: {w}", tone="bad" if w in refused else "caution")
         for w in said
     )
@@ -349,11 +351,11 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
         "gains",
         "Which gains, with which margins?",
         (
-            *(words if refused else ()),
+            *(advice if refused else ()),
             *(table for table in tables if table.rows),
             *(figure for g in gains if (figure := rate_steps_figure(g)) is not None),
             *(Text(f"{g.axis}: {line}") for g in gains for line in g.trade),
-            *(() if refused else words),
+            *(() if refused else advice),
         ),
     )
 

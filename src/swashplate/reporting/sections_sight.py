@@ -107,12 +107,12 @@ def hover(modes: Mapping[str, Sequence[Mode]], problems: Sequence[str] = ()) -> 
 
 def _row(mode: Mode, label: str, place: int) -> tuple[Cell, ...]:
     value = mode.eigenvalue
-    words = f"{value.real:+.3f}" + (f" ± {value.imag:.3f}j" if value.imag > 0.0 else "")
+    text = f"{value.real:+.3f}" + (f" ± {value.imag:.3f}j" if value.imag > 0.0 else "")
     grows = value.real > _SLOW
     return (
         Cell(f"{place}. {', '.join(name for name, share in mode.states if share > 0.1) or mode.states[0][0]}"),
         Cell(label),
-        Cell(words, number=True),
+        Cell(text, number=True),
         Cell(f"{mode.frequency:.2f}", number=True),
         Cell(f"{mode.frequency / (2.0 * math.pi):.2f}", number=True),
         Cell(f"{mode.damping:+.3f}", number=True),

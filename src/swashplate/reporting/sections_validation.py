@@ -54,9 +54,9 @@ def _axis_cells(judged: AxisVerdict) -> tuple[Cell, Cell]:
     return Cell(judged.axis), Cell(judged.level, tone=LEVEL_TONE.get(judged.level, "quiet"), strong=True)
 
 
-def _numbers(words: str) -> str:
+def _numbers(verdict_text: str) -> str:
     """The numbers with which a verdict's words begin, as "phi 69 % (56 %), p 55 % (28 %), 1 s ahead"."""
-    match = re.match(r"(.+?) at ([\d.]+) s\.", words)
+    match = re.match(r"(.+?) at ([\d.]+) s\.", verdict_text)
     if match is None:
         return ""
     numbers = re.sub(r" \[[^]]*\]", "", match[1]).replace("(best rival ", "(")
@@ -77,13 +77,13 @@ def prediction(validation: Validation) -> Section:
     ]
     for i, source in enumerate(sorted(names)):
         blocks += _pictures(validation, source, identifier=f"prediction-{i + 1}")
-    blocks += [Text(one.words, tone="caution") for one in validation.contacts]
-    blocks += [Text(words, tone="caution" if "narrow" in words else "plain") for words in validation.bands_told]
+    blocks += [Text(one.summary_text, tone="caution") for one in validation.contacts]
+    blocks += [Text(line, tone="caution" if "narrow" in line else "plain") for line in validation.bands_told]
     blocks.append(fit_over_horizon(validation))
     tables = (_fits(validation), _beside(validation), _bands(validation), _loop_closed(validation))
     blocks += [table for table in (*tables, _without_contact(validation)) if table]
-    blocks += [Text(law.words[0].upper() + law.words[1:]) for law in validation.laws]
-    blocks += _told(validation)
+    blocks += [Text(law.summary_text[0].upper() + law.summary_text[1:]) for law in validation.laws]
+    blocks += _calibrated_constants(validation)
     return Section("prediction", "How well does it predict what it has not seen?", tuple(blocks), folded=True)
 
 
@@ -128,12 +128,12 @@ def _bands(validation: Validation) -> Table | None:
     drawn = bool(validation.settings.get("draws"))
     return Table(
         "Do the bands hold what they promise?",
-        ("channel", "ahead [s]", *(words for words, _ in BAND_ROWS)),
+        ("channel", "ahead [s]", *(heading for heading, _ in BAND_ROWS)),
         tuple(
             (
                 Cell(half.channel),
                 _cell(f"{half.horizon:g}", False),
-                *(_band_cell(words, cell(half, most[half.channel, half.horizon])) for words, cell in BAND_ROWS),
+                *(_band_cell(heading, cell(half, most[half.channel, half.horizon])) for heading, cell in BAND_ROWS),
             )
             for half in halves
         ),
@@ -144,15 +144,15 @@ def _bands(validation: Validation) -> Table | None:
     )
 
 
-def _band_cell(words: str, text: str) -> Cell:
+def _band_cell(heading: str, text: str) -> Cell:
     tone = "caution" if text.startswith("too ") else "quiet" if text.startswith("cannot") else "plain"
-    return Cell(text, number=words not in ("so", "unit"), tone=tone)
+    return Cell(text, number=heading not in ("so", "unit"), tone=tone)
 
 
-def _told(validation: Validation) -> tuple[Block, ...]:
+def _calibrated_constants(validation: Validation) -> tuple[Block, ...]:
     """What the first seconds of each record told, and the vehicle could not know."""
-    told = validation.calibrated
-    names = [name for name in Nuisance._fields if any(float(getattr(one, name)) for one in told)]
+    calibrated = validation.calibrated
+    names = [name for name in Nuisance._fields if any(float(getattr(one, name)) for one in calibrated)]
     if not names:
         return ()
     seconds = float(validation.settings["calibration"])
@@ -165,7 +165,7 @@ def _told(validation: Validation) -> tuple[Block, ...]:
                     Cell(name),
                     Cell(meaning(name)),
                     Cell(unit_words(record_unit(name))),
-                    *(_cell(f"{float(getattr(one, name)):.3f}", False) for one in told),
+                    *(_cell(f"{float(getattr(one, name)):.3f}", False) for one in calibrated),
                 )
                 for name in names
             ),
@@ -240,9 +240,9 @@ def _without_contact(validation: Validation) -> Table | None:
     """The model's scores with and without the starts that a proposed mask touches."""
     rows = []
     for without in _of_judged(validation, validation.without_contact):
-        whole = validation.score(without.channel, without.horizon)
-        cells = [_cell(words, False) for words in (f"{without.horizon:g}", percent(whole.fit), percent(without.fit))]
-        counts = [_cell(str(count), False) for count in (whole.starts, without.starts)]
+        all_starts = validation.score(without.channel, without.horizon)
+        cells = [_cell(text, False) for text in (f"{without.horizon:g}", percent(all_starts.fit), percent(without.fit))]
+        counts = [_cell(str(count), False) for count in (all_starts.starts, without.starts)]
         rows.append((Cell(without.channel), *cells, *counts))
     if not rows:
         return None
@@ -262,9 +262,9 @@ def _loop_closed(validation: Validation) -> Table | None:
     closed = " and ".join(dict.fromkeys(law.axis for law in validation.laws))
     return Table(
         f"With the {closed} controller in the place of its recorded command",
-        ("channel", "ahead [s]", *(f"{words} [%]" for words, _ in CLOSED_ROWS)),
+        ("channel", "ahead [s]", *(f"{text} [%]" for text, _ in CLOSED_ROWS)),
         tuple(
-            (Cell(f.channel), *(_cell(words, False) for words in (f"{f.horizon:g}", *(c(f) for _, c in CLOSED_ROWS))))
+            (Cell(f.channel), *(_cell(text, False) for text in (f"{f.horizon:g}", *(c(f) for _, c in CLOSED_ROWS))))
             for f in rows
         ),
         note="Recorded commands answer gusts that no prediction knows. Gain: points that closing the loop adds; "
@@ -277,9 +277,9 @@ def _beside(validation: Validation) -> Table | None:
     rows = []
     for f in _of_judged(validation, validation.floors):
         unit = channel(f.channel)
-        told = math.isfinite(f.ceiling)
+        has_ceiling = math.isfinite(f.ceiling)
         ahead = f"{percent(f.lead)} ({percent(f.lead_low)} to {percent(f.lead_high)})" if math.isfinite(f.low) else "–"
-        words = (
+        texts = (
             f"{f.horizon:g}",
             percent(f.fit),
             f"{percent(f.low)} to {percent(f.high)}" if math.isfinite(f.low) else "–",
@@ -290,11 +290,15 @@ def _beside(validation: Validation) -> Table | None:
         rows.append(
             (
                 Cell(f.channel),
-                *(_cell(text, False) for text in words),
+                *(_cell(text, False) for text in texts),
                 Cell(unit_words(unit.shown_unit)),
                 _cell(percent(f.expected), False),
                 _cell(percent(f.past), False),
-                Cell(percent(f.ceiling) if told else "refused", number=True, tone="plain" if told else "caution"),
+                Cell(
+                    percent(f.ceiling) if has_ceiling else "refused",
+                    number=True,
+                    tone="plain" if has_ceiling else "caution",
+                ),
             )
         )
     if not rows:
@@ -322,8 +326,8 @@ def _beside(validation: Validation) -> Table | None:
     )
 
 
-def _cell(words: str, strong: bool) -> Cell:
-    return Cell(words, number=True, strong=strong)
+def _cell(text: str, strong: bool) -> Cell:
+    return Cell(text, number=True, strong=strong)
 
 
 def innovations(validation: Validation) -> Section:

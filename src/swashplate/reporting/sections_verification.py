@@ -50,14 +50,14 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
             "record.",
         )
     )
-    blocks += [Text(f"{f.channel}: fit {f.fit:.0f} %, {f.scatter}{f.words}", tone="quiet") for f in v.floors]
+    blocks += [Text(f"{f.channel}: fit {f.fit:.0f} %, {f.scatter}{f.summary_text}", tone="quiet") for f in v.floors]
     if rival is not None:
         theirs = tuple(
             (Cell(o.output), Cell(f"{o.theil:.2f}", number=True), Cell(f"{o.fit:.0f}", number=True))
             for o in rival.outputs
         )
-        told = f"{rival.model.name}: {rival.verdict}; J_rms = {rival.cost:.2f}, {rival.constants} constants."
-        blocks.append(Text(told))
+        rival_summary = f"{rival.model.name}: {rival.verdict}; J_rms = {rival.cost:.2f}, {rival.constants} constants."
+        blocks.append(Text(rival_summary))
         blocks.append(Table(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
         if not {t.source for t in rival.traces} & {t.source for t in v.traces}:
             blocks.append(Text(f"{rival.model.name} is not drawn: it was flown in other stretches.", tone="quiet"))

@@ -188,9 +188,11 @@ def by_contributor(derivatives: Derivatives, row: str) -> Figure:
         for part in parts:
             values = [factor * float(table.parts[part][place]) for table in tables]
             if max(map(abs, values)) > _SEEN * max(map(abs, total)) + 1e-12:
-                seen = f"{name} of the {part.replace('_', ' ')}<br>%{{x:.1f}} m/s, %{{y:.4g}}"
+                hover_text = f"{name} of the {part.replace('_', ' ')}<br>%{{x:.1f}} m/s, %{{y:.4g}}"
                 traces.append(
-                    line(speeds, values, name=part, color=_PART_COLORS[part], dash="dash", axis=number, hover=seen)
+                    line(
+                        speeds, values, name=part, color=_PART_COLORS[part], dash="dash", axis=number, hover=hover_text
+                    )
                 )
     keys = (Key("total", BLACK), *(Key(part.replace("_", " "), _PART_COLORS[part], "dash") for part in parts))
     per = "mass" if row in "XYZ" else "moment of inertia"

@@ -73,7 +73,7 @@ def compose_straightness(
         banners=(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),),
         summary=tuple(summary),
         picture=_path_figure(runs, many),
-        sections=(_numbers(runs, lag, vehicle, sources), _time(runs), _made(vehicle)),
+        sections=(_numbers(runs, lag, vehicle, sources), _time(runs), _provenance(vehicle)),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
@@ -88,20 +88,20 @@ def _models(runs: Mapping[str, StepRun], many: str) -> tuple[str, str]:
     drawn = {name: run.drawn for name, run in runs.items() if run.drawn is not None}
     if not drawn:
         return "flown on the model that the law was made from, where it must work; see --fit.", "caution"
-    words = []
+    lines = []
     for name, paths in drawn.items():
         low, middle, high = np.nanpercentile(paths.drift, _PERCENTILES)
-        words.append(f"{name} {middle:+.2f} m ({low:+.2f} to {high:+.2f} m)")
+        lines.append(f"{name} {middle:+.2f} m ({low:+.2f} to {high:+.2f} m)")
     size = len(next(iter(drawn.values())).drift)
-    return f"{size} {many}; drift, median (5 to 95 %): {'; '.join(words)}.", "plain"
+    return f"{size} {many}; drift, median (5 to 95 %): {'; '.join(lines)}.", "plain"
 
 
 def _against(name: str, wins: int, of: int) -> tuple[str, str]:
     """Good where the law wins by two standard deviations of a tossed coin."""
     ahead = wins - 0.5 * of > math.sqrt(of)
     verdict = "" if ahead else " No more than chance: on these flights the law is not shown to be better."
-    words = f"on {wins} of {of} flights the law ends nearer to straight ahead than {_WORDS[name]}.{verdict}"
-    return words, "good" if ahead else "caution"
+    text = f"on {wins} of {of} flights the law ends nearer to straight ahead than {_WORDS[name]}.{verdict}"
+    return text, "good" if ahead else "caution"
 
 
 def _path_figure(runs: Mapping[str, StepRun], many: str) -> Figure:
@@ -119,9 +119,9 @@ def _path_figure(runs: Mapping[str, StepRun], many: str) -> Figure:
     for name, run in runs.items():
         color, dash = _STYLES[name]
         x, y = run.flight.values("x"), run.flight.values("y")
-        words = _WORDS[name]
-        traces.append(line(x, y, name=words, color=color, dash=dash, width=2.4, hover=f"{words}<br>{hover}"))
-        keys.append(Key(words, color, dash))
+        label = _WORDS[name]
+        traces.append(line(x, y, name=label, color=color, dash=dash, width=2.4, hover=f"{label}<br>{hover}"))
+        keys.append(Key(label, color, dash))
     if any(run.tracks for run in runs.values()):
         keys.append(Key(f"thin: {many}", GREY))
     return Figure(
@@ -154,8 +154,8 @@ def _numbers(
 ) -> Section:
     rows = []
     for name, run in runs.items():
-        own = [float(getattr(run.path, key)[0]) for key in ("drift", "leftmost", "rightmost", "speed", "time")]
-        rows.append(_row(name, "this one", own))
+        of_model = [float(getattr(run.path, key)[0]) for key in ("drift", "leftmost", "rightmost", "speed", "time")]
+        rows.append(_row(name, "this one", of_model))
         if run.drawn is not None:
             for percent in _PERCENTILES:
                 values = [
@@ -180,7 +180,7 @@ def _numbers(
 
 def _row(name: str, models: str, values: list[float]) -> tuple[Cell, ...]:
     shown = [f"{v:+.2f}" if math.isfinite(v) else "–" for v in values[:3]] + [f"{v:.2f}" for v in values[3:]]
-    return (Cell(name), Cell(models), *(Cell(words, number=True) for words in shown))
+    return (Cell(name), Cell(models), *(Cell(text, number=True) for text in shown))
 
 
 def _time(runs: Mapping[str, StepRun]) -> Section:
@@ -205,7 +205,7 @@ def _time(runs: Mapping[str, StepRun]) -> Section:
     return Section("time", "Heading, height and inputs", (figure,))
 
 
-def _made(vehicle: Vehicle) -> Section:
+def _provenance(vehicle: Vehicle) -> Section:
     lines = [f"{name} {version}" for name, version in versions().items()]
     lines.append(f"card of {vehicle.name}, SHA-256 {card_hash(vehicle.card)}")
     return Section("made-with", "Made with", (Points(tuple(lines)),), folded=True)

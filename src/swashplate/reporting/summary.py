@@ -62,17 +62,17 @@ def _names(flights: Sequence[DataSource]) -> str:
 
 
 def _what(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
-    words = []
+    parts = []
     if fit:
         used = sum(float(c.record.time[-1] - c.record.time[0]) for c in fit.in_time)
         source = f"{used:.1f} s of {_names(fit.data)}" if used else _names(fit.data)
-        words.append(f"{counted(len(fit.names), 'parameter')} of '{fit.model.card.called}' identified from {source}")
+        parts.append(f"{counted(len(fit.names), 'parameter')} of '{fit.model.card.called}' identified from {source}")
     if validation:
-        words.append(
+        parts.append(
             f"tested on {_names(validation.data)}"
             + (", which the fit never saw" if fit and not used_twice(fit, validation) else "")
         )
-    return "What", ", ".join(words) + ".", "plain"
+    return "What", ", ".join(parts) + ".", "plain"
 
 
 def _fit(fit: Result[Any, Any]) -> Line:
@@ -89,13 +89,13 @@ def _fit(fit: Result[Any, Any]) -> Line:
 def _prediction(validation: Validation) -> Line:
     horizon = middle_horizon(validation)
     scores = {(s.channel, s.predictor): s.fit for s in validation.scores if s.horizon == horizon}
-    named = [(name, words) for name, words in _AXES if (name, "model") in scores]
+    named = [(name, label) for name, label in _AXES if (name, "model") in scores]
     if not named:
         return "Prediction", "no channel of roll or pitch was predicted.", "caution"
-    own = ", ".join(f"{words} {percent(scores[name, 'model'])} %" for name, words in named)
+    fits = ", ".join(f"{label} {percent(scores[name, 'model'])} %" for name, label in named)
     rivals = [
-        f"{words} {', '.join(percent(scores[name, p]) for name, _ in named)}"
-        for p, words in (("published card", "published card"), ("constant rates", "constant rates"))
+        f"{label} {', '.join(percent(scores[name, p]) for name, _ in named)}"
+        for p, label in (("published card", "published card"), ("constant rates", "constant rates"))
         if all((name, p) in scores for name, _ in named)
     ]
     beaten = all(
@@ -104,7 +104,7 @@ def _prediction(validation: Validation) -> Line:
         for p in PREDICTORS
         if p != "model"
     )
-    text = f"fit {horizon:g} s ahead: {own} ({'; '.join([*rivals, 'hold the last value 0'])})."
+    text = f"fit {horizon:g} s ahead: {fits} ({'; '.join([*rivals, 'hold the last value 0'])})."
     return "Prediction", text, "good" if beaten else "caution"
 
 
@@ -113,19 +113,19 @@ _AXES = (("phi", "roll"), ("theta", "pitch"), ("p", "roll rate"), ("q", "pitch r
 
 def _verdict(validation: Validation) -> Line:
     by_level = {level: [v.axis for v in validation.verdict if v.level == level] for level in _LEVELS}
-    words = [f"{level}: {', '.join(axes)}" for level, axes in by_level.items() if axes]
+    parts = [f"{level}: {', '.join(axes)}" for level, axes in by_level.items() if axes]
     # What nobody judged is nothing good: the bar is green only where every axis is.
     worst = next((level for level in ("poor", "usable", "cannot be judged", "good") if by_level[level]), "")
-    return "Verdict", ("; ".join(words) or "no axis was judged") + ".", _TONES.get(worst, "caution")
+    return "Verdict", ("; ".join(parts) or "no axis was judged") + ".", _TONES.get(worst, "caution")
 
 
 def _changes(fit: Result[Any, Any]) -> Line:
-    moved = sorted(
+    largest = sorted(
         (e for e in fit.estimates if not e.tie and e.best_sigma > 0.0),
         key=lambda e: -abs(e.value - e.start) / e.best_sigma,
     )[:3]
-    words = [f"{e.name} {value_words(e.start)} → {value_words(e.value, e.best_sigma)}" for e in moved]
-    return "Change", f"Largest changes for their uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
+    changes = [f"{e.name} {value_words(e.start)} → {value_words(e.value, e.best_sigma)}" for e in largest]
+    return "Change", f"Largest changes for their uncertainty: {'; '.join(changes) or 'nothing'}.", "plain"
 
 
 def _in_short(problems: str) -> str:
@@ -135,24 +135,24 @@ def _in_short(problems: str) -> str:
 
 
 def _warnings(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
-    words = []
+    warnings = []
     if fit:
         blind = list(dict.fromkeys(a.axis for a in getattr(fit.details, "excitation", ()) if not a.identifiable))
         if blind:
-            words.append(f"no independent excitation in {listed(blind)}")
+            warnings.append(f"no independent excitation in {listed(blind)}")
         heavy = [e.name for e in fit.estimates if e.prior_share > PRIOR_HEAVY and not e.tie]
         if heavy:
-            words.append(f"the prior, not the flight, decided {listed(heavy, most=5)}")
+            warnings.append(f"the prior, not the flight, decided {listed(heavy, most=5)}")
         if fit.directions:
-            words.append(f"{counted(len(fit.directions), 'combination')} of parameters hardly seen")
+            warnings.append(f"{counted(len(fit.directions), 'combination')} of parameters hardly seen")
         if any(not c.record.voltage_known for c in fit.in_time):
-            words.append("battery voltage not logged")
+            warnings.append("battery voltage not logged")
     elif validation and any(not r.voltage_known for r in validation.records):
-        words.append("battery voltage not logged")
+        warnings.append("battery voltage not logged")
     data = (*(fit.data if fit else ()), *(validation.data if validation else ()))
-    words += [text.rstrip(".") for text in scale_words(data)]
-    words += [_in_short(text) for text in problem_words(data)]
-    if not words:
+    warnings += [text.rstrip(".") for text in scale_words(data)]
+    warnings += [_in_short(text) for text in problem_words(data)]
+    if not warnings:
         return "Warnings", "no problem was found in these flights.", "plain"
-    text = "; ".join(words)
+    text = "; ".join(warnings)
     return "Warnings", f"{text[0].upper()}{text[1:]}.", "caution"

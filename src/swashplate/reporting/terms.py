@@ -63,17 +63,17 @@ TERMS: dict[str, str] = {
 
 def terms_in(texts: Iterable[str]) -> dict[str, str]:
     """The terms that occur in some texts, in alphabetical order."""
-    whole = " ".join(texts)
+    text = " ".join(texts)
     return {
-        term: words
-        for term, words in sorted(TERMS.items(), key=lambda item: item[0].lower())
-        if re.search(rf"(?<!\w){re.escape(term)}(?:s|es)?(?!\w)", whole, 0 if len(term) < 3 else re.IGNORECASE)
+        term: meaning
+        for term, meaning in sorted(TERMS.items(), key=lambda item: item[0].lower())
+        if re.search(rf"(?<!\w){re.escape(term)}(?:s|es)?(?!\w)", text, 0 if len(term) < 3 else re.IGNORECASE)
     }
 
 
 def with_terms(sections: Sequence[Section], lines: Sequence[tuple[str, str, str]] = ()) -> tuple[Section, ...]:
     """Sections with one more at the end: what the words in them mean."""
-    texts = [words for line in lines for words in line[:2]]
+    texts = [text for line in lines for text in line[:2]]
     for section in sections:
         texts.append(section.title)
         for block in section.blocks:
@@ -88,6 +88,6 @@ def with_terms(sections: Sequence[Section], lines: Sequence[tuple[str, str, str]
                 texts.append(block.caption)
             else:
                 texts += [block.words] if isinstance(block, Text) else block.items
-    rows = tuple((Cell(term), Cell(words)) for term, words in terms_in(texts).items())
+    rows = tuple((Cell(term), Cell(text)) for term, text in terms_in(texts).items())
     table = Table("Words of this page", ("word", "meaning"), rows)
     return (*sections, Section("words", "What do the words mean?", (table,), folded=True)) if rows else tuple(sections)

@@ -139,7 +139,7 @@ def base_layout(height: int, *, left: int = 58, top: int = 8, right: int = 10, b
 
 def axis(title: str = "", **more: Any) -> dict[str, Any]:
     """One axis: light grid, thin frame."""
-    plain: dict[str, Any] = {
+    defaults: dict[str, Any] = {
         "gridcolor": "#e4e4e4",
         "zeroline": False,
         "linecolor": "#999",
@@ -152,8 +152,8 @@ def axis(title: str = "", **more: Any) -> dict[str, Any]:
         "exponentformat": "e",
     }
     if title:
-        plain["title"] = {"text": title, "standoff": 4, "font": {"size": 12}}
-    return {**plain, **more}
+        defaults["title"] = {"text": title, "standoff": 4, "font": {"size": 12}}
+    return {**defaults, **more}
 
 
 def phase_ticks(values: Any) -> dict[str, Any]:

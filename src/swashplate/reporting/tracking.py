@@ -20,7 +20,7 @@ def compose_tracking(
     source: str, tracks: Sequence[Tracked], notes: Sequence[str], *, simulated: bool, title: str | None
 ) -> Report:
     """The report's structure, a section for each equation."""
-    told = sum(one.final is not None for one in tracks)
+    known = sum(one.final is not None for one in tracks)
     banners = (("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),) if simulated else ()
     missing = [one.text for one in tracks if one.final is None]
     if missing:
@@ -29,7 +29,7 @@ def compose_tracking(
         title=title or f"Identification in flight: {source}",
         banners=banners,
         summary=(
-            ("Estimated", f"{told} of {len(tracks)} at the end", "plain" if told == len(tracks) else "bad"),
+            ("Estimated", f"{known} of {len(tracks)} at the end", "plain" if known == len(tracks) else "bad"),
             ("Stood still", _stood(tracks), "caution" if any(one.frozen for one in tracks) else "plain"),
         ),
         picture=None,
@@ -59,7 +59,7 @@ def _blocks(one: Tracked, k: int, source: str) -> tuple[Text | Points | Table | 
     caption = f"At the end, after {one.counted:.1f} s that counted."
     note = "Standard errors count residuals that are not independent; see the how-to."
     blocks: list[Text | Points | Table | Figure] = [
-        *(Text(words, tone="caution") for words in one.notes),
+        *(Text(remark, tone="caution") for remark in one.notes),
         _figure(one, k, source),
         Table(caption, ("unknown", "value", "standard error", "unit"), rows, note=note),
     ]
@@ -94,9 +94,9 @@ def _figure(one: Tracked, k: int, source: str) -> Figure:
             }
         )
         traces.append(line(one.time, value, name=name, color=MODEL, axis=number))
-        late = known & (one.time > one.time[0] + 0.25 * np.ptp(one.time))
-        if np.any(late):  # the first seconds' bounds would hide all the rest
-            low, high = (value - 3.0 * sigma)[late].min(), (value + 3.0 * sigma)[late].max()
+        settled = known & (one.time > one.time[0] + 0.25 * np.ptp(one.time))
+        if np.any(settled):  # the first seconds' bounds would hide all the rest
+            low, high = (value - 3.0 * sigma)[settled].min(), (value + 3.0 * sigma)[settled].max()
             layout[f"yaxis{number}"]["range"] = [float(low), float(high)]
     layout["shapes"] = [
         {

@@ -37,8 +37,8 @@ def result_hash(result: dict[str, Any]) -> str:
 
     Two machines that agree to six digits agree on the hash (but for numbers that round differently by chance).
     """
-    words = json.dumps(_rounded({k: v for k, v in result.items() if k != "seconds"}), sort_keys=True, default=str)
-    return hashlib.sha256(words.encode()).hexdigest()
+    text = json.dumps(_rounded({k: v for k, v in result.items() if k != "seconds"}), sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _rounded(value: Any) -> Any:

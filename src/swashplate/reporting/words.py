@@ -21,15 +21,15 @@ def value_words(value: float | None, sigma: float | None = None) -> str:
     digits = 4
     if sigma is not None and math.isfinite(sigma) and sigma > 0.0 and value != 0.0:
         digits = min(6, max(2, math.floor(math.log10(abs(value))) - math.floor(math.log10(sigma)) + 2))
-    return _plain(f"{value:.{digits}g}")
+    return _short_exponent(f"{value:.{digits}g}")
 
 
 def sigma_words(sigma: float | None) -> str:
     """A standard deviation with two significant digits."""
-    return "–" if sigma is None or not math.isfinite(sigma) else _plain(f"{sigma:.2g}")
+    return "–" if sigma is None or not math.isfinite(sigma) else _short_exponent(f"{sigma:.2g}")
 
 
-def _plain(text: str) -> str:
+def _short_exponent(text: str) -> str:
     """Exponents without their padding: 2.3e-05 becomes 2.3e-5; large round numbers without an exponent."""
     if "e" not in text:
         return text
@@ -99,10 +99,10 @@ def _lowpass(d: Mapping[str, Any]) -> str:
 
 
 def _derive(d: Mapping[str, Any]) -> str:
-    made = [str(name) for name in d.get("derived", ())]
-    taken = f" Gravity was taken as {d['gravity']:.4g} m/s²" if "az" in made and "gravity" in d else ""
+    derived = [str(name) for name in d.get("derived", ())]
+    taken = f" Gravity was taken as {d['gravity']:.4g} m/s²" if "az" in derived and "gravity" in d else ""
     why = ", the standard, because the log does not say it" if d.get("assumed") else ""
-    return f"{listed(made, most=12)} were derived from position and attitude.{f'{taken}{why}.' if taken else ''}"
+    return f"{listed(derived, most=12)} were derived from position and attitude.{f'{taken}{why}.' if taken else ''}"
 
 
 def _between(d: Mapping[str, Any]) -> str:
@@ -160,5 +160,5 @@ def span_words(flight: DataSource) -> str:
     """Duration, pieces and rate of a flight."""
     if not flight.segments:
         return "–"
-    flown = sum(stop - start for start, stop in flight.segments)
-    return f"{flown:.1f} s in {counted(len(flight.segments), 'segment')} at {flight.rate:.0f} Hz"
+    seconds = sum(stop - start for start, stop in flight.segments)
+    return f"{seconds:.1f} s in {counted(len(flight.segments), 'segment')} at {flight.rate:.0f} Hz"

@@ -34,7 +34,7 @@ class AskedChange:
     share: float
 
     @property
-    def words(self) -> str:
+    def summary_text(self) -> str:
         return (
             f"{self.name} = {self.value:.4g}, and the records ask for {self.wanted:.4g}, {self.sigmas:.0f} standard "
             f"deviations away; that moves up to {100.0 * self.share:.0f} % of what the controls do."
@@ -47,14 +47,14 @@ class ParameterErrors:
     def __init__(self, count: int) -> None:
         self.information, self.pull = np.zeros((count, count)), np.zeros(count)
 
-    def add(self, moved: Complex, error: Complex, used: NDArray[np.bool_]) -> None:
+    def add(self, slopes: Complex, error: Complex, used: NDArray[np.bool_]) -> None:
         """Lines of one record, each of noise of size one.
 
         Args:
             moved: what one bound of each parameter does (n, k, p). error: of the predictions (n, k).
             used: which lines (n, k).
         """
-        s, e = moved[used], error[used]
+        s, e = slopes[used], error[used]
         self.information += 2.0 * INDEPENDENT * np.real(s.conj().T @ s)
         self.pull += 2.0 * INDEPENDENT * np.real(s.conj().T @ e)
 
@@ -66,8 +66,8 @@ class ParameterErrors:
             beside = np.linalg.solve(
                 self.information[np.ix_(rest, rest)] + np.eye(rest.sum()), self.information[rest, i]
             )
-            told = self.information[i, i] - self.information[i, rest] @ beside
-            if told > 1e-9 * max(self.information[i, i], 1e-300):
-                change[i] = (self.pull[i] - self.pull[rest] @ beside) / told
-                spread[i] = 1.0 / np.sqrt(told)
+            remaining = self.information[i, i] - self.information[i, rest] @ beside
+            if remaining > 1e-9 * max(self.information[i, i], 1e-300):
+                change[i] = (self.pull[i] - self.pull[rest] @ beside) / remaining
+                spread[i] = 1.0 / np.sqrt(remaining)
         return change, spread

@@ -96,11 +96,11 @@ class Band:
         return "too wide" if self.low > self.promised + NEAR else "cannot be judged"
 
     @property
-    def words(self) -> str:
+    def summary_text(self) -> str:
         """What the band holds, and so."""
         scatter = f" ({self.low:.0f} to {self.high:.0f})" if math.isfinite(self.low) else ""
-        told = f"the {self.promised:g} % band holds {self.held:.0f} %{scatter}"
-        return f"{self.channel}, {self.horizon:g} s ahead: {told}, {_WORDS[self.level]}"
+        text = f"the {self.promised:g} % band holds {self.held:.0f} %{scatter}"
+        return f"{self.channel}, {self.horizon:g} s ahead: {text}, {_WORDS[self.level]}"
 
     @property
     def warning(self) -> str:
@@ -114,15 +114,15 @@ class Band:
         )
 
 
-def _told(band: Band) -> str:
+def _share_text(band: Band) -> str:
     scatter = f" [{band.low:.0f} to {band.high:.0f}]" if math.isfinite(band.low) else ""
     return f"{band.held:.0f}{scatter}"
 
 
 ROWS: tuple[tuple[str, Callable[[Band, Band], str]], ...] = (
-    ("50 % band holds", lambda half, _: _told(half)),
+    ("50 % band holds", lambda half, _: _share_text(half)),
     ("so", lambda half, _: half.level),
-    ("95 % band holds", lambda _, most: _told(most)),
+    ("95 % band holds", lambda _, most: _share_text(most)),
     ("so", lambda _, most: most.level),
     ("sigma", lambda half, _: f"{half.sigma * known(half.channel).shown_factor:.3g}"),
     ("unit", lambda half, _: known(half.channel).shown_unit),
@@ -177,14 +177,14 @@ def bands(by_horizon: Mapping[float, Sequence[BandedRecord]]) -> tuple[Band, ...
     A band goes from the k-th lowest path to the k-th highest. A flight by the law of the paths has any rank among n of
     them with equal probability, so that it lies in the band with 1 - 2k/(n + 1), however few paths there are.
     """
-    made = []
+    judged = []
     for horizon, records in by_horizon.items():
         times = [record.time for record in records]
-        variance, own, missed = (
+        variance, own_variance, missed = (
             np.concatenate([getattr(r, part) for r in records]).mean(axis=0)
             for part in ("variance", "by_parameters", "missed")
         )
-        share = 100.0 * own / np.maximum(variance, 1e-300)
+        share = 100.0 * own_variance / np.maximum(variance, 1e-300)
         for promised in SHARES:
             inside = [np.stack([_inside(r, promised), np.ones(r.below.shape)], axis=1) for r in records]
             sums, drawn = np.concatenate(inside).sum(axis=0), block_bootstrap.drawn(times, inside, horizon=horizon)
@@ -192,7 +192,7 @@ def bands(by_horizon: Mapping[float, Sequence[BandedRecord]]) -> tuple[Band, ...
             for i, name in enumerate(PREDICTED):
                 low, high = block_bootstrap.interval(None if drawn is None else 100.0 * drawn[:, 0, i] / drawn[:, 1, i])
                 sigma, starts = math.sqrt(variance[i]), int(sums[1, i])
-                made.append(
+                judged.append(
                     Band(
                         channel=name,
                         unit=known(name).unit,
@@ -208,7 +208,7 @@ def bands(by_horizon: Mapping[float, Sequence[BandedRecord]]) -> tuple[Band, ...
                         wider=max(float(record.wider[i]) for record in records),
                     )
                 )
-    return tuple(made)
+    return tuple(judged)
 
 
 def _inside(record: BandedRecord, promised: float) -> Array:
@@ -226,12 +226,12 @@ def in_brief(judged: Sequence[Band], horizon: float, *, drawn: bool = True) -> s
     """
     rows = [band for band in judged if abs(band.horizon - horizon) < 1e-9]
     said = []
-    for level, words in _WORDS.items():
+    for level, phrase in _WORDS.items():
         if not drawn and level != "too narrow":
             continue
         named = [f"{b.channel} {b.held:.0f} of {b.promised:g} %" for b in rows if b.level == level]
         if named:
-            said.append(f"{words[0].upper()}{words[1:]}: {', '.join(named)}.")
+            said.append(f"{phrase[0].upper()}{phrase[1:]}: {', '.join(named)}.")
     if not drawn and not said:
         return ""
     by = "" if drawn else " (how sure the model's numbers are is not in them)"

@@ -151,13 +151,15 @@ def ceiling(
     ahead = round(horizon / records[0].dt)
     if any(_sees_the_future(record, ahead, regressors) for record in records):
         return Ceiling(how, refused="its regressors see the motion after the start")
-    plain, more, past = (_predicted(records, training, ahead, after, regressors) for after in (0.0, AFTER, NO_INPUTS))
-    if plain is None or more is None or past is None:
+    predicted, more, past = (
+        _predicted(records, training, ahead, after, regressors) for after in (0.0, AFTER, NO_INPUTS)
+    )
+    if predicted is None or more is None or past is None:
         return Ceiling(how, refused="the flights are too short for it")
-    before, after = (np.sqrt(np.mean(np.concatenate(each), axis=0)) for each in (plain, more))
+    before, after = (np.sqrt(np.mean(np.concatenate(each), axis=0)) for each in (predicted, more))
     leak = np.asarray(100.0 * (1.0 - after / np.maximum(before, 1e-300)))
     leak[_PLACES] = np.maximum(leak[_PLACES], leak[_SPEEDS])
-    return Ceiling(how, tuple(plain), tuple(past), leak)
+    return Ceiling(how, tuple(predicted), tuple(past), leak)
 
 
 def _known(record: FilteredMotion, seconds: float) -> tuple[Array, Array]:

@@ -64,11 +64,11 @@ def ceiling_along(
     steps = [float((t[-1] - t[0]) / (t.size - 1)) for t in times]
     if any(_sees_ahead(u, dt, bank) for u, dt in zip(inputs, steps, strict=True)):
         return Ceiling(CROSSED, refused="its regressors see the motion after the start")
-    plain, more = (_told(times, inputs, outputs, steps, after, bank) for after in (0.0, AFTER))
-    if plain is None or more is None:
+    explained, more = (_explained(times, inputs, outputs, steps, after, bank) for after in (0.0, AFTER))
+    if explained is None or more is None:
         return Ceiling(CROSSED, refused="the flights are too short for it")
-    before, after = (np.sqrt(np.mean(np.concatenate(each), axis=0)) for each in (plain, more))
-    return Ceiling(CROSSED, tuple(plain), (), np.asarray(100.0 * (1.0 - after / np.maximum(before, 1e-300))))
+    before, after = (np.sqrt(np.mean(np.concatenate(each), axis=0)) for each in (explained, more))
+    return Ceiling(CROSSED, tuple(explained), (), np.asarray(100.0 * (1.0 - after / np.maximum(before, 1e-300))))
 
 
 def _sees_ahead(inputs: Array, dt: float, bank: Bank) -> bool:
@@ -85,7 +85,7 @@ def _straightened(values: Array) -> Array:
     return np.asarray(level - line * (line.T @ level) / np.sum(line**2))
 
 
-def _told(
+def _explained(
     times: Sequence[Array],
     inputs: Sequence[Array],
     outputs: Sequence[Array],

@@ -65,7 +65,7 @@ def closed_ahead(
     nuisance = Nuisance(*(float(value) for value in numbers.nuisance))
     trims = np.array([getattr(nuisance, f"trim_{name}", 0.0) for name in vehicle.input_names], dtype=float)
     delays = np.where(motors(vehicle), nuisance.delay_motor, nuisance.delay_servo)
-    late = np.round(delays / dt).astype(int)
+    delay_steps = np.round(delays / dt).astype(int)
     # What reaches the vehicle is a curve through four logged samples: until here, all are from before the start.
     known = np.maximum(np.floor(delays / dt).astype(int) - 1, 0)
     body = np.asarray(filtered.x)[:, [vehicle.index(name) for name in PREDICTED]]
@@ -81,7 +81,7 @@ def closed_ahead(
         references.append((left[starts + 1] - left[low]) / (starts + 1 - low) + share @ trims)
         shares.append(share)
         gains.append(gain)
-        behind.append(min(lag + int(late[np.flatnonzero(share)[0]]), reach - 1))
+        behind.append(min(lag + int(delay_steps[np.flatnonzero(share)[0]]), reach - 1))
     back = [share / (share @ share) for share in shares]
     answers = np.any(np.array(shares) != 0.0, axis=0)
     since = np.where(answers, known, ahead)
@@ -106,7 +106,7 @@ def _closed_ahead(
     """As `closed_ahead`; past: body states (starts, reach, 12), reference: (starts, axes), recorded: what reached the
     vehicle and the voltage by sample."""
     body, step = [model.vehicle.index(name) for name in PREDICTED], record_filter(model).step
-    fade, told = model.fade(Noise(*numbers.noise)), numbers_and_constants(model.vehicle, numbers.parameters)
+    fade, constants = model.fade(Noise(*numbers.noise)), numbers_and_constants(model.vehicle, numbers.parameters)
     x, gust, drift = (np.asarray(part)[starts] for part in filtered[:3])
     states = np.empty((len(starts), ahead, x.shape[1]))
     for k in range(ahead):
@@ -114,7 +114,7 @@ def _closed_ahead(
         answer = reference + np.sum(loops.gains * past[:, past.shape[1] - 1 - loops.late], axis=2)
         # The part of the inputs that is the axis's command becomes the answer, all else stays as recorded.
         u = np.where(k >= loops.since, u + (answer - u @ loops.shares.T) @ loops.back, u)
-        states[:, k] = x = step(x, gust, drift, u, recorded[1][starts + k], told)
+        states[:, k] = x = step(x, gust, drift, u, recorded[1][starts + k], constants)
         gust = fade * gust
         past = np.concatenate([past[:, 1:], x[:, None, body]], axis=1)
     return states

@@ -41,8 +41,8 @@ class ModelComparison(Shown):
 
     def to_document(self) -> dict[str, Any]:
         """Fits and warnings as JSON types."""
-        told = {name: list(v.warnings) for name, v in self.found.items() if v.warnings}
-        return {"kind": "comparison", "fit": self.fits(), "warnings": told}
+        warnings = {name: list(v.warnings) for name, v in self.found.items() if v.warnings}
+        return {"kind": "comparison", "fit": self.fits(), "warnings": warnings}
 
     def save(self, path: str | Path) -> Path:
         """Write it as a JSON file, whole: `swashplate.load` reads it back."""
@@ -63,8 +63,8 @@ class ModelComparison(Shown):
         for output, fits in self.fits().items():
             cells = (f"{fits[n]:>{width}.1f}" if n in fits else " " * (width - 1) + "-" for n in self.found)
             lines.append(f"  {output:<12}{''.join(cells)}")
-        told = dict.fromkeys(f"! {n}: {text}" for n, v in self.found.items() for text in v.warnings)
-        return "\n".join([*lines, *told])
+        warnings = dict.fromkeys(f"! {n}: {text}" for n, v in self.found.items() for text in v.warnings)
+        return "\n".join([*lines, *warnings])
 
 
 def along_flights(

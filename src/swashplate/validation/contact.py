@@ -54,7 +54,7 @@ class Contact:
     intervals: tuple[tuple[float, float], ...]
 
     @property
-    def words(self) -> str:
+    def summary_text(self) -> str:
         unit = "rad" if self.feature == "psi" else "m"
         side = "above" if self.above else "below"
         return (
@@ -116,9 +116,9 @@ def contact(name: str, time: Array, states: Array, pushes: Array) -> Contact | N
     push = float(residual[inside, axis].mean() - residual[~inside, axis].mean())
     if abs(push) < LEAST:
         return None
-    whole = measured[:, column] > limit if above else measured[:, column] < limit
+    beyond_limit = measured[:, column] > limit if above else measured[:, column] < limit
     return Contact(
-        name, feature, above, limit, _AXES[axis], push, chance, float(inside.mean()), _intervals(time, whole, dt)
+        name, feature, above, limit, _AXES[axis], push, chance, float(inside.mean()), _intervals(time, beyond_limit, dt)
     )
 
 

@@ -45,7 +45,7 @@ class Law:
     explained: float
 
     @property
-    def words(self) -> str:
+    def summary_text(self) -> str:
         answers = ", ".join(f"{gain:+.4g} per {name}" for name, gain in zip(self.motion, self.gains, strict=True))
         return (
             f"{self.axis} loop of {self.record}: the command answers with {answers}, {1e3 * self.lag:.0f} ms late; "
@@ -77,23 +77,23 @@ def learnt(vehicle: Vehicle, record: Record, states: Array, *, axes: Sequence[st
         axes: of `CLOSABLE`. seconds: what comes later is not looked at.
     """
     first, last = round(_BEGUN / record.dt), round(seconds / record.dt)
-    made = []
+    laws = []
     for axis in (a.name for a in vehicle.traits.axes if a.name in axes):
         command = record.inputs @ shares_of(vehicle, axis)
         names = MOTION[axis][0]
-        moved = states[:, [PREDICTED.index(name) for name in names]]
+        motion = states[:, [PREDICTED.index(name) for name in names]]
         best = Law(record.name, axis, names, (0.0,) * len(names), 0.0, 0.0)  # a command that is held
         for lag in range(round(_LATEST / record.dt) + 1):
             answer = command[first:last]
-            table = np.column_stack([np.ones(answer.size), moved[first - lag : last - lag]])
+            table = np.column_stack([np.ones(answer.size), motion[first - lag : last - lag]])
             gains = np.linalg.lstsq(table, answer, rcond=None)[0]
             left, all_of_it = np.var(answer - table @ gains), np.var(answer)
             share = 1.0 - float(left / all_of_it) if all_of_it > 0.0 else 0.0
             if share > best.explained:
                 coefficients = tuple(float(g) for g in gains[1:])
                 best = Law(record.name, axis, names, coefficients, lag * record.dt, share)
-        made.append(best)
-    return tuple(made)
+        laws.append(best)
+    return tuple(laws)
 
 
 def shares_of(vehicle: Vehicle, axis: str) -> Array:

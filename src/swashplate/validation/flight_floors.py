@@ -42,24 +42,24 @@ LOOP_CLOSED = "loop closed"
 
 def closed_floors(by_horizon: Mapping[float, Sequence[ClosedRecord]]) -> tuple[Floor, ...]:
     """Fits with loops closed, and by how much they lead those on the recorded inputs (same blocks for both)."""
-    made: list[Floor] = []
+    rows: list[Floor] = []
     for horizon, records in by_horizon.items():
-        moved = [(r.truth - r.first) ** 2 for r in records]
+        movement = [(r.truth - r.first) ** 2 for r in records]
         squares = {
             LOOP_CLOSED: [(r.closed - r.truth) ** 2 for r in records],
             "model": [(r.recorded - r.truth) ** 2 for r in records],
         }
         nothing = np.full(len(PREDICTED), np.nan)
-        made += floors(
+        rows += floors(
             PREDICTED,
             horizon,
             [r.time for r in records],
             squares,
-            dict.fromkeys(squares, moved),
+            dict.fromkeys(squares, movement),
             expected=nothing,
             ceilings=(),
         )
-    return tuple(made)
+    return tuple(rows)
 
 
 def motion_of(record: Record, truth: Array, starts: NDArray[np.intp]) -> FilteredMotion:
@@ -86,7 +86,7 @@ def flight_floors(
             the model comes first.
         training: the records of the fit.
     """
-    made: list[Floor] = []
+    floor_rows: list[Floor] = []
     for horizon, records in scored.items():
         kept = [i for i, record in enumerate(records) if record.motion.starts.size >= _FEWEST]
         if not kept:
@@ -98,7 +98,7 @@ def flight_floors(
         promised[_PLACE] = promised[_PLACE].mean()  # told for a nose that points north
         learnt = [m for m in training if abs(m.dt - motions[0].dt) < 1e-9]
         boxes = [ceiling(motions, horizon), *([ceiling(motions, horizon, training=learnt)] if learnt else [])]
-        made += floors(
+        floor_rows += floors(
             PREDICTED,
             horizon,
             [motion.time[motion.starts] for motion in motions],
@@ -107,4 +107,4 @@ def flight_floors(
             expected=np.sqrt(promised),
             ceilings=boxes,
         )
-    return tuple(made)
+    return tuple(floor_rows)

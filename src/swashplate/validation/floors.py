@@ -85,12 +85,12 @@ class Floor:
         return f"{_percent(self.low)} to {_percent(self.high)} %, " if math.isfinite(self.low) else ""
 
     @property
-    def words(self) -> str:
+    def summary_text(self) -> str:
         """Whether the model or the flight is poor."""
         unit = known(self.channel)
-        moved, factor = f"{self.moved * unit.shown_factor:.2g}", unit.shown_factor
+        change, factor = f"{self.moved * unit.shown_factor:.2g}", unit.shown_factor
         promise = f"; the filter expects a fit of {_percent(self.expected)} %" if math.isfinite(self.expected) else ""
-        moves = f"in that time the flight changes by {moved} {unit.shown_unit} (rms){promise}"
+        moves = f"in that time the flight changes by {change} {unit.shown_unit} (rms){promise}"
         if not math.isfinite(self.ceiling):
             return f"{moves}. {self._without_ceiling}No ceiling: {self.refused}."
         if self.fit - self.ceiling > _CLOSE:
@@ -194,25 +194,25 @@ def floors(
     }
     of_boxes = [_fit(sums[2 * (len(names) + i)], sums[1]) for i in range(len(boxes))]
     of_past = [_fit(sums[2 * (len(names) + i) + 1], sums[1]) for i in range(len(boxes))]
-    made = []
+    rows = []
     for c, name in enumerate(channels):
 
         def differing(ahead: Array | None, behind: Array | None, c: int = c) -> tuple[float, float]:
             return block_bootstrap.interval(None if ahead is None or behind is None else ahead[:, c] - behind[:, c])
 
-        own = drawn[names[0]]
-        low, high = block_bootstrap.interval(None if own is None else own[:, c])
+        of_model = drawn[names[0]]
+        low, high = block_bootstrap.interval(None if of_model is None else of_model[:, c])
         rival = max(names[1:], key=lambda n: fits[n][c]) if len(names) > 1 else ""
-        lead_low, lead_high = differing(own, drawn[rival]) if rival else (NAN, NAN)
+        lead_low, lead_high = differing(of_model, drawn[rival]) if rival else (NAN, NAN)
         leaks = [float(box.leak[c]) if box.leak is not None else NAN for box in boxes]
         passing = [i for i, leak in enumerate(leaks) if leak <= LEAK and sums[1, c] > 0.0]
         best = max(passing or range(len(boxes)), key=lambda i: of_boxes[i][c], default=None)
-        told = best is not None and best in passing
+        has_ceiling = best is not None and best in passing
         gap = (NAN, NAN)
-        if told and draws is not None and best is not None:
-            gap = differing(_fit(draws[:, 2 * (len(names) + best)], draws[:, 1]), own)
+        if has_ceiling and draws is not None and best is not None:
+            gap = differing(_fit(draws[:, 2 * (len(names) + best)], draws[:, 1]), of_model)
         size = math.sqrt(sums[1, c] / max(count, 1))
-        made.append(
+        rows.append(
             Floor(
                 channel=name,
                 unit=known(name).unit,
@@ -227,26 +227,26 @@ def floors(
                 lead_low=lead_low,
                 lead_high=lead_high,
                 expected=float(100.0 * (1.0 - expected[c] / size)) if size > 0.0 else NAN,
-                ceiling=float(of_boxes[best][c]) if told and best is not None else NAN,
+                ceiling=float(of_boxes[best][c]) if has_ceiling and best is not None else NAN,
                 by=boxes[best].how if best is not None else "",
                 gap_low=gap[0],
                 gap_high=gap[1],
                 leak=leaks[best] if best is not None else NAN,
                 seen=float(of_boxes[best][c]) if best is not None else NAN,
                 past=max((float(fit[c]) for fit in of_past), default=NAN),
-                refused="" if told else _refused(ceilings, leaks, best),
+                refused="" if has_ceiling else _refused(ceilings, leaks, best),
                 blocks=block_bootstrap.blocks_of(times, horizon),
             )
         )
-    return tuple(made)
+    return tuple(rows)
 
 
 def _none(like: Array) -> Array:
     return np.full_like(like, NAN)
 
 
-def _fit(squares: Array, moved: Array) -> Array:
-    return np.asarray(100.0 * (1.0 - np.sqrt(squares / np.maximum(moved, 1e-300))))
+def _fit(squares: Array, movement: Array) -> Array:
+    return np.asarray(100.0 * (1.0 - np.sqrt(squares / np.maximum(movement, 1e-300))))
 
 
 def _refused(ceilings: Sequence[Ceiling], leaks: Sequence[float], best: int | None) -> str:

@@ -21,14 +21,14 @@ def log_likelihood(innovations: Array, covariance: Array) -> float:
 def check(innovations: Array, covariance: Array, names: tuple[str, ...]) -> tuple[InnovationCheck, ...]:
     """Size, consistency and whiteness per output (Bar-Shalom, Li and Kirubarajan 2001, sec. 5.4)."""
     n = innovations.shape[0]
-    made = []
+    checks = []
     for i, name in enumerate(names):
         row = innovations[:, i] - innovations[:, i].mean()
         power = float(row @ row) or 1e-300
         correlations = [float(row[:-lag] @ row[lag:]) / power for lag in range(1, min(_LAGS, n - 1) + 1)]
         expected = float(np.sqrt(covariance[i, i]))
         size = float(np.sqrt(np.mean(innovations[:, i] ** 2)))
-        made.append(
+        checks.append(
             InnovationCheck(
                 channel=name,
                 rms=size,
@@ -38,4 +38,4 @@ def check(innovations: Array, covariance: Array, names: tuple[str, ...]) -> tupl
                 whiteness_bound=2.576 / np.sqrt(n),
             )
         )
-    return tuple(made)
+    return tuple(checks)

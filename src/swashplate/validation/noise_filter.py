@@ -110,10 +110,10 @@ class NoiseFilter:
         slow = averaged(values, self.every)
         n, k = len(slow), self.weights.shape[1]
         flat = slow.reshape(n, k, -1)
-        told = np.zeros_like(flat)
+        explained = np.zeros_like(flat)
         for memory, weight in zip(self.memories, self.weights, strict=True):
-            told += weight.T @ _fading(flat, memory)
-        return np.asarray(((flat - told) / self.noise[record][None, :, None]).reshape(slow.shape))
+            explained += weight.T @ _fading(flat, memory)
+        return np.asarray(((flat - explained) / self.noise[record][None, :, None]).reshape(slow.shape))
 
     def response(self, omega: Array, dt: float) -> Complex:
         """A at frequencies [rad/s] as (n, k from, k to), `dt` of the averaged samples."""
@@ -133,8 +133,8 @@ def _fading(values: Array, memory: float) -> Array:
     """Fading average of a signal's past samples; before the first one nothing moved."""
     from scipy.signal import lfilter
 
-    late = np.concatenate([np.zeros_like(values[:1]), values[:-1]])
-    return np.asarray(lfilter([1.0 - memory], [1.0, -memory], late, axis=0))
+    delayed = np.concatenate([np.zeros_like(values[:1]), values[:-1]])
+    return np.asarray(lfilter([1.0 - memory], [1.0, -memory], delayed, axis=0))
 
 
 def _past(values: Array, memories: Array) -> Array:

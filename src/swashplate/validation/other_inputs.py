@@ -29,20 +29,22 @@ def other_inputs(
         errors: of the model by output, each as stamps [s] and values of stretches, in the flights' order.
     """
     others = bystanders_of(flights, (*inputs, *errors))
-    moved = of_inputs(excitations(flights, others, outputs=tuple(errors))) if others else {}
-    told: dict[str, str] = {}
+    excitation = of_inputs(excitations(flights, others, outputs=tuple(errors))) if others else {}
+    explanations: dict[str, str] = {}
     for output, stretches in errors.items():
         movers = []
-        for name in (n for n in others if moved[n].outside):
-            left = whole = 0.0
+        for name in (n for n in others if excitation[n].outside):
+            left = total = 0.0
             for flight, (time, error) in zip(flights, stretches, strict=True):
                 command = np.interp(time, flight.time(name), flight.values(name))
                 share = share_of(error, command[:, None], float(time[1] - time[0]))
-                whole += float(np.sum(error**2))
+                total += float(np.sum(error**2))
                 left += float(np.sum(error**2)) * (1.0 - max(np.nan_to_num(share), 0.0))
-            if whole > 0.0 and 1.0 - left / whole >= MUCH:
-                movers.append((1.0 - left / whole, name))
+            if total > 0.0 and 1.0 - left / total >= MUCH:
+                movers.append((1.0 - left / total, name))
         if movers:
             names = ", ".join(f"'{name}' ({100.0 * share:.0f} %)" for share, name in sorted(movers, reverse=True))
-            told[output] = f"of what the model leaves of {output}, other inputs explain much: {names}. Add them to it."
-    return told
+            explanations[output] = (
+                f"of what the model leaves of {output}, other inputs explain much: {names}. Add them to it."
+            )
+    return explanations

@@ -49,10 +49,10 @@ class Fan(NamedTuple):
     def at(self, horizon: float, record: Record, starts: NDArray[np.intp]) -> BandedRecord:
         """One horizon [s], from the first `starts` (those whose horizon lies within the record)."""
         rows, last = slice(len(starts)), round(horizon / record.dt) - 1
-        below, variance, own, missed = (
+        below, variance, own_variance, missed = (
             part[rows, last] for part in (self.below, self.variance, self.by_parameters, self.missed)
         )
-        return BandedRecord(record.time[starts], below, self.paths, variance, own, missed, self.wider)
+        return BandedRecord(record.time[starts], below, self.paths, variance, own_variance, missed, self.wider)
 
 
 def spread(
@@ -78,12 +78,12 @@ def spread(
     ahead = about.shape[1]
     places = np.minimum(starts[:, None] + np.arange(1, ahead + 1), len(truth) - 1)
     came = truth[places]
-    below, variance, own = (np.zeros(about.shape) for _ in range(3))
-    for path, plain in paths(draws, record, noise=noise, nuisance=nuisance, starts=starts, ahead=ahead):
+    below, variance, own_variance = (np.zeros(about.shape) for _ in range(3))
+    for path, undisturbed in paths(draws, record, noise=noise, nuisance=nuisance, starts=starts, ahead=ahead):
         below += about + wider * (path - about) < came
         variance += (wider * (path - about)) ** 2 / len(draws)
-        own += (wider * (plain - about)) ** 2 / len(draws)
-    return Fan(len(draws), below, variance, own, (came - about) ** 2, np.broadcast_to(wider, about.shape[-1:]))
+        own_variance += (wider * (undisturbed - about)) ** 2 / len(draws)
+    return Fan(len(draws), below, variance, own_variance, (came - about) ** 2, np.broadcast_to(wider, about.shape[-1:]))
 
 
 def paths(
@@ -113,23 +113,23 @@ def paths(
     before: Vehicle | None = None
     for vehicle in draws:
         if vehicle is not before:
-            seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=length)
+            filtered = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=length)
             _, _, Q, R, P = uncertainty(vehicle, record, noise=noise, nuisance=nuisance)
             roots = [_root(part) for part in (P, Q, R)]
-            plain = seen.ahead(starts, ahead)
+            undisturbed = filtered.ahead(starts, ahead)
             before = vehicle
         aside, kicks, shaken = (
             random.standard_normal((len(starts), *count, len(root))) @ root.T
             for root, count in zip(roots, ((), (length,), (length,)), strict=True)
         )
-        readings = _shown(seen, starts, aside, kicks) + shaken
+        readings = _shown(filtered, starts, aside, kicks) + shaken
         reached = record.outputs[np.maximum(starts[:, None] + np.arange(1 - half, 1), 0)]  # by the smoothing
-        whole = np.concatenate([reached, readings], axis=1)
-        flat = whole.reshape(-1, whole.shape[-1])
+        joined = np.concatenate([reached, readings], axis=1)
+        flat = joined.reshape(-1, joined.shape[-1])
         side_by_side = replace(record, time=np.linspace(0.0, record.dt * (len(flat) - 1), len(flat)), outputs=flat)
-        states = measured_states(side_by_side, nuisance).reshape(*whole.shape[:2], len(PREDICTED))
+        states = measured_states(side_by_side, nuisance).reshape(*joined.shape[:2], len(PREDICTED))
         # Where the smoothing reaches no neighbour.
-        yield states[:, half : half + ahead], plain[..., [vehicle.index(name) for name in PREDICTED]]
+        yield states[:, half : half + ahead], undisturbed[..., [vehicle.index(name) for name in PREDICTED]]
 
 
 def _root(covariance: Array) -> Array:
@@ -137,17 +137,19 @@ def _root(covariance: Array) -> Array:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _shown(seen: Observed, starts: NDArray[np.intp], aside: Array, kicks: Array) -> Array:
+def _shown(filtered: Observed, starts: NDArray[np.intp], aside: Array, kicks: Array) -> Array:
     """Readings without the sensors' noise (runs, samples, outputs), of states that begin `aside` (runs, joined) and are
     kicked at every sample (runs, samples, joined)."""
-    model, numbers = seen.model, numbers_and_constants(seen.model.vehicle, seen.numbers.parameters)
-    noise, nuisance = Noise(*seen.numbers.noise), Nuisance(*seen.numbers.nuisance)
+    model, numbers = filtered.model, numbers_and_constants(filtered.model.vehicle, filtered.numbers.parameters)
+    noise, nuisance = Noise(*filtered.numbers.noise), Nuisance(*filtered.numbers.nuisance)
     fade, turn, step = model.fade(noise), model.line_turn(noise), record_filter(model).step
-    state = FilterState(*(np.asarray(part)[starts] if isinstance(part, np.ndarray) else () for part in seen.filtered))
+    state = FilterState(
+        *(np.asarray(part)[starts] if isinstance(part, np.ndarray) else () for part in filtered.filtered)
+    )
     state, shown = model.moved(state, aside), []
     for k in range(kicks.shape[1]):
         here = starts + k
-        x = step(state.x, state.gust, state.drift, seen.commands[here], seen.voltage[here], numbers)
+        x = step(state.x, state.gust, state.drift, filtered.commands[here], filtered.voltage[here], numbers)
         line = state.line @ turn.T if model.lined else ()
         state = model.moved(FilterState(x, fade * state.gust, state.drift, line), kicks[:, k])
         measured = model.measure(state.x.T, nuisance, _ARRAYS).T

@@ -64,7 +64,7 @@ class Predictions:
         """Those from starts before a sample, and the others."""
         first = int(np.searchsorted(self.starts, sample))
         parts = (slice(None, first), slice(first, None))
-        early, late = (
+        early, after = (
             replace(
                 self,
                 starts=self.starts[part],
@@ -73,7 +73,7 @@ class Predictions:
             )
             for part in parts
         )
-        return early, late
+        return early, after
 
 
 class Observed(NamedTuple):
@@ -90,8 +90,8 @@ class Observed(NamedTuple):
 
     def ahead(self, starts: NDArray[np.intp], ahead: int) -> Array:
         """States 1, 2, ... samples after some starts, with nothing measured any more (starts, ahead, states)."""
-        told = self.filtered, self.numbers, self.commands, self.voltage
-        return record_filter(self.model).ahead_of(*told, starts, ahead)
+        known = self.filtered, self.numbers, self.commands, self.voltage
+        return record_filter(self.model).ahead_of(*known, starts, ahead)
 
 
 def predict(
@@ -114,26 +114,26 @@ def predict(
     run on the recorded inputs; gusts fade and drifts stay as the observer last saw them. `close_loop` names axes that
     are predicted again with their controller, as the seconds before tell it, in the place of their recorded command.
     """
-    seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=round(horizon / record.dt))
+    filtered = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=round(horizon / record.dt))
     n, ahead = record.time.size, round(horizon / record.dt)
     first, step = round(settling / record.dt), max(1, round(every / record.dt))
     if early is not None:
         first -= max(0, (first - round(early / record.dt)) // step) * step
     starts = np.arange(first, max(n - 1, 0), step)
     kept = [vehicle.index(name) for name in PREDICTED]
-    laws = learnt(vehicle, record, seen.filtered.x[:, kept], axes=close_loop, seconds=settling)
+    laws = learnt(vehicle, record, filtered.filtered.x[:, kept], axes=close_loop, seconds=settling)
     closed = None
     if laws:
-        given = (seen.model, seen.filtered, seen.numbers, laws, record.inputs)
-        answered = closed_ahead(*given, seen.commands, seen.voltage, starts, ahead)
+        given = (filtered.model, filtered.filtered, filtered.numbers, laws, record.inputs)
+        answered = closed_ahead(*given, filtered.commands, filtered.voltage, starts, ahead)
         closed = answered[..., kept]
     return Predictions(
         starts=starts,
-        states=seen.ahead(starts, ahead)[..., kept],
-        filtered=seen.filtered.x[:, kept],
-        innovations=seen.innovations,
-        covariance=np.asarray(seen.covariance),
-        disturbances=seen.filtered.gust[:, :N_DISTURBANCES] + seen.filtered.drift,
+        states=filtered.ahead(starts, ahead)[..., kept],
+        filtered=filtered.filtered.x[:, kept],
+        innovations=filtered.innovations,
+        covariance=np.asarray(filtered.covariance),
+        disturbances=filtered.filtered.gust[:, :N_DISTURBANCES] + filtered.filtered.drift,
         closed=closed,
         laws=laws,
     )
@@ -164,10 +164,10 @@ def naive(states: Array, starts: NDArray[np.intp], ahead: int, dt: float, *, kin
     time = ahead * dt
     position, velocity, angles, rates = held[:, 0:3], held[:, 3:6], held[:, 6:9], held[:, 9:12]
     attitude = Rotation.from_euler("ZYX", angles[:, ::-1])
-    moved = position + attitude.apply(velocity) * time
+    position_ahead = position + attitude.apply(velocity) * time
     turned = (attitude * Rotation.from_rotvec(rates * time)).as_euler("ZYX")[:, ::-1]
     turned = angles + (turned - angles + np.pi) % (2 * np.pi) - np.pi
-    return np.concatenate([moved, velocity, turned, rates], axis=1)
+    return np.concatenate([position_ahead, velocity, turned, rates], axis=1)
 
 
 def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, horizon: float) -> Array:

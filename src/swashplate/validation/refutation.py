@@ -150,32 +150,32 @@ def judge(
     noise = NoiseLevel.behind(filter, step, edges)
     grid = 2.0 * np.pi * np.geomspace(low, high, 2 + int(np.log(high / low) / _STEP_OF_SLOPES))
     bounded, slopes = own_bounds(model, outputs, grid)
-    told = ParameterErrors(len(bounded))
+    errors = ParameterErrors(len(bounded))
     loudest, shares = np.zeros((2, len(bounded)))
     for r, piece in enumerate(pieces):
         if not noise.lines[r].all():
             continue
-        seen = _Seen(filter, r, model, piece, tuple(outputs))
-        samples, constants = samples + seen.samples, constants + seen.constants
-        left, bare = noise.power(r, seen.error), noise.power(r, seen.measured)
+        piece_seen = _Seen(filter, r, model, piece, tuple(outputs))
+        samples, constants = samples + piece_seen.samples, constants + piece_seen.constants
+        left, bare = noise.power(r, piece_seen.error), noise.power(r, piece_seen.measured)
         floor = noise.floor[r][:, None]
         controls = np.sqrt(np.maximum(bare - floor, 0.0))
-        moved = seen.moved(grid, slopes, noise, step)
-        by_parameter = noise.of_lines(r, np.abs(moved) ** 2)
-        own = SIGMAS * np.sqrt(by_parameter.sum(axis=2))
+        slopes_seen = piece_seen.driven_motion(grid, slopes, noise, step)
+        by_parameter = noise.of_lines(r, np.abs(slopes_seen) ** 2)
+        tolerated = SIGMAS * np.sqrt(by_parameter.sum(axis=2))
         unsure = np.maximum(np.sqrt(noise.power(r, filter.together[r])), UNSEEN)
         largest = noise.largest(r, chance)
         # No sum of errors is larger than the sum of their sizes.
-        allowed = largest + np.maximum(own, MATERIAL * controls) + unsure
+        allowed = largest + np.maximum(tolerated, MATERIAL * controls) + unsure
         limit = HEARD * largest**2
         admitted = noise.known & piece.moved & np.ones(left.shape, dtype=bool)
         heard = (bare > limit) & admitted
-        claims |= [bool(np.any(noise.power(r, part) > limit)) for part in np.moveaxis(seen.forced, 2, 0)]
+        claims |= [bool(np.any(noise.power(r, part) > limit)) for part in np.moveaxis(piece_seen.forced, 2, 0)]
         for share, power in ((loudest, np.ones(controls.shape)), (shares, np.maximum(controls, 1e-300))):
             apart = np.sqrt(by_parameter) * (heard / power)[:, :, None]
             np.maximum(share, np.max(apart, axis=(0, 1), initial=0.0), out=share)
         white = noise.inverse(r)
-        told.add(white[:, :, None] * moved, white * spectrum(seen.error), noise.inside(r, admitted))
+        errors.add(white[:, :, None] * slopes_seen, white * spectrum(piece_seen.error), noise.inside(r, admitted))
         findings += [
             Finding(
                 piece.source,
@@ -191,14 +191,14 @@ def judge(
             for b in range(edges.size - 1)
             for k, output in enumerate(outputs)
         ]
-    silent = tuple(n for n, told in zip(model.inputs, claims, strict=True) if not told)
+    silent = tuple(n for n, errors in zip(model.inputs, claims, strict=True) if not errors)
     led = any(piece.moved for piece in pieces)
-    changes = _asked(model, bounded, told, loudest, shares)
+    changes = _asked(model, bounded, errors, loudest, shares)
     return _in_words(tuple(findings), changes, silent, samples, constants, led=led)
 
 
 def _asked(
-    model: StateSpaceModel, bounded: Sequence[str], told: ParameterErrors, loudest: Array, shares: Array
+    model: StateSpaceModel, bounded: Sequence[str], errors: ParameterErrors, loudest: Array, shares: Array
 ) -> tuple[AskedChange, ...]:
     """The changes of parameters that are beyond doubt, heard, and matter; the surest first.
 
@@ -206,7 +206,7 @@ def _asked(
         loudest, shares: what one bound of each parameter makes where the controls are heard, at most in any band and
             output: over the noise, and over what the controls do.
     """
-    change, spread = told.asked()
+    change, spread = errors.asked()
     sigmas = np.abs(change) / np.sqrt(1.0 + spread**2)
     matters = (np.abs(change) * loudest > UNSEEN) & (np.abs(change) * shares > MATERIAL)
     asked = []
@@ -231,20 +231,20 @@ def _in_words(
     quiet = [f"the records say nothing about {', '.join(silent)}."] if silent else []
     if not against and not telling and not changes:
         heard = any(f.heard for f in findings)
-        words = (
+        text = (
             "the model's own bounds are so wide that a model without any control would pass too."
             if heard
             else "the controls do not stand out of gusts and noise in any output or band: fly a sweep."
             if led
             else "nothing from outside moved the controls: they are a controller's answer, or nobody can tell."
         )
-        return Judgement(OPEN, (words,), findings, silent, samples, constants)
-    told = [f for f in findings if f.heard]
-    beyond = sum(max(f.error**2 - f.noise**2, 0.0) for f in told)
-    share = float(np.sqrt(beyond / sum(f.controls**2 for f in told))) if told else float("nan")
+        return Judgement(OPEN, (text,), findings, silent, samples, constants)
+    audible = [f for f in findings if f.heard]
+    beyond = sum(max(f.error**2 - f.noise**2, 0.0) for f in audible)
+    share = float(np.sqrt(beyond / sum(f.controls**2 for f in audible))) if audible else float("nan")
     if not against and not changes:
-        words = f"{len(telling)} of {len(findings)} outputs and bands could have refuted it, and none does."
-        return Judgement(STANDS, (words, *quiet), findings, silent, samples, constants, share)
+        text = f"{len(telling)} of {len(findings)} outputs and bands could have refuted it, and none does."
+        return Judgement(STANDS, (text, *quiet), findings, silent, samples, constants, share)
     worst = tuple(
         f"{f.output} between {f.band_hz[0]:.2g} and {f.band_hz[1]:.2g} Hz in {f.source}: predictions are off by "
         f"{f.error:.3g} times the noise, up to {f.allowed:.3g} would be its own bounds and noise, {f.controls:.3g} is "
@@ -252,7 +252,7 @@ def _in_words(
         for f in against[:3]
     )
     head = [f"{len(against)} of {len(telling)} outputs and bands that can refute it do; the worst:"] if against else []
-    asked = tuple(change.words for change in changes[:3])
+    asked = tuple(change.summary_text for change in changes[:3])
     return Judgement(REFUTED, (*head, *worst, *asked, *quiet), findings, silent, samples, constants, share, changes)
 
 
@@ -278,7 +278,7 @@ class _Seen:
         flat = values.reshape(self._constants.shape[0], -1)
         return np.asarray((flat - self._constants @ (self._constants.T @ flat)).reshape(values.shape))
 
-    def moved(self, grid: Array, slopes: Complex, noise: NoiseLevel, step: float) -> Complex:
+    def driven_motion(self, grid: Array, slopes: Complex, noise: NoiseLevel, step: float) -> Complex:
         """Lines of what one standard deviation of each parameter makes, (n_lines, n_outputs, n_parameters)."""
         hertz = np.fft.rfftfreq(len(self._inputs), step)
         used = np.any(noise.bands[self._record], axis=0)
@@ -286,10 +286,10 @@ class _Seen:
         at = np.clip(np.searchsorted(grid, omega) - 1, 0, grid.size - 2)
         share = np.clip((omega - grid[at]) / (grid[at + 1] - grid[at]), 0.0, 1.0)[:, None, None, None]
         between = (1.0 - share) * slopes[at] + share * slopes[at + 1]
-        moved = (between @ spectrum(self._inputs)[used][:, None, :, None])[..., 0]
-        seen = np.swapaxes(self._filter.response(omega, step), 1, 2) @ moved
-        lines = np.zeros((used.size, *seen.shape[1:]), dtype=np.complex128)
-        lines[used] = seen / self._filter.noise[self._record][:, None]
+        driven = (between @ spectrum(self._inputs)[used][:, None, :, None])[..., 0]
+        filtered = np.swapaxes(self._filter.response(omega, step), 1, 2) @ driven
+        lines = np.zeros((used.size, *filtered.shape[1:]), dtype=np.complex128)
+        lines[used] = filtered / self._filter.noise[self._record][:, None]
         return lines
 
 

@@ -93,11 +93,11 @@ class Residuals(Shown):
         """The verdict in words."""
         if self.complete:
             return "COMPLETE: no input explains anything of what the model leaves (99 %, all lags and pairs together)."
-        told = [
+        lines = [
             f"{c.output} from {c.input} ({c.worst[1]:+.2f} at {c.worst[0]:.3g} s, limit {c.limit:.2f})"
             for c in sorted(self.unexplained, key=lambda c: -abs(c.worst[1]) / c.limit)
         ]
-        return f"INCOMPLETE: inputs still explain what the model leaves: {'; '.join(told)}."
+        return f"INCOMPLETE: inputs still explain what the model leaves: {'; '.join(lines)}."
 
     def to_document(self) -> dict[str, Any]:
         """The verdict and the largest correlation of each pair as JSON types."""
@@ -169,18 +169,18 @@ def residuals(
     single = float(ndtri(1.0 - 0.5 * _LEVEL))
     all_together = float(ndtri(1.0 - 0.5 * _LEVEL / (pairs * (lags + 1))))
     left = {name: [_level(t.flight[:, k] - t.model[:, k]) for t in verification.traces] for k, name in enumerate(names)}
-    moved = {name: [_level(t.inputs[:, k]) for t in verification.traces] for k, name in enumerate(verification.inputs)}
-    own, theirs = ({n: _correlation(rows, rows, lags) for n, rows in each.items()} for each in (left, moved))
+    inputs = {name: [_level(t.inputs[:, k]) for t in verification.traces] for k, name in enumerate(verification.inputs)}
+    of_residuals, theirs = ({n: _correlation(rows, rows, lags) for n, rows in each.items()} for each in (left, inputs))
     times = np.asarray(dt * np.arange(-lags, lags + 1), dtype=np.float64)
     cross = []
     for output in names:
         for name in verification.inputs:
-            pooled = max(_LEAST_SPREAD, float(own[output] @ theirs[name]))
+            pooled = max(_LEAST_SPREAD, float(of_residuals[output] @ theirs[name]))
             spread = float(np.sqrt(pooled / samples))
-            values = _correlation(left[output], moved[name], lags)
+            values = _correlation(left[output], inputs[name], lags)
             cross.append(Correlation(output, name, times, values, single * spread, all_together * spread))
     bound = single / float(np.sqrt(samples))
-    auto = tuple(Correlation(n, "", times[lags:], own[n][lags:], bound, bound) for n in names)
+    auto = tuple(Correlation(n, "", times[lags:], of_residuals[n][lags:], bound, bound) for n in names)
     return Residuals(verification, auto, tuple(cross), samples)
 
 
@@ -188,11 +188,11 @@ def _level(row: Array) -> Array:
     return np.asarray(row - np.mean(row), dtype=np.float64)
 
 
-def _correlation(late: Sequence[Array], early: Sequence[Array], lags: int) -> Array:
+def _correlation(later: Sequence[Array], early: Sequence[Array], lags: int) -> Array:
     """Correlation of late(t) with early(t - lag) for lags from -`lags` to `lags`, products pooled over the pieces."""
     total = np.zeros(2 * lags + 1)
-    for a, b in zip(late, early, strict=True):
+    for a, b in zip(later, early, strict=True):
         for k in range(-lags, lags + 1):
             total[k + lags] += float(a[k:] @ b[: a.size - k]) if k >= 0 else float(a[:k] @ b[-k:])
-    size = float(np.sqrt(sum(float(a @ a) for a in late) * sum(float(b @ b) for b in early)))
+    size = float(np.sqrt(sum(float(a @ a) for a in later) * sum(float(b @ b) for b in early)))
     return total / max(size, np.finfo(float).tiny)

@@ -44,7 +44,7 @@ def save(judged: Judged, document: Mapping[str, Any], path: str | os.PathLike[st
         document: what readers and other programs look at: its `kind` and figures.
         path: the file.
     """
-    return write_json(path, {**document, "schema": SCHEMA, "saved": _told(judged)})
+    return write_json(path, {**document, "schema": SCHEMA, "saved": _plain_value(judged)})
 
 
 def from_document(document: Mapping[str, Any], *, where: str, equations: Vehicle | None = None) -> Judged:
@@ -66,24 +66,24 @@ def from_document(document: Mapping[str, Any], *, where: str, equations: Vehicle
             channel="schema",
             hint="Make it again: this version writes all of it.",
         )
-    return _made(KINDS[document["kind"]], document["saved"], where=where, at="saved", equations=equations)
+    return _restored(KINDS[document["kind"]], document["saved"], where=where, at="saved", equations=equations)
 
 
-def _told(value: Any) -> Any:
+def _plain_value(value: Any) -> Any:
     if isinstance(value, Vehicle | StateSpaceModel):
         return model_document(value)
     if isinstance(value, Mapping) and any(isinstance(entry, KINDS["verification"]) for entry in value.values()):
-        return {name: _told(entry) for name, entry in value.items()}
+        return {name: _plain_value(entry) for name, entry in value.items()}
     if any(isinstance(value, KINDS[kind]) for kind in KINDS):
-        return {f.name: _told(getattr(value, f.name)) for f in fields(value)}
+        return {f.name: _plain_value(getattr(value, f.name)) for f in fields(value)}
     return encode(value)
 
 
-def _made(wanted: Any, table: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
+def _restored(wanted: Any, table: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
     """An object of that class from its fields."""
     if not isinstance(table, dict):
         raise DocumentError("is no table.", where=where, channel=at)
-    hints, made = typing.get_type_hints(wanted), {}
+    hints, fields_read = typing.get_type_hints(wanted), {}
     for name in dict.fromkeys([f.name for f in fields(wanted)] + list(table)):
         place = f"{at}.{name[:60]}"
         if name not in hints:
@@ -92,18 +92,18 @@ def _made(wanted: Any, table: Any, *, where: str, at: str, equations: Vehicle | 
             raise DocumentError("is missing.", where=where, channel=place)
         entry = table[name]
         if name in _MODELS:
-            made[name] = model_from(entry, where=where, at=place, equations=equations)
+            fields_read[name] = model_from(entry, where=where, at=place, equations=equations)
         elif name in _VERIFICATIONS:
             inner = KINDS["verification"]
-            whole = None if entry is None else _made(inner, entry, where=where, at=place, equations=equations)
-            made[name] = whole
+            value = None if entry is None else _restored(inner, entry, where=where, at=place, equations=equations)
+            fields_read[name] = value
         elif name == "found":
             if not isinstance(entry, dict):
                 raise DocumentError("is no table.", where=where, channel=place)
-            made[name] = {
-                who: _made(KINDS["verification"], one, where=where, at=f"{place}.{who[:60]}", equations=equations)
+            fields_read[name] = {
+                who: _restored(KINDS["verification"], one, where=where, at=f"{place}.{who[:60]}", equations=equations)
                 for who, one in entry.items()
             }
         else:
-            made[name] = decode(hints[name], entry, where=where, at=place)
-    return wanted(**made)
+            fields_read[name] = decode(hints[name], entry, where=where, at=place)
+    return wanted(**fields_read)

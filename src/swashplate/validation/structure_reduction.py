@@ -60,7 +60,7 @@ def reduce(
         return verify(model, hold_out, band=limits) if hold_out else None
 
     allowed = fit.cost + max(LEAST_GROWTH, GROWTH * fit.cost)
-    whole = along(fit.solution)
+    full = along(fit.solution)
     history: list[ReductionStep] = list(fit.details.reduction)
     tried: set[str] = set()
     present = fit
@@ -80,8 +80,8 @@ def reduce(
             after = float("inf") if new is None else new.cost
             modes, gone = ("", False) if new is None else moved_modes(fit.details.modes, new.solution.eigenvalues())
             veto = "a mode has gone or moved beyond its bounds" if gone else ""
-            if new is not None and after <= allowed and not veto and whole is not None:
-                veto = _worse(whole, along(new.solution))
+            if new is not None and after <= allowed and not veto and full is not None:
+                veto = _worse(full, along(new.solution))
             kept = new is not None and after <= allowed and not veto
             history.append(ReductionStep(name, reason + remark, present.cost, after, kept, veto, modes))
             if progress is not None:
@@ -109,7 +109,7 @@ _NO_HOLD_OUT = "reduced without a hold-out: nothing but the fitted responses and
 def moved_modes(modes: Sequence[ModeAccuracy], eigenvalues: Complex) -> tuple[str, bool]:
     """Where the told modes inside the band have gone, in words; whether one is lost or moved beyond its bounds."""
     left = [v for v in map(complex, eigenvalues) if v.imag >= -1e-12]
-    told, lost, same = [], False, 0
+    lines, lost, same = [], False, 0
     for mode in modes:
         bound = float(np.hypot(mode.frequency_bound, mode.frequency * mode.damping_bound))
         if not mode.inside or not np.isfinite(bound):
@@ -118,15 +118,15 @@ def moved_modes(modes: Sequence[ModeAccuracy], eigenvalues: Complex) -> tuple[st
             return f"{mode.frequency:.3g} rad/s has gone", True
         near = min(left, key=lambda v: abs(v - mode.eigenvalue))
         left.remove(near)
-        moved = abs(near - mode.eigenvalue)
-        far = moved > min(MOVED * bound, max(FAR * mode.frequency, bound))
+        shift = abs(near - mode.eigenvalue)
+        far = shift > min(MOVED * bound, max(FAR * mode.frequency, bound))
         lost = lost or far
-        if far or moved > _HARDLY * mode.frequency:
-            told.append(f"{_written(mode.eigenvalue)} to {_written(near)}{' (beyond its bounds)' if far else ''}")
+        if far or shift > _HARDLY * mode.frequency:
+            lines.append(f"{_written(mode.eigenvalue)} to {_written(near)}{' (beyond its bounds)' if far else ''}")
         else:
             same += 1
     rest = f"{same} within {100.0 * _HARDLY:g} %" if same else ""
-    return "modes: " + ", ".join([*told, rest] if rest else told) if told or rest else "", lost
+    return "modes: " + ", ".join([*lines, rest] if rest else lines) if lines or rest else "", lost
 
 
 def _written(value: complex) -> str:

@@ -134,13 +134,13 @@ def validate(
     for number, piece in enumerate(pieces):
         ahead = max(h for h in horizons if h < piece.time[-1] - piece.time[0] - calibration)
         rivals: dict[str, _Rival] = {}
-        for name, flown in (("model", vehicle), ("published card", published)):
+        for name, vehicle_flown in (("model", vehicle), ("published card", published)):
             if rivals and alone:
                 rivals[name] = rivals["model"]
                 continue
-            nuisance = calibrate(flown, piece, noise=noise, prior=prior, seconds=calibration, trims=trims)
+            nuisance = calibrate(vehicle_flown, piece, noise=noise, prior=prior, seconds=calibration, trims=trims)
             predictions = predict(
-                flown,
+                vehicle_flown,
                 piece,
                 noise=noise,
                 nuisance=nuisance,
@@ -150,47 +150,51 @@ def validate(
                 early=None if rivals else SETTLING,
                 close_loop=() if rivals else close_loop,
             )
-            rivals[name] = _Rival(flown, nuisance, *reversed(predictions.split(round(calibration / piece.dt))))
-        own = rivals["model"]
-        laws.extend(own.predictions.laws)
-        calibrated.append(own.nuisance)
-        truth = measured_states(piece, own.nuisance)
+            rivals[name] = _Rival(vehicle_flown, nuisance, *reversed(predictions.split(round(calibration / piece.dt))))
+        model_rival = rivals["model"]
+        laws.extend(model_rival.predictions.laws)
+        calibrated.append(model_rival.nuisance)
+        truth = measured_states(piece, model_rival.nuisance)
         # The tracked point as it is: that is what a controller saw, whatever the lever arm.
         judged.extend(excitation(vehicle, piece, measured_states(piece, Nuisance())))
         measured.append(truth)
-        sigma = prediction_sigma(vehicle, piece, noise=noise, nuisance=own.nuisance, horizon=ahead)
-        wider = _wider(piece, own, truth, sigma, every=every, horizon=min(horizons))
+        sigma = prediction_sigma(vehicle, piece, noise=noise, nuisance=model_rival.nuisance, horizon=ahead)
+        wider = _wider(piece, model_rival, truth, sigma, every=every, horizon=min(horizons))
         furthest = ahead if draws else min(ahead, JUDGED_AHEAD)
         fan = spread(
             draws or (vehicle,) * FEWEST_DRAWS,
             piece,
             noise=noise,
-            nuisance=own.nuisance,
-            predictions=own.predictions,
+            nuisance=model_rival.nuisance,
+            predictions=model_rival.predictions,
             truth=truth,
             longest=round(furthest / piece.dt),
             wider=wider,
         )
         for horizon in horizons:
             if horizon <= ahead:
-                starts, made = _at_horizon(piece, rivals, horizon)
-                for name, part in made.items():
+                starts, prediction = _at_horizon(piece, rivals, horizon)
+                for name, part in prediction.items():
                     parts.setdefault((name, horizon), []).append(part)
-                if own.predictions.closed is not None:
-                    predicted = own.predictions.closed[: len(starts), round(horizon / piece.dt) - 1]
-                    looped.setdefault(horizon, []).append(ClosedRecord(piece.time[starts], predicted, *made["model"]))
+                if model_rival.predictions.closed is not None:
+                    predicted = model_rival.predictions.closed[: len(starts), round(horizon / piece.dt) - 1]
+                    looped.setdefault(horizon, []).append(
+                        ClosedRecord(piece.time[starts], predicted, *prediction["model"])
+                    )
                 promised = sigma[round(horizon / piece.dt) - 1]
                 if horizon <= furthest:
                     banded.setdefault(horizon, []).append(fan.at(horizon, piece, starts))
                 scored.setdefault(horizon, []).append(
                     ScoredRecord(piece.name, motion_of(piece, truth, starts), promised)
                 )
-        shown = fan.sigma if draws else np.broadcast_to(sigma, own.predictions.states.shape)
-        examples.extend(_examples(piece, own, shown[:, : round(_EXAMPLE / piece.dt)]))
+        shown = fan.sigma if draws else np.broadcast_to(sigma, model_rival.predictions.states.shape)
+        examples.extend(_examples(piece, model_rival, shown[:, : round(_EXAMPLE / piece.dt)]))
         settled = round(calibration / piece.dt)
-        pushed = contact(piece.name, piece.time[settled:], truth[settled:], own.predictions.disturbances[settled:])
+        pushed = contact(
+            piece.name, piece.time[settled:], truth[settled:], model_rival.predictions.disturbances[settled:]
+        )
         contacts.append(pushed)
-        checks.append((own.predictions.innovations[settled:], own.predictions.covariance))
+        checks.append((model_rival.predictions.innovations[settled:], model_rival.predictions.covariance))
         likelihoods.append(
             {
                 name: innovations.log_likelihood(r.predictions.innovations[settled:], r.predictions.covariance)
@@ -246,11 +250,11 @@ def validate(
     )
 
 
-def _wider(piece: Record, own: _Rival, truth: Array, sigma: Array, *, every: float, horizon: float) -> Array:
+def _wider(piece: Record, rival: _Rival, truth: Array, sigma: Array, *, every: float, horizon: float) -> Array:
     """How much wider the bands of a record are to be, by its first seconds (see `widening`)."""
     ahead = round(horizon / piece.dt)
-    starts = own.early.starts[own.early.starts + ahead < own.predictions.starts[0]]
-    errors = truth[starts + ahead] - own.early.states[: len(starts), ahead - 1]
+    starts = rival.early.starts[rival.early.starts + ahead < rival.predictions.starts[0]]
+    errors = truth[starts + ahead] - rival.early.states[: len(starts), ahead - 1]
     return widening(errors, sigma[ahead - 1], seconds=len(starts) * every, horizon=horizon)
 
 
@@ -262,15 +266,15 @@ def _without_contact(
     """The model's predictions that no proposed mask touches; nothing where none is proposed."""
     if not any(contacts):
         return {}
-    made: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
+    errors: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
     for horizon, records_at in scored.items():
         for record, rows in zip(records_at, parts["model", horizon], strict=True):
             start = record.motion.time[record.motion.starts]
             mask = next((c for c in contacts if c is not None and c.record == record.name), None)
             free = ~mask.touches(start, horizon) if mask else np.ones(start.shape, dtype=bool)
             predicted, truth, first = rows
-            made.setdefault(("model", horizon), []).append((predicted[free], truth[free], first[free]))
-    return made
+            errors.setdefault(("model", horizon), []).append((predicted[free], truth[free], first[free]))
+    return errors
 
 
 def _learnt(model: Result[Vehicle, Any] | Vehicle, nuisance: Nuisance) -> list[FilteredMotion]:
@@ -327,18 +331,18 @@ def _at_horizon(
     counted = starts + ahead < piece.time.size - round(_EDGE / piece.dt)
     first = starts[counted]
     truths = {name: measured_states(piece, r.nuisance) for name, r in rivals.items()}
-    made = {
+    predicted = {
         name: (r.predictions.states[counted, ahead - 1], truths[name][first + ahead], truths[name][first])
         for name, r in rivals.items()
     }
     truth = truths["model"]
     for name, kind in (("hold", "hold"), ("constant rates", "rates")):
-        made[name] = (naive(truth, first, ahead, piece.dt, kind=kind), truth[first + ahead], truth[first])
-    return first, made
+        predicted[name] = (naive(truth, first, ahead, piece.dt, kind=kind), truth[first + ahead], truth[first])
+    return first, predicted
 
 
 def _scores(parts: Mapping[tuple[str, float], Sequence[tuple[Array, Array, Array]]]) -> tuple[Score, ...]:
-    made = []
+    scores = []
     for (name, horizon), rows in parts.items():
         predicted, truth, first = (np.concatenate(columns) for columns in zip(*rows, strict=True))
         if not len(truth):
@@ -350,25 +354,25 @@ def _scores(parts: Mapping[tuple[str, float], Sequence[tuple[Array, Array, Array
         )
         for channel in _JUDGED:
             i = PREDICTED.index(channel)
-            made.append(Score(channel, horizon, name, float(fits[i]), float(errors[i]), float(theils[i]), len(truth)))
-    return tuple(made)
+            scores.append(Score(channel, horizon, name, float(fits[i]), float(errors[i]), float(theils[i]), len(truth)))
+    return tuple(scores)
 
 
-def _examples(piece: Record, own: _Rival, sigma: Array) -> list[Example]:
+def _examples(piece: Record, rival: _Rival, sigma: Array) -> list[Example]:
     """A few predictions spread over the record, as long as their standard deviations (starts, n, 12)."""
     ahead = sigma.shape[1]
-    usable = np.flatnonzero(own.predictions.starts + ahead < piece.time.size)
+    usable = np.flatnonzero(rival.predictions.starts + ahead < piece.time.size)
     chosen = usable[np.linspace(0, usable.size - 1, min(_EXAMPLES, usable.size)).astype(int)] if usable.size else usable
-    made = []
+    examples = []
     for place in chosen:
-        start = int(own.predictions.starts[place])
-        made.append(
+        start = int(rival.predictions.starts[place])
+        examples.append(
             Example(
                 record=piece.name,
                 start=float(piece.time[start]),
                 time=piece.time[start + 1 : start + 1 + ahead],
-                states=own.predictions.states[place, :ahead],
+                states=rival.predictions.states[place, :ahead],
                 sigma=sigma[place],
             )
         )
-    return made
+    return examples

@@ -155,8 +155,8 @@ class Validation(Shown):
     def bands_told(self) -> list[str]:
         """Which bands hold and which do not, a sentence by horizon."""
         horizons, drawn = dict.fromkeys(band.horizon for band in self.bands), bool(self.settings.get("draws"))
-        told = [in_brief(self.bands, horizon, drawn=drawn) for horizon in horizons] + [widened_words(self.bands)]
-        return [words for words in told if words]
+        texts = [in_brief(self.bands, horizon, drawn=drawn) for horizon in horizons] + [widened_words(self.bands)]
+        return [text for text in texts if text]
 
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types (no time histories)."""
@@ -164,12 +164,12 @@ class Validation(Shown):
             "kind": "validation",
             "vehicle": self.vehicle.name,
             "scores": [vars(score) for score in self.scores],
-            "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
-            "contacts": [vars(one) | {"words": one.words} for one in self.contacts],
+            "floors": [vars(floor) | {"words": floor.summary_text} for floor in self.floors],
+            "contacts": [vars(one) | {"words": one.summary_text} for one in self.contacts],
             "scores_without_contact": [vars(score) for score in self.without_contact],
             "loop_closed": [vars(floor) for floor in self.loop_closed],
             "laws": [vars(law) for law in self.laws],
-            "bands": [vars(band) | {"level": band.level, "words": band.words} for band in self.bands],
+            "bands": [vars(band) | {"level": band.level, "words": band.summary_text} for band in self.bands],
             "innovations": [vars(check) for check in self.innovations],
             "log_likelihood": dict(self.log_likelihood),
             "verdict": [vars(axis) for axis in self.verdict],
@@ -178,8 +178,8 @@ class Validation(Shown):
             "flights": [vars(one) | {"history": [vars(step) for step in one.history]} for one in self.data],
             "settings": dict(self.settings),
             "calibrated": [
-                {"record": record.name} | {name: float(value) for name, value in told._asdict().items()}
-                for record, told in zip(self.records, self.calibrated, strict=False)
+                {"record": record.name} | {name: float(value) for name, value in constants._asdict().items()}
+                for record, constants in zip(self.records, self.calibrated, strict=False)
             ],
         }
 
@@ -201,14 +201,14 @@ class Validation(Shown):
                 row = (fits.get((channel, horizon, predictor), float("nan")) for channel in channels)
                 lines.append(f"  {predictor:16s}" + "".join(f"{value:9.1f}" for value in row))
             beside_it = (("no contact", self.without_contact), ("loop closed", self.loop_closed))
-            for words, others in beside_it:
+            for label, others in beside_it:
                 by_channel = {s.channel: s.fit for s in others if s.horizon == horizon}
                 if by_channel:
                     row = (by_channel.get(channel, float("nan")) for channel in channels)
-                    lines.append(f"  {words:16s}" + "".join(f"{value:9.1f}" for value in row))
+                    lines.append(f"  {label:16s}" + "".join(f"{value:9.1f}" for value in row))
             beside = {f.channel: f for f in self.floors if f.horizon == horizon}
-            for words, cell in ROWS if beside else ():
+            for label, cell in ROWS if beside else ():
                 row_of = (cell(beside[channel]) if channel in beside else "" for channel in channels)
-                lines.append(f"  {words:16s}" + "".join(f"{text:>9s}" for text in row_of))
-        told = [*(c.words for c in self.contacts), *(law.words for law in self.laws), *self.bands_told]
-        return "\n".join([*lines, *told, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])
+                lines.append(f"  {label:16s}" + "".join(f"{text:>9s}" for text in row_of))
+        remarks = [*(c.summary_text for c in self.contacts), *(law.summary_text for law in self.laws), *self.bands_told]
+        return "\n".join([*lines, *remarks, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])

@@ -81,8 +81,8 @@ def verify_vehicle(
         for k, c in enumerate(likelihood.comparisons(optimum.row))
     )
     names = (*vehicle.input_names, *vehicle.state_names)
-    own = dict(zip(names, (*vehicle.input_units, *vehicle.state_units), strict=True))
-    units = {n: channel(n).unit for n in shared} | own
+    unit_of = dict(zip(names, (*vehicle.input_units, *vehicle.state_units), strict=True))
+    units = {n: channel(n).unit for n in shared} | unit_of
     data = sources_of(flights)
     warnings = [*damaged(data), *([] if optimum.converged else ["the search for the start states did not end."])]
     if not all(np.all(np.isfinite(t.model)) for t in traces):

@@ -91,7 +91,7 @@ def validate(
             of another model, or `published` or `draws` beside a model that is flown along the inputs.
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
-    model, flown = fitted(model), as_flights(flights)
+    model, logs = fitted(model), as_flights(flights)
     held = model.solution if isinstance(model, Result) else model
     rigid = isinstance(held, Vehicle) and set(PREDICTED) <= set(held.state_names)
     # What flies nonlinear vehicles compiles; linear models need none of it, and it takes a second to import.
@@ -100,7 +100,7 @@ def validate(
 
         return predict_flights(
             model,
-            flown,
+            logs,
             published=published,
             horizons=horizons,
             every=every,
@@ -117,7 +117,7 @@ def validate(
         raise SwashError(
             "is compared with nothing: such a model is flown along the recorded inputs alone.", channel="published"
         )
-    return along_inputs(model, flown, outputs=outputs)
+    return along_inputs(model, logs, outputs=outputs)
 
 
 def fitted(model: Any) -> Any:

@@ -45,7 +45,7 @@ def verdict(
         floors: what the model's scores stand beside; the words say whether the model or the flight is poor.
         bands: of the predictions; the words say which hold less than they promise.
     """
-    made = []
+    judged_axes = []
     for axis, (channels, horizon) in _AXES.items():
         rows = [s for s in scores if s.channel in channels and abs(s.horizon - horizon) < 1e-9]
         if not rows:
@@ -54,9 +54,9 @@ def verdict(
         beside = [f for f in floors if f.channel in channels and abs(f.horizon - horizon) < 1e-9]
         one = _one(axis, channels, horizon, rows, judged, beside)
         narrow = [b for b in bands if b.channel in channels and abs(b.horizon - horizon) < 1e-9 and b.promised == SURE]
-        told = " ".join([one.words, *(b.warning for b in narrow if b.warning)])
-        made.append(replace(one, words=told))
-    return tuple(made)
+        text = " ".join([one.words, *(b.warning for b in narrow if b.warning)])
+        judged_axes.append(replace(one, words=text))
+    return tuple(judged_axes)
 
 
 def in_brief(verdicts: Iterable[AxisVerdict]) -> str:
@@ -81,7 +81,7 @@ def _one(
         f"{c} {model[c]:.0f} %{scatter.get(c, '')} (best rival {rivals[c]:.0f} %)" for c in channels if c in model
     )
     said = f"{numbers} at {horizon:g} s."
-    beside = "".join(f" {f.channel}: {f.words}" for f in floors)
+    beside = "".join(f" {f.channel}: {f.summary_text}" for f in floors)
     hopeless = [f.channel for f in floors if f.reached and f.ceiling < THRESHOLDS["usable"]]
     beaten = [c for c in model if model[c] <= rivals[c]]
     worst = min(model.values())

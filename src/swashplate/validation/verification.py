@@ -133,7 +133,7 @@ class Verification(Shown):
             "samples": self.samples,
             "stretch_s": self.settings.get("stretch_s"),
             "outputs": [vars(o) for o in self.outputs],
-            "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
+            "floors": [vars(floor) | {"words": floor.summary_text} for floor in self.floors],
             "records": [{"source": t.source, "biases": dict(t.biases), "shifts": dict(t.shifts)} for t in self.traces],
             "warnings": list(self.warnings),
             "flights": [vars(one) | {"history": [vars(step) for step in one.history]} for one in self.data],
@@ -154,6 +154,6 @@ class Verification(Shown):
         lines.append(f"  {'output':<10}{'rms error':>12}  {'unit':<8}{'Theil':>7}{'fit %':>8}")
         for o in self.outputs:
             lines.append(f"  {o.output:<10}{o.rms:>12.4g}  {o.unit:<8}{o.theil:>7.2f}{o.fit:>8.1f}")
-        lines += [f"  {floor.channel}: {floor.scatter}{floor.words}" for floor in self.floors]
+        lines += [f"  {floor.channel}: {floor.scatter}{floor.summary_text}" for floor in self.floors]
         lines += [f"! {text}" for text in self.warnings]
         return "\n".join(lines if self.inside is None else [*lines, repr(self.inside)])

@@ -56,11 +56,11 @@ def verify_inside(
     What a model does outside its band is not told by the fit: a record's slow drift, say, which a loop fights with
     commands that a near-integrator then adds up. The verdict is on the band.
     """
-    whole = verify(model, flights, low=band[0] if band else None, judged=band is None)
+    everywhere = verify(model, flights, low=band[0] if band else None, judged=band is None)
     if band is None:
-        return whole
+        return everywhere
     inside = verify(model, flights, band=band)
-    return replace(whole, inside=inside, judgement=inside.judgement)
+    return replace(everywhere, inside=inside, judgement=inside.judgement)
 
 
 def verify(
@@ -112,15 +112,15 @@ def verify(
             time, table = uniform_table(piece, (*model.inputs, *shared), who=f"'{model.name}'")
             dt = float((time[-1] - time[0]) / (time.size - 1))
             source = piece.provenance.source or "flight"
-            moved = table - table.mean(axis=0)
+            deviation = table - table.mean(axis=0)
             outside = any(one.outside for one in excitations(piece, model.inputs, outputs=shared))
-            pieces.append(Piece(source, moved[:, :m], moved[:, m:], dt, outside))
+            pieces.append(Piece(source, deviation[:, :m], deviation[:, m:], dt, outside))
             if band is not None:
                 table = filtered(table, rate=1.0 / dt, cutoff=(band[0], min(band[1], _TOP / dt)), order=_ORDER)
             count = max(1, round(time.size * dt / stretch))
             for part in np.array_split(np.arange(time.size), count):
                 name = f"{source} {time[part][0]:.2f}-{time[part][-1]:.2f} s"
-                trace, still, free = _flown(model, shared, name, time[part], table[part], dt, shifts)
+                trace, still, free = _along_records(model, shared, name, time[part], table[part], dt, shifts)
                 traces.append(trace)
                 owners.append(piece)
                 constants += free
@@ -173,7 +173,7 @@ def verified(
         inputs: of the model. units: of both.
         warnings, data, settings, judgement, rivals, constants: see `Verification`.
     """
-    rows, told = _judged(units, outputs, traces), list(warnings)
+    rows, warnings_told = _judged(units, outputs, traces), list(warnings)
     lost = [f"{o.output} ({o.theil:.2f})" for o in rows if o.theil > GOOD_TIC]
     others: dict[str, str] = {}
     if lost or (judgement is not None and judgement.verdict == OPEN):
@@ -183,21 +183,23 @@ def verified(
         refuted = judgement is not None and judgement.verdict == REFUTED
         gusts = "What moved them may be no input (gusts)."
         why = "The records refute it." if refuted else " ".join(others.values()) or gusts
-        told.append(f"Theil's coefficient above {GOOD_TIC:g}: {', '.join(lost)}. The model does not follow. {why}")
+        warnings_told.append(
+            f"Theil's coefficient above {GOOD_TIC:g}: {', '.join(lost)}. The model does not follow. {why}"
+        )
     elif others:
-        told += others.values()
+        warnings_told += others.values()
     weight = np.array([_WEIGHT.get(units.get(n, ""), 1.0) for n in outputs])
     errors = np.concatenate([t.flight - t.model for t in traces]) * weight
     cost = float(np.sqrt(np.mean(errors**2)))
     closer = [name for name, other in (rivals or {}).items() if other <= cost]
     if closer:
-        told.append(f"a naive predictor is as close as the model: {', '.join(closer)}.")
+        warnings_told.append(f"a naive predictor is as close as the model: {', '.join(closer)}.")
     return Verification(
         model=model,
         cost=cost,
         outputs=rows,
         traces=tuple(traces),
-        warnings=tuple(told),
+        warnings=tuple(warnings_told),
         data=data,
         settings={
             "outputs": list(outputs),
@@ -217,25 +219,25 @@ def verified(
 def _beside(outputs: tuple[str, ...], traces: Sequence[Trace], *, banded: bool) -> tuple[Floor, ...]:
     """What the fits stand beside; "hold" is the mean of each stretch, and what moves is the flight about it."""
     times = [t.time for t in traces]
-    moved = [(t.flight - t.flight.mean(axis=0)) ** 2 for t in traces]
+    movement = [(t.flight - t.flight.mean(axis=0)) ** 2 for t in traces]
     box = (
         Ceiling(CROSSED, refused="a band's filters, which have no phase, look ahead")
         if banded
         else ceiling_along(times, [t.inputs for t in traces], [t.flight for t in traces])
     )
-    squares = {"model": [(t.flight - t.model) ** 2 for t in traces], HOLD: moved}
+    squares = {"model": [(t.flight - t.model) ** 2 for t in traces], HOLD: movement}
     return floors(
         outputs,
         float("inf"),
         times,
         squares,
-        dict.fromkeys(squares, moved),
+        dict.fromkeys(squares, movement),
         expected=np.full(len(outputs), np.nan),
         ceilings=[box],
     )
 
 
-def _flown(
+def _along_records(
     model: StateSpaceModel, outputs: tuple[str, ...], name: str, time: Array, table: Array, dt: float, shifts: bool
 ) -> tuple[Trace, Array, int]:
     """One stretch; what the constants alone leave of the flight (n, n_outputs); how many there are."""
@@ -266,19 +268,19 @@ def _flown(
 def _judged(
     units: Mapping[str, str], outputs: tuple[str, ...], traces: Sequence[Trace]
 ) -> tuple[OutputVerification, ...]:
-    made = []
+    outputs_judged = []
     for k, name in enumerate(outputs):
         # Deviations from each stretch's own mean: a bias that was solved for is no merit.
         y = np.concatenate([t.flight[:, k] - t.flight[:, k].mean() for t in traces])
         model_y = np.concatenate([t.model[:, k] - t.flight[:, k].mean() for t in traces])
-        error, flight, own = (float(np.sqrt(np.mean(np.square(v)))) for v in (y - model_y, y, model_y))
-        made.append(
+        error, flight, of_model = (float(np.sqrt(np.mean(np.square(v)))) for v in (y - model_y, y, model_y))
+        outputs_judged.append(
             OutputVerification(
                 name,
                 units.get(name, ""),
                 error,
-                error / max(flight + own, 1e-300),
+                error / max(flight + of_model, 1e-300),
                 100.0 * (1.0 - error / max(flight, 1e-300)),
             )
         )
-    return tuple(made)
+    return tuple(outputs_judged)

@@ -70,8 +70,8 @@ def test_other_laws_and_flights_that_are_too_short_are_told(record: BandedRecord
 def test_what_a_band_says() -> None:
     found = bands({0.5: [_record(0.5)]})
     band = next(one for one in found if (one.channel, one.promised) == ("p", 95.0))
-    assert band.words.startswith(f"p, 0.5 s ahead: the 95 % band holds {band.held:.0f} % ({band.low:.0f} to ")
-    assert "this motion is larger than the model and the gusts of its fit explain" in band.words
+    assert band.summary_text.startswith(f"p, 0.5 s ahead: the 95 % band holds {band.held:.0f} % ({band.low:.0f} to ")
+    assert "this motion is larger than the model and the gusts of its fit explain" in band.summary_text
     assert in_brief(found, 0.5).startswith("Bands 0.5 s ahead. Too narrow: ")
     half, most = next(pair for pair in pairs(found) if pair[0].channel == "p")
     cells = [cell(half, most) for _, cell in ROWS]

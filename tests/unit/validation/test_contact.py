@@ -41,7 +41,7 @@ def test_a_tether_beyond_a_heading_is_found(seed: int) -> None:
     assert (found.feature, found.above, found.axis) == ("psi", True, "forward")
     assert found.limit == pytest.approx(2.8, abs=0.25)
     assert found.push == pytest.approx(-0.65, abs=0.25)
-    assert "Nothing was left out" in found.words
+    assert "Nothing was left out" in found.summary_text
     states, _ = _flown(seed, push=-0.65)
     inside = np.zeros(N, dtype=bool)
     for first, last in found.intervals:

@@ -41,8 +41,8 @@ def test_a_law_is_found_with_its_lag_and_nothing_later_is_looked_at() -> None:
     assert law.lag == pytest.approx(0.02)
     assert law.explained > 0.99
     assert law.motion == ("psi", "r")
-    assert "20 ms late" in law.words
-    assert "-0.03 per psi" in law.words
+    assert "20 ms late" in law.summary_text
+    assert "-0.03 per psi" in law.summary_text
 
 
 def test_a_command_that_answers_nothing_is_hardly_explained() -> None:

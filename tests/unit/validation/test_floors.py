@@ -83,10 +83,10 @@ def test_the_truth_is_at_the_ceiling_and_a_spoilt_model_is_short_of_it() -> None
     good, spoilt = (_floor(record, _model(record, gain=gain)) for gain in (1.0, -0.5))
     assert good.ceiling == spoilt.ceiling > 60.0
     assert good.reached
-    assert "The model is as good as the ceiling" in good.words
+    assert "The model is as good as the ceiling" in good.summary_text
     assert not spoilt.reached
     assert spoilt.gap_low > 5.0
-    assert spoilt.words.endswith(f"The ceiling is {spoilt.ceiling:.0f} %: a better model is possible.")
+    assert spoilt.summary_text.endswith(f"The ceiling is {spoilt.ceiling:.0f} %: a better model is possible.")
     assert good.rms < 0.5 * spoilt.rms
     assert good.moved == spoilt.moved
 
@@ -113,7 +113,7 @@ def test_a_controllers_answers_are_a_leak_and_the_ceiling_is_refused(seed: int) 
     assert "answer the motion" in found.refused
     assert found.leak > LEAK
     assert found.seen > found.past
-    assert "No ceiling" in found.words
+    assert "No ceiling" in found.summary_text
 
 
 def _peeping(record: FilteredMotion, starts: NDArray[np.intp], ahead: int, after: float) -> Array:
@@ -139,7 +139,7 @@ def test_a_flight_that_nothing_moves_has_a_low_ceiling_and_says_so() -> None:
     found = _floor(record, level)
     assert found.ceiling < 45.0  # the mean of noise is nearer than its last value: 29 %
     assert found.reached
-    assert "cannot be predicted from what was recorded: even the ceiling is a fit of" in found.words
+    assert "cannot be predicted from what was recorded: even the ceiling is a fit of" in found.summary_text
 
 
 def test_a_record_that_is_too_short_has_no_ceiling_and_no_interval() -> None:
@@ -261,13 +261,13 @@ def test_the_verdict_says_whether_the_model_or_the_flight_is_poor(
 
 def test_a_loss_to_the_past_is_no_proof_against_a_model_on_commands_that_answer() -> None:
     lost = replace(_beside(12.0, 70.0), ceiling=float("nan"), past=66.0, leak=14.0, refused="inputs answer")
-    assert "The past alone has a fit of 66 %; where a controller's commands answer the motion" in lost.words
-    assert "The model is poor" not in lost.words
-    assert "The model is poor: the past alone has a fit of 66 %" in replace(lost, leak=3.0).words
+    assert "The past alone has a fit of 66 %; where a controller's commands answer the motion" in lost.summary_text
+    assert "The model is poor" not in lost.summary_text
+    assert "The model is poor: the past alone has a fit of 66 %" in replace(lost, leak=3.0).summary_text
 
 
 def test_a_model_beyond_the_ceiling_is_not_told_that_its_motion_cannot_be_predicted() -> None:
-    better = _beside(55.0, 39.0).words
+    better = _beside(55.0, 39.0).summary_text
     assert "The model is better than the regression that is the ceiling (39 %)." in better
     assert "cannot be predicted" not in better
-    assert "cannot be predicted" in _beside(37.0, 39.0).words
+    assert "cannot be predicted" in _beside(37.0, 39.0).summary_text

@@ -179,7 +179,7 @@ def test_every_score_of_the_model_stands_beside_its_floor() -> None:
     assert 0.0 < phi.expected < phi.fit  # the usual gusts are promised, and this flight had none
     assert np.isnan(phi.low)  # five seconds of starts are too few blocks
     assert "filter expects" in repr(found)
-    assert found.as_dict()["floors"][0]["words"] == found.floors[0].words
+    assert found.as_dict()["floors"][0]["words"] == found.floors[0].summary_text
 
 
 def test_a_flight_that_is_over_before_it_is_calibrated_is_refused() -> None:

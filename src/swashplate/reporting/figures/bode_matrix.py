@@ -164,10 +164,10 @@ def bode_matrix(rows: Sequence[Sequence[Pair | None]], *, identifier: str = "bod
     )
 
 
-def _heading(words: str, left: float, upper: float) -> dict[str, Any]:
+def _heading(text: str, left: float, upper: float) -> dict[str, Any]:
     """What stands over a cell."""
     return {
-        "text": f"<b>{words}</b>",
+        "text": f"<b>{text}</b>",
         "xref": "paper",
         "yref": "paper",
         "x": left,

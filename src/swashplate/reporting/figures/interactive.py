@@ -21,7 +21,7 @@ def interactive(figure: Figure, *, theme: str = "light", frequency: str = "Hz", 
         SwashError: a theme or a unit that there is not; plotly missing.
     """
     look = checked(theme)
-    made = library("plotly.graph_objects", what="drawing")
+    objects = library("plotly.graph_objects", what="drawing")
     spec = in_unit(figure.spec, frequency)
     layout = dict(spec["layout"]) | {"showlegend": bool(figure.keys)}
     margin = dict(layout.get("margin", {}))
@@ -44,7 +44,7 @@ def interactive(figure: Figure, *, theme: str = "light", frequency: str = "Hz", 
     traces = [{**trace, "showlegend": False} for trace in spec["data"]]
     traces += [_entry(key) for key in figure.keys]
     drawn = coloured({"data": traces, "layout": layout}, look)
-    return made.Figure(data=drawn["data"], layout=drawn["layout"], skip_invalid=False)
+    return objects.Figure(data=drawn["data"], layout=drawn["layout"], skip_invalid=False)
 
 
 def _entry(key: Key) -> dict[str, Any]:

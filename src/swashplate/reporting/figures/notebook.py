@@ -36,7 +36,7 @@ def html_of(shown: Any) -> str:
 
 
 def _table(table: Table) -> str:
-    heads = "".join(f"<th>{escape(words)}</th>" for words in table.columns)
+    heads = "".join(f"<th>{escape(heading)}</th>" for heading in table.columns)
     rows = "".join(
         f"<tr>{''.join(f'<td>{escape(cell.words)}</td>' for cell in row)}</tr>" for row in table.rows[:_MOST_ROWS]
     )

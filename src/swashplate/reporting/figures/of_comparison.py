@@ -32,21 +32,23 @@ from swashplate.validation.verification import Verification
 _STYLES = ((BLUE, "dash"), (VERMILION, "dot"), (GREEN, "dashdot"), (PURPLE, "dash"), (ORANGE, "dot"))
 
 
-def section_of_comparison(flown: ModelComparison) -> Section:
+def section_of_comparison(comparison: ModelComparison) -> Section:
     """The lines, and how close each model comes."""
     rows = tuple(
-        (Cell(name), *(Cell(f"{fits[who]:.1f}" if who in fits else "-", number=True) for who in flown.found))
-        for name, fits in flown.fits().items()
+        (Cell(name), *(Cell(f"{fits[who]:.1f}" if who in fits else "-", number=True) for who in comparison.found))
+        for name, fits in comparison.fits().items()
     )
-    table = Table("Fit [%]: 100 (1 - rms error / rms of the flight about its mean)", ("output", *flown.found), rows)
-    told = tuple(Text(f"{n}: {t}", tone="caution") for n, v in flown.found.items() for t in v.warnings)
-    return Section("comparison", "Models along the flight", (*told, _lines(flown), table))
+    table = Table(
+        "Fit [%]: 100 (1 - rms error / rms of the flight about its mean)", ("output", *comparison.found), rows
+    )
+    warnings = tuple(Text(f"{n}: {t}", tone="caution") for n, v in comparison.found.items() for t in v.warnings)
+    return Section("comparison", "Models along the flight", (*warnings, _lines(comparison), table))
 
 
-def _lines(flown: ModelComparison) -> Figure:
+def _lines(comparison: ModelComparison) -> Figure:
     """Inputs, then flight and models of every output."""
-    first = next(iter(flown.found.values()))
-    names = list(flown.fits())
+    first = next(iter(comparison.found.values()))
+    names = list(comparison.fits())
     units = first.units
     titles = [quantity(n, channel(n).shown_unit or units.get(n, "")) for n in names]
     layout = stacked([inputs_title(first.inputs, units), *titles], height=112)
@@ -58,26 +60,26 @@ def _lines(flown: ModelComparison) -> Figure:
         keys.append(Key(name, color))
     for number, name in enumerate(names, start=2):
         measured = False
-        for (who, v), (color, dash) in zip(flown.found.items(), _STYLES * len(flown.found), strict=False):
+        for (who, v), (color, dash) in zip(comparison.found.items(), _STYLES * len(comparison.found), strict=False):
             if all(o.output != name for o in v.outputs):
                 continue
             k = [o.output for o in v.outputs].index(name)
             rows = [("flight", FLIGHT, "solid", [(t.time, t.flight[:, k]) for t in v.traces])] if not measured else []
             rows.append((who, color, dash, [(t.time, t.model[:, k]) for t in v.traces]))
             measured = True
-            for words, ink, style, pieces in rows:
+            for label, ink, style, pieces in rows:
                 time, values = joined(pieces)
                 places, values = kept(values), shown(name, values)
-                traces.append(line(time[places], values[places], name=words, color=ink, dash=style, axis=str(number)))
-    told = zip(flown.found, _STYLES * len(flown.found), strict=False)
-    keys += [Key(f"{who} ({_mean_fit(flown.found[who]):.0f} %)", color, dash) for who, (color, dash) in told]
+                traces.append(line(time[places], values[places], name=label, color=ink, dash=style, axis=str(number)))
+    styled = zip(comparison.found, _STYLES * len(comparison.found), strict=False)
+    keys += [Key(f"{who} ({_mean_fit(comparison.found[who]):.0f} %)", color, dash) for who, (color, dash) in styled]
     return Figure(
         "models",
         {"data": traces, "layout": layout},
         int(layout["height"]),
         "Flight and models along the recorded inputs; in brackets the mean fit over the outputs. Biases and start "
         "states are solved for.",
-        f"{', '.join(names)} of the flight and of {', '.join(flown.found)} over time.",
+        f"{', '.join(names)} of the flight and of {', '.join(comparison.found)} over time.",
         keys=tuple(keys),
     )
 

@@ -84,12 +84,12 @@ def over_time(
                 if name not in flight:
                     continue
                 color = _COLORS[(j if single else k) % len(_COLORS)]
-                words = name if single else label(flight, k)
+                legend = name if single else label(flight, k)
                 if not single:
-                    keys[words] = Key(words, color)
+                    keys[legend] = Key(legend, color)
                 time, values = _line(flight, name)
                 offset = shifts[k] if shifts else 0.0
-                traces.append(line(time + offset, values, name=words, color=color, axis=_number(i)))
+                traces.append(line(time + offset, values, name=legend, color=color, axis=_number(i)))
     if notes:
         layout["margin"] = {**layout["margin"], "r": 12 + 7 * max(len(note["text"]) for note in notes)}
     return Figure(
@@ -191,7 +191,7 @@ def of_spectra(panels: Sequence[Mapping[str, spectra.Spectrum]], names: Sequence
         names: of all flights, in the order of their colours.
     """
     drawn = [next(iter(panel.values())) for panel in panels]
-    told = [f"{name}: {curve}" if len(names) > 1 else str(curve) for panel in panels for name, curve in panel.items()]
+    lines = [f"{name}: {curve}" if len(names) > 1 else str(curve) for panel in panels for name, curve in panel.items()]
     titles = [f"{one.channel} [({unit_words(one.unit) or '1'})²/Hz]" for one in drawn]
     layout = over_frequency(titles, height=_PANEL + 20, unit="Hz")
     colors = {name: _COLORS[k % len(_COLORS)] for k, name in enumerate(names)}
@@ -207,7 +207,7 @@ def of_spectra(panels: Sequence[Mapping[str, spectra.Spectrum]], names: Sequence
         {"data": traces, "layout": layout},
         int(layout["height"]),
         "Power spectral density, one-sided, after Welch; of a log with gaps its longest unbroken piece.",
-        f"Power spectra of {', '.join(one.channel for one in drawn)}. {'; '.join(told)}.",
+        f"Power spectra of {', '.join(one.channel for one in drawn)}. {'; '.join(lines)}.",
         keys=tuple(Key(name, color) for name, color in colors.items()) if len(names) > 1 else (),
     )
 

@@ -19,9 +19,9 @@ def section_of_trims(curve: TrimCurve) -> Section:
     """Controls over speed, and the trims as a table."""
     columns = curve.columns()
     rows = tuple(tuple(Cell(f"{v:.3f}", number=True) for v in row) for row in zip(*columns.values(), strict=True))
-    told: tuple[Block, ...] = tuple(Text(text, tone="caution") for text in curve.remarks)
+    remarks: tuple[Block, ...] = tuple(Text(text, tone="caution") for text in curve.remarks)
     title = f"Trims of {curve.vehicle.card.title}"
-    return Section("trims", title, (*told, controls(curve), Table("Trims", tuple(columns), rows)))
+    return Section("trims", title, (*remarks, controls(curve), Table("Trims", tuple(columns), rows)))
 
 
 def section_of_derivatives(derivatives: Derivatives, row: str = "M") -> Section:

@@ -105,8 +105,8 @@ def section_of_harmonics(harmonics: Harmonics) -> Section:
     """The channel's spectrum with the multiples of the rotor's speed marked, and the notches."""
     drawn = of_spectra([{harmonics.spectrum.channel: harmonics.spectrum}], [harmonics.spectrum.channel])
     density = harmonics.spectrum.density[1:]
-    seen = density[density > 0.0]
-    ends = [float(np.min(seen)), float(np.max(seen))] if seen.size else [1.0, 10.0]
+    positive = density[density > 0.0]
+    ends = [float(np.min(positive)), float(np.max(positive))] if positive.size else [1.0, 10.0]
     marks = [
         line([h.frequency, h.frequency], ends, name=f"{h.number} x", color=VERMILION, dash="dot", width=1.0)
         for h in harmonics.harmonics
@@ -144,10 +144,10 @@ def section_of_steps(steps: RateSteps) -> Section:
         line(steps.time, steps.disturbance, name="disturbance", color=BLUE, axis="2"),
     ]
     verdict = "Stable" if steps.stable else "UNSTABLE: do not fly these gains"
-    words = f"{verdict}; overshoot {100.0 * steps.overshoot:.0f} %, settles at {steps.settled:.3g}."
+    summary = f"{verdict}; overshoot {100.0 * steps.overshoot:.0f} %, settles at {steps.settled:.3g}."
     alt = "The rate over time, after a step of the target and after a disturbance of 0.1 of the command."
-    figure = Figure("steps", {"data": traces, "layout": layout}, int(layout["height"]), words, alt)
-    return Section("steps", "Steps of a rate loop", (figure, Text(words, tone="plain" if steps.stable else "bad")))
+    figure = Figure("steps", {"data": traces, "layout": layout}, int(layout["height"]), summary, alt)
+    return Section("steps", "Steps of a rate loop", (figure, Text(summary, tone="plain" if steps.stable else "bad")))
 
 
 # ---- autopilots ------------------------------------------------------------------------------------------------
@@ -190,6 +190,6 @@ def plain_page(
     title: str, *, summary: Mapping[str, str], sections: Sequence[Section] = (), problems: Sequence[str] = ()
 ) -> Report:
     """The page of a result of one verb: what is wrong first, then its numbers, then its figures."""
-    made = f"swashplate {versions()['swashplate']}, {date()}"
-    lines = tuple((name, words, "plain") for name, words in summary.items())
-    return Report(title, tuple(("bad", text) for text in problems), lines, None, tuple(sections), made)
+    version = f"swashplate {versions()['swashplate']}, {date()}"
+    lines = tuple((name, value, "plain") for name, value in summary.items())
+    return Report(title, tuple(("bad", text) for text in problems), lines, None, tuple(sections), version)

@@ -77,20 +77,20 @@ def still(figures: Sequence[Figure], *, theme: str = "paper", frequency: str = "
     scale = 0.9 if look == "paper" else 1.0
     width = max(_WIDTH[look], *(_PX * figure.min_width * scale for figure in figures)) if figures else _WIDTH[look]
     with mpl.rc_context(style):
-        made: Still = made_by.Figure(
+        drawing: Still = made_by.Figure(
             figsize=(width, scale * sum(shares) + sum(legends)), layout="constrained", facecolor=ground
         )
         heights = np.add(shares, legends)
         apart = len(shares) > 1 or (bool(title) and look != "paper")  # a title and a legend share no place
-        parts: Sequence[Any] = (made,)
+        parts: Sequence[Any] = (drawing,)
         if apart:
-            parts = list(made.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0])
+            parts = list(drawing.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0])
         for part, figure in zip(parts, figures, strict=True):
             part.set_facecolor(ground)
             _Sheet(part, coloured(in_unit(figure.spec, frequency), look), look).draw(figure.keys)
         if title and look != "paper":
-            made.suptitle(title, fontsize=size + 2, x=0.01, ha="left")
-    return made
+            drawing.suptitle(title, fontsize=size + 2, x=0.01, ha="left")
+    return drawing
 
 
 class _Sheet:
@@ -170,7 +170,7 @@ class _Sheet:
         """Markers whose colour is a number."""
         area, scale = (0.75 * marker.get("size", 6)) ** 2, str(marker.get("colorscale", "Viridis")).lower()
         drawn = panel.scatter(x, y, c=unpacked(marker["color"]), s=area, cmap=scale, zorder=3)
-        label = _plain(marker.get("colorbar", {}).get("title", {}).get("text", ""))
+        label = _without_markup(marker.get("colorbar", {}).get("title", {}).get("text", ""))
         self.part.colorbar(drawn, ax=panel, label=label, fraction=0.05, pad=0.02)
 
     def _bars(self, panel: Any, trace: Mapping[str, Any]) -> None:
@@ -203,7 +203,7 @@ class _Sheet:
             x, y = unpacked(trace["x"]), unpacked(trace["y"])
             drawn = panel.pcolormesh(x, y, z, cmap=colors, shading="nearest", rasterized=True, **limits)
         bar = trace.get("colorbar", {})
-        label = _plain(bar.get("title", {}).get("text", ""))
+        label = _without_markup(bar.get("title", {}).get("text", ""))
         self.part.colorbar(drawn, ax=panel, label=label, ticks=bar.get("tickvals"), fraction=0.05, pad=0.02)
 
     # ---- around it ---------------------------------------------------------------------------------------------
@@ -233,7 +233,7 @@ class _Sheet:
             its.set_ticks(range(len(axis["categoryarray"])), labels=axis["categoryarray"])
         elif not pictured:
             its.set_major_locator(MaxNLocator(nbins=axis.get("nticks", 6), steps=[1, 2, 2.5, 5, 10]))
-        label = _plain(axis.get("title", {}).get("text", ""))
+        label = _without_markup(axis.get("title", {}).get("text", ""))
         if label:
             (panel.set_xlabel if side == "x" else panel.set_ylabel)(label)
         if axis.get("showticklabels") is False:
@@ -255,19 +255,19 @@ class _Sheet:
     def _texts(self) -> None:
         """Headings of panels, and what is written within them."""
         for note in self.layout.get("annotations", ()):
-            words = _plain(note["text"])
+            text = _without_markup(note["text"])
             if note.get("xref") == "paper":
                 panel = self._below(note["x"], note["y"])
                 if panel is not None:
-                    panel.set_title(words, loc="left", fontweight="bold")
+                    panel.set_title(text, loc="left", fontweight="bold")
                 continue
             panel = self.panels[str(note.get("yref", "y")).split(" ")[0][1:]]
             if str(note.get("xref", "")).endswith(" domain"):
                 ink = note["font"].get("color")
                 where = {"transform": panel.transAxes, "ha": "left", "va": "top", "fontsize": "small", "color": ink}
-                panel.text(note["x"], note["y"], words, **where)
+                panel.text(note["x"], note["y"], text, **where)
                 continue
-            panel.text(note["x"], note["y"], words, ha="center", va="center", fontsize=7)
+            panel.text(note["x"], note["y"], text, ha="center", va="center", fontsize=7)
 
     def _below(self, x: float, y: float) -> Any:
         """The panel whose upper left corner is there."""
@@ -284,8 +284,8 @@ def _across(count: int) -> int:
     return count if count <= 4 else -(-count // (-(-count // 4)))
 
 
-def _plain(words: str) -> str:
-    return _TAG.sub("", words.replace("<br>", " ")).replace("$", r"\$")
+def _without_markup(text: str) -> str:
+    return _TAG.sub("", text.replace("<br>", " ")).replace("$", r"\$")
 
 
 def _rgba(color: str | None) -> Any:

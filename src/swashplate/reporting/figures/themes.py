@@ -94,14 +94,14 @@ def in_unit(spec: Mapping[str, Any], frequency: str) -> Mapping[str, Any]:
     """
     if frequency not in get_args(Frequency):
         raise SwashError(f"is '{frequency}', expected Hz or rad/s.", channel="frequency")
-    own = spec["layout"].get("meta", {}).get("frequency")
-    if own is None or own == frequency:
+    unit_of_figure = spec["layout"].get("meta", {}).get("frequency")
+    if unit_of_figure is None or unit_of_figure == frequency:
         return spec
     factor = _HERTZ if frequency == "rad/s" else 1.0 / _HERTZ
 
     def swapped(value: Any) -> Any:
         if isinstance(value, str):
-            return value.replace(own, frequency)
+            return value.replace(unit_of_figure, frequency)
         if isinstance(value, Mapping):
             return {key: swapped(entry) for key, entry in value.items()}
         return [swapped(entry) for entry in value] if isinstance(value, list | tuple) else value
@@ -116,8 +116,8 @@ def in_unit(spec: Mapping[str, Any], frequency: str) -> Mapping[str, Any]:
     for key, entry in spec["layout"].items():
         if not key.startswith("xaxis"):
             continue
-        moved = {"title": swapped(entry["title"])} if "title" in entry else {}
+        changes = {"title": swapped(entry["title"])} if "title" in entry else {}
         if "range" in entry and entry.get("type") == "log":
-            moved["range"] = [float(end + np.log10(factor)) for end in entry["range"]]
-        layout[key] = {**entry, **moved}
+            changes["range"] = [float(end + np.log10(factor)) for end in entry["range"]]
+        layout[key] = {**entry, **changes}
     return {"data": data, "layout": layout}

@@ -38,8 +38,8 @@ def section_of(shown: Any) -> Section:
     Raises:
         SwashError: an object that shows nothing.
     """
-    if (own := own_section(shown)) is not None:
-        return own
+    if (section := own_section(shown)) is not None:
+        return section
     return _of_report(structure_of(shown, modes={}) if _has_modes(shown) else structure_of(shown), shown)
 
 
@@ -55,20 +55,22 @@ def _has_modes(shown: Any) -> bool:
 
 def _of_report(page: Report, shown: Any) -> Section:
     """The figures of an object's report, and its words."""
-    words = tuple(Text(text, tone=tone) for tone, text in page.banners)
+    banners = tuple(Text(text, tone=tone) for tone, text in page.banners)
     picture = (page.picture,) if page.picture else ()
     rest = tuple(block for section in page.sections for block in section.blocks if isinstance(block, Figure))
     if isinstance(shown, Result) and shown.targets:
         rest = tuple(sorted(rest, key=lambda figure: figure.identifier != "fitted-responses"))
     if isinstance(shown, Result):
-        told = (*shown.problems, *shown.warnings)
+        warnings = (*shown.problems, *shown.warnings)
         columns = [(head, cells) for head, cells in shown.columns() if any(cells)]
         rows = tuple(tuple(Cell(cell) for cell in row) for row in zip(*(cells for _, cells in columns), strict=True))
         estimates = Table("Estimates", tuple(head for head, _ in columns), rows)
         title = f"{shown.name} by {shown.method}: {shown.state}"
-        return Section("result", title, (*(Text(text, tone="caution") for text in told), *picture, *rest, estimates))
+        return Section(
+            "result", title, (*(Text(text, tone="caution") for text in warnings), *picture, *rest, estimates)
+        )
     summary = Table("Summary", ("", ""), tuple((Cell(label), Cell(text)) for label, text, _ in page.summary))
-    return Section("shown", page.title, (*words, *picture, *rest, summary))
+    return Section("shown", page.title, (*banners, *picture, *rest, summary))
 
 
 def section_of_responses(responses: FrequencyResponse) -> Section:
@@ -79,10 +81,10 @@ def section_of_responses(responses: FrequencyResponse) -> Section:
             band = responses.band(output, name)
             ends = "none" if band is None else f"{band[0] / TWO_PI:.3g} - {band[1] / TWO_PI:.3g}"
             rows.append((Cell(f"{output} / {name}"), Cell(ends)))
-    told = tuple(Text(text, tone="caution") for text in (*responses.problems, *responses.warnings))
+    warnings = tuple(Text(text, tone="caution") for text in (*responses.problems, *responses.warnings))
     table = Table("Where they may be used", ("output / input", "coherent band [Hz]"), tuple(rows))
     title = f"Frequency responses ({responses.method}): {responses.omega.size} lines"
-    return Section("responses", title, (*told, bode_matrix.of_responses(responses), table))
+    return Section("responses", title, (*warnings, bode_matrix.of_responses(responses), table))
 
 
 # ---- the verbs behind the methods ------------------------------------------------------------------------------
