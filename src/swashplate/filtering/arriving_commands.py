@@ -47,4 +47,4 @@ def commands_by(vehicle: Vehicle, late: Array, names: Sequence[str]) -> Array:
 
 def motors(vehicle: Vehicle) -> list[bool]:
     """Which inputs are motors; the others come by way of servos, with a delay of their own."""
-    return [name.startswith("motor") for name in vehicle.input_names]
+    return [name in vehicle.traits.motors for name in vehicle.input_names]

@@ -202,9 +202,8 @@ class StochasticModel:
 
     @property
     def unexcited(self) -> Array:
-        """A little variance per sample on states that no disturbance reaches: rotor speeds [rad/s] and angles [rad]."""
-        speeds = [name.startswith("omega") for name in self.vehicle.state_names]
-        return np.where(np.array(speeds), 1e-4, 1e-10)
+        """A little variance per sample on states that no disturbance reaches: rotor speeds [rad/s], and others."""
+        return np.where([role == "rotor speed" for role in self.vehicle.roles], 1e-4, 1e-10)
 
     def sensor_variances(self, noise: Noise) -> Any:
         """Variances of the measured channels."""

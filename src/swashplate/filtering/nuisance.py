@@ -38,6 +38,9 @@ class Nuisance(NamedTuple):
     push_r: Any = 0.0
 
 
+DELAYS = ("delay_servo", "delay_motor")
+"""Times: no motion comes before its command, and a cost has a kink where one is a whole number of samples."""
+
 PUSHES = tuple(f"push_{name}" for name in DISTURBED)
 """In the order of the disturbances."""
 

@@ -165,11 +165,8 @@ def process_noise(plan: ObserverPlan, unrest: Unrest) -> tuple[Array, Array]:
     fade = 1.0 / np.array(on_axes(u.force_time, u.force_time, u.moment_time, u.moment_time))
     vehicle = plan.equations.vehicle
     white = {**dict.fromkeys("uvw", u.jolt), **dict.fromkeys("pq", u.twist), "r": u.twist_yaw}
-    white |= dict.fromkeys(("alpha_lower", "beta_lower", "a1", "b1", "a", "b"), u.flapping)
-    white |= dict.fromkeys(("eta_bar", "zeta_bar", "c", "d"), u.bar)
-    white |= dict.fromkeys(("omega_lower", "omega_upper", "omega"), u.speed)
-    inner = vehicle.state_names[_BODY:]
-    states = [white.get(name, u.other if name in inner else 0.0) ** 2 * dt for name in vehicle.state_names]
+    inner = {"body": 0.0, "flapping": u.flapping, "bar": u.bar, "rotor speed": u.speed, "other": u.other}
+    states = [white.get(n, inner[role]) ** 2 * dt for n, role in zip(vehicle.state_names, vehicle.roles, strict=True)]
     spread = u.spread**2 * (1.0 - np.exp(-2.0 * fade * dt))
     wander = [BIASED[name][1] ** 2 * dt for name in plan.biases]
     late = len(plan.names) - plan.moves - len(wander)
@@ -183,9 +180,9 @@ def measurement_noise(plan: ObserverPlan) -> Array:
 
 def start_variance(plan: ObserverPlan, unrest: Unrest) -> Array:
     """Variances before the first reading, of states, disturbances, slow parameters (none) and biases."""
-    units = dict(zip(plan.equations.vehicle.state_names, plan.equations.vehicle.state_units, strict=True))
+    states = zip(plan.equations.vehicle.roles, plan.equations.vehicle.state_units, strict=True)
     usual = {"m": 0.05, "m/s": 0.05, "rad": 0.01, "rad/s": 0.02}
-    first = [4.0 if name.startswith("omega") else usual.get(unit, 0.01) ** 2 for name, unit in units.items()]
+    first = [4.0 if role == "rotor speed" else usual.get(unit, 0.01) ** 2 for role, unit in states]
     spread = unrest.spread**2
     return np.array([*first, *spread, *[0.0] * len(plan.slow), *(BIASED[name][0] ** 2 for name in plan.biases)])
 

@@ -162,6 +162,11 @@ _AXES = (
 )
 TRAITS = Traits(
     axes=_AXES,
+    roles={
+        **dict.fromkeys(("alpha_lower", "beta_lower"), "flapping"),
+        **dict.fromkeys(("eta_bar", "zeta_bar"), "bar"),
+    },
+    motors=("motor_lower", "motor_upper"),
     coaxial=True,
     observed=True,
     published="coax",

@@ -47,7 +47,7 @@ def input_delays(vehicle: Vehicle) -> dict[str, float]:
     known = vehicle.card.observer.get(SECTION)
     if known is None:
         told = vehicle.card.observer.get("nuisance", {})
-        names = {i: "delay_motor" if i.startswith("motor") else "delay_servo" for i in vehicle.input_names}
+        names = {i: "delay_motor" if i in vehicle.traits.motors else "delay_servo" for i in vehicle.input_names}
         known = {i: told.get(name, 0.0) for i, name in names.items()} if told.keys() & set(names.values()) else {}
     return {name: max(0.0, float(value)) for name, value in known.items()}
 

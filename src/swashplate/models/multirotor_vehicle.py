@@ -333,6 +333,7 @@ def multirotor(card: Card) -> Vehicle:
         specific_force=partial(specific_force, senses=senses),
         traits=Traits(
             axes=axes(par, senses, warming=warming),
+            motors=inputs._fields,
             observed=True,
             gyroscope=True,
             no_link="a multirotor's motors have no servo mapping; ArduPilot's and PX4's own multirotor simulators "

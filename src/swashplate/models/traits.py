@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from swashplate.arrays import Array
 from swashplate.models.card import Card
@@ -24,6 +24,10 @@ Pose = Callable[[Sequence[float], Sequence[float], Environment], dict[str, Any]]
 Doubts = Callable[[Model, Array, Array, Environment], Mapping[str, str]]
 Hover = Callable[[Any, Scalar, Backend], tuple[Mapping[str, Scalar], Sequence[Scalar]]]
 Settled = Callable[[Any, Any, Scalar, Any, Scalar], Mapping[str, Scalar]]
+
+
+Role = Literal["body", "flapping", "bar", "rotor speed", "other"]
+"""What a state is: of the rigid body, a rotor's tilt, a stabilizer bar's, a speed at which something turns, or else."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,9 @@ class Traits:
 
     Attributes:
         axes: that it is flown in, with their inputs: whether a flight moves each by itself is judged in these.
+        roles: what its inner states are, by name. One that is not named is a rotor's speed where its unit is rad/s,
+            else "other".
+        motors: inputs that are a motor's command, late by another time than a servo's.
         linear: it holds near one trim only: small angles, deviations, input ranges that are often assumed.
         remark: what whoever flies it must know, in a line; "" for nothing.
         about: the same at length.
@@ -99,6 +106,8 @@ class Traits:
     """
 
     axes: tuple[Axis, ...] = ()
+    roles: Mapping[str, Role] = field(default_factory=dict)
+    motors: tuple[str, ...] = ()
     linear: bool = False
     remark: str = ""
     about: str = ""

@@ -15,10 +15,11 @@ from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.surroundings import environment_of
-from swashplate.models.traits import Traits
+from swashplate.models.traits import Role, Traits
 from swashplate.models.usual_axes import usual_axes
 from swashplate.physics.backend import Backend, FloatBackend
 from swashplate.physics.environment import Environment
+from swashplate.physics.rigid_body import RigidBody
 from swashplate.public import resolve
 
 _FLOATS = FloatBackend()
@@ -69,6 +70,18 @@ class Vehicle:
     def called(self) -> str:
         """What a reader should see: its equations' name, or its own title where many models share such a name."""
         return self.card.title if self.traits.linear else self.name
+
+    @property
+    def roles(self) -> tuple[Role, ...]:
+        """What each state is, in their order: as declared, else by its unit (`Traits.roles`)."""
+        known: dict[str, Role] = {**dict.fromkeys(RigidBody._fields, "body"), **self.traits.roles}
+        by_unit: list[Role] = ["rotor speed" if unit == "rad/s" else "other" for unit in self.state_units]
+        return tuple(known.get(name, usual) for name, usual in zip(self.state_names, by_unit, strict=True))
+
+    @property
+    def rotor_speeds(self) -> tuple[str, ...]:
+        """States that are speeds at which something turns."""
+        return tuple(name for name, role in zip(self.state_names, self.roles, strict=True) if role == "rotor speed")
 
     @property
     def stick_axes(self) -> Mapping[str, Mapping[str, float]]:

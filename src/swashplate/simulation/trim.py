@@ -56,6 +56,7 @@ class Trim:
         speed, lateral, climb: velocity ahead, to the right (both level, in the direction of heading) and up [m/s].
         residual: the largest rate of change left [SI units].
         turn: rate of turn to the right [rad/s].
+        battery: whether the voltage is in the equations.
     """
 
     state: Array
@@ -68,6 +69,7 @@ class Trim:
     climb: float
     residual: float
     turn: float = 0.0
+    battery: bool = False
 
     def states(self) -> dict[str, float]:
         """The states by name."""
@@ -81,7 +83,7 @@ class Trim:
         head = f"Trim at {self.speed:g} m/s ahead, {self.lateral:g} m/s right, {self.climb:g} m/s up, "
         head += f"turning {np.degrees(self.turn):g} deg/s, " if self.turn else ""
         head += f"in air of {float(self.environment.air_density):.4g} kg/m^3"
-        if any(name.startswith("motor") for name in self.input_names):
+        if self.battery:
             head += f", {float(self.environment.voltage):g} V"
         head += f" (residual {self.residual:.1e})"
         lines = [
@@ -201,9 +203,8 @@ def trim(
             hint=_near_there(vehicle, state, inputs, surroundings) + "Ask for a slower flight, or check the card.",
         )
     _check_limits(vehicle, inputs, where)
-    return Trim(
-        state, inputs, vehicle.state_names, vehicle.input_names, surroundings, speed, lateral, climb, largest, turn
-    )
+    names, battery = (vehicle.state_names, vehicle.input_names), "voltage_nominal" in vehicle.card.parameters
+    return Trim(state, inputs, *names, surroundings, speed, lateral, climb, largest, turn, battery)
 
 
 def _near_there(vehicle: Vehicle, state: Array, inputs: Array, surroundings: Environment) -> str:

@@ -243,9 +243,7 @@ def validate(
         laws=tuple(laws),
         bands=judged_bands,
         not_logged=tuple(
-            name
-            for name in (*(s for s in vehicle.state_names if s.startswith("omega")), "voltage")
-            if any(name not in flight for flight in flights)
+            name for name in (*vehicle.rotor_speeds, "voltage") if any(name not in flight for flight in flights)
         ),
     )
 

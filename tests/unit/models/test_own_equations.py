@@ -83,7 +83,7 @@ def test_it_is_saved_with_other_numbers_and_loaded_again(fan: sp.Vehicle, tmp_pa
 
 def test_a_fit_finds_its_numbers(fan: sp.Vehicle, held: Flight, tmp_path: Path) -> None:
     truth, inputs = fan.with_values(TRUTH), {name: held.values(name) for name in fan.input_names}
-    flight = measured(sp.simulate(truth, inputs, start=sp.trim(truth), rate=50.0, interpolation="linear"))
+    flight = measured(sp.simulate(truth, inputs, start=sp.trim(truth), rate=50.0))
     seen = ("x", "y", "z", "phi", "theta", "psi", "p", "q", "r")
     fit = sp.identify(fan, flight, free=list(TRUTH), outputs=seen)
     assert fit.converged

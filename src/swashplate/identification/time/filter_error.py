@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import DELAYS, Nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
@@ -101,8 +101,8 @@ class FilterError:
         for number in range(len(self.logs)):
             for name, (usual, scale, sigma) in nuisances.items():
                 start = usual if nuisance is None else float(getattr(nuisance, name))
-                low = 0.0 if name.startswith("delay") else -np.inf
-                kinked = name.startswith("delay")
+                low = 0.0 if name in DELAYS else -np.inf
+                kinked = name in DELAYS
                 entries.append(
                     Entry(f"{name}[{number}]", "nuisance", start, scale, low, mean=start, sigma=sigma, kinked=kinked)
                 )

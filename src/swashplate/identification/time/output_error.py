@@ -15,7 +15,7 @@ from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import DELAYS, Nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row
@@ -50,12 +50,10 @@ _INITIAL = {
     # state: scale, prior sigma of its correction; pose and velocities are free, hidden states stay near their guess
     **dict.fromkeys(("x", "y", "z", "phi", "theta", "psi"), (0.01, 1.0)),
     **dict.fromkeys(("u", "v", "w", "p", "q", "r"), (0.1, 10.0)),
-    **dict.fromkeys(("alpha_lower", "beta_lower"), (0.02, 0.2)),
-    **dict.fromkeys(("eta_bar", "zeta_bar"), (0.02, 0.5)),
-    **dict.fromkeys(("omega_lower", "omega_upper"), (2.0, 10.0)),
 }
+_INNER = {"flapping": (0.02, 0.2), "bar": (0.02, 0.5), "rotor speed": (2.0, 10.0)}
 _HIDDEN = (0.02, 0.1)
-"""The same for inner states that have no entry: flapping, stabilizer bar."""
+"""The same for inner states by their role, and for others."""
 
 _DRIFTING = {"trim_motor_lower": (0.002, 0.002), "trim_motor_upper": (0.002, 0.002)}
 """Scale and prior sigma of what moves slowly between windows: with the battery, by the error of its voltage.
@@ -102,15 +100,17 @@ class OutputError:
         absent -= {f"trim_{name}" for name in table.vehicle.input_names}
         self.nuisances = tuple(name for name in self.nuisances if name not in absent)
         drifting = tuple(name for name in _DRIFTING if name in self.nuisances)
-        spread = {**_INITIAL, **_DRIFTING}
-        self._own = {name: spread.get(name, _HIDDEN) for name in (*table.vehicle.state_names, *drifting)}
+        vehicle, states = table.vehicle, {}
+        for name, role in zip(vehicle.state_names, vehicle.roles, strict=True):
+            states[name] = _INITIAL.get(name) or _INNER.get(role, _HIDDEN)
+        self._own = states | {name: _DRIFTING[name] for name in drifting}
         self.logs, self._log = logs(pieces)
         entries = parameter_entries(table)
         for number in range(len(self.logs)):
             for name in self.nuisances:
                 scale, sigma = _NUISANCE[name]
-                low = -0.02 if name.startswith("delay") else -np.inf
-                kinked = name.startswith("delay")
+                low = -0.02 if name in DELAYS else -np.inf
+                kinked = name in DELAYS
                 entries.append(Entry(f"{name}[{number}]", "nuisance", 0.0, scale, low, sigma=sigma, kinked=kinked))
         self._shared = len(entries)
         for place in range(len(self._places)):

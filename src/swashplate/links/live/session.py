@@ -376,7 +376,7 @@ def _told(job: Job) -> list[Any]:
 
 
 def _has_bar(vehicle: Vehicle) -> bool:
-    return getattr(vehicle.state, "bar", None) is not None
+    return "bar" in vehicle.traits.switches and "bar" in vehicle.roles
 
 
 def _voltages(nominal: float) -> list[float]:

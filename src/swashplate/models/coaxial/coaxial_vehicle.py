@@ -120,6 +120,7 @@ _EFFECTS = (
 )
 TRAITS = Traits(
     axes=_AXES,
+    roles=dict.fromkeys((f"{tilt}_{side}" for side in ("upper", "lower") for tilt in ("a1", "b1")), "flapping"),
     servo_layout="two swashplates",
     standing={"ground": True, "grip": True, "rotor_speed": "throttle"},
     effects=lambda card: _EFFECTS,
@@ -129,7 +130,11 @@ TRAITS = Traits(
     doubts=doubts,
     power=power,
 )
-LATE = replace(TRAITS, delayed_by="servo_delay")
+
+
+def _late(states: tuple[str, ...]) -> Traits:
+    """With delayed commands, which these states carry."""
+    return replace(TRAITS, delayed_by="servo_delay", roles={**TRAITS.roles, **dict.fromkeys(states, "other")})
 
 
 @lru_cache(maxsize=16)
@@ -207,6 +212,6 @@ def coaxial(card: Card) -> Vehicle:
         derivatives=partial(derivatives, options=options),
         specific_force=partial(specific_force, options=options),
         trim_held=held,
-        traits=LATE if switches.delay else TRAITS,
+        traits=TRAITS if state.delays is None else _late(state.delays._fields),
         options=options,
     )

@@ -91,6 +91,11 @@ _AXES = (
 )
 TRAITS = Traits(
     axes=_AXES,
+    roles={
+        **dict.fromkeys(Flapping._fields, "flapping"),
+        **dict.fromkeys(Bar._fields, "bar"),
+        **dict.fromkeys((*YawGyro._fields, *Delays._fields), "other"),
+    },
     rotorcraft=True,
     servo_layout="swashplate",
     standing={"ground": True, "grip": True, "rotor_speed": "throttle"},

@@ -33,6 +33,10 @@ _OPTIONS = ("states", "state_units", "inputs", "input_units", "low", "high")
 SIZE = "rotor_radius"
 """Option that a card may have: how large it is drawn [m]."""
 TRAITS = Traits(
+    roles={
+        **dict.fromkeys(("a", "b", "a1", "b1", "alpha_lower", "beta_lower"), "flapping"),
+        **dict.fromkeys(("c", "d", "eta_bar", "zeta_bar"), "bar"),
+    },
     linear=True,
     remark="A linear model: deviations from one trim, without ground, wind or battery.",
     about="A linear model: deviations from one trim, trusted near it only. It has no ground, wind or battery; its "
