@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from collections.abc import Callable
@@ -10,11 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import one_message, swash
+from commands import one_message, swash, swash_process
 from scipy.io import savemat
 
 from made_logs import coax_record, dimensions, write_coax
 from simulated_flights import FREE, TIE
+from swashplate.compiler import compiler
 from swashplate.flights.flight import Flight
 from swashplate.models.card import packaged_cards
 
@@ -368,3 +370,24 @@ def test_what_was_typed_is_judged_before_what_was_not(line: str, named: str) -> 
     done = swash(*line.split())
     assert done.code == 2
     assert named in done.err
+
+
+def test_a_compiler_that_refuses_a_filter_makes_one_message(simulated: Path, tmp_path: Path) -> None:
+    """It answers well when it is tried, and not when it counts."""
+    there = compiler()
+    if there is None:
+        pytest.skip("there is no C compiler")
+    script = f"""#!/bin/sh
+for each in "$@"; do
+  case "$each" in *.c) if grep -q run_along "$each"; then echo "error: not today" >&2; exit 1; fi;; esac
+done
+exec {" ".join(there)} "$@"
+"""
+    (tmp_path / "cc").write_text(script)
+    (tmp_path / "cc").chmod(0o755)
+    path, out = f"{tmp_path}{os.pathsep}{os.environ['PATH']}", tmp_path / "out"
+    asked = ("--vehicle", "coax", "--flight", simulated, "--free", "flight", "--quiet", "--out", out)
+    message = one_message(swash_process("identify", *asked, PATH=path))
+    assert "refused" in message
+    assert "not today" in message
+    assert not out.exists()

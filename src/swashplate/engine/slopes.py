@@ -11,7 +11,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.engine.equations import Equations, unpack_rows
 from swashplate.engine.roots import Looping, require_casadi
-from swashplate.errors import ExportError
+from swashplate.engine.untraced import untraced
 from swashplate.physics.backend import Backend, CasadiBackend, newton
 
 Scalars = Callable[[Sequence[Any], Sequence[Any], Sequence[Any], Backend], Sequence[Any]]
@@ -47,7 +47,7 @@ def slopes_of(f: Scalars, sizes: tuple[int, int, int], *, where: str) -> Slopes:
     try:
         values, slopes = with_slopes(f, *given)
     except Exception as error:  # whatever a model of another package does with numbers that are none
-        raise ExportError(f"CasADi cannot trace the equations: {error}", where=where) from error
+        raise untraced(error, "equations", where) from error
     graph = casadi.Function("slopes", given, [casadi.densify(values), casadi.densify(slopes)], {"cse": True})
 
     def at(x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from swashplate.engine.equations import Equations, unpack_rows
 from swashplate.engine.roots import Looped, Looping, require_casadi
-from swashplate.errors import ExportError
+from swashplate.engine.untraced import untraced
 from swashplate.models.nesting import rebuild
 from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.frames import Euler
@@ -28,19 +28,22 @@ def traced_rates(equations: Equations) -> Looped:
     try:
         return looping.looped([x, w, p], [casadi.vertcat(*vehicle.rates(x, *unpack_rows(equations, w, p), looping))])
     except Exception as error:  # whatever a model of another package does with numbers that are none
-        raise ExportError(f"CasADi cannot trace the equations: {error}", where=vehicle.name) from error
+        raise untraced(error, "equations", vehicle.name) from error
 
 
 def traced_force(equations: Equations) -> Any:
-    """The specific force [m/s^2] as a CasADi function of (x, w, p); rows as in `traced_rates`."""
+    """The specific force [m/s^2] as a CasADi function of (x, w, p); rows and errors as in `traced_rates`."""
     casadi, vehicle = require_casadi(), equations.vehicle
     sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
     x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
     u, parameters, environment = unpack_rows(equations, w, p)
     state = rebuild(vehicle.state, [x[i] for i in range(sizes[0])])
     commands = vehicle.inputs(*(u[i] for i in range(len(vehicle.input_names))))
-    felt = vehicle.specific_force(state, commands, parameters, environment, CasadiBackend())
-    return casadi.Function("felt", [x, w, p], [casadi.densify(casadi.vertcat(*felt))], {"cse": True})
+    try:
+        felt = vehicle.specific_force(state, commands, parameters, environment, CasadiBackend())
+        return casadi.Function("felt", [x, w, p], [casadi.densify(casadi.vertcat(*felt))], {"cse": True})
+    except Exception as error:  # as of the rates
+        raise untraced(error, "specific force", vehicle.name) from error
 
 
 def traced_angles() -> Any:
@@ -74,4 +77,4 @@ def unrolled_rates(equations: Equations) -> Any:
         rates = vehicle.rates(x, *unpack_rows(equations, w, p), CasadiBackend())
         return casadi.Function("rates", [x, w, p], [casadi.densify(casadi.vertcat(*rates))], {"cse": True})
     except Exception as error:  # whatever a model of another package does with numbers that are none
-        raise ExportError(f"CasADi cannot trace the equations: {error}", where=vehicle.name) from error
+        raise untraced(error, "equations", vehicle.name) from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
-from swashplate.errors import ExportError
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_c import filter_source
 from swashplate.filtering.filter_code import FilterCode, Fixed, Followed, Following, Pushed, RecordSeries
@@ -132,13 +130,10 @@ def flat(rows: Any) -> Array:
 
 @lru_cache(maxsize=16)
 def filter_code(model: StochasticModel) -> FilterCode:
-    """A model's filter: in C, or by NumPy where there is no compiler, or one that does not compile it.
+    """A model's filter: in C, or by NumPy where there is no compiler.
 
     Raises:
-        ExportError: for equations that CasADi cannot trace.
+        ExportError: for equations that CasADi cannot trace or that are not printed as C, or a compiler that refuses.
         MissingLibraryError: without CasADi.
     """
-    if can_compile():
-        with suppress(ExportError, OSError):  # a compiler that refuses, a library that does not load
-            return FilterLibrary(model)
-    return VirtualFilter(model)
+    return FilterLibrary(model) if can_compile() else VirtualFilter(model)

@@ -24,7 +24,6 @@ from swashplate.engine.equations import Equations
 from swashplate.engine.roots import require_casadi
 from swashplate.engine.template import filled
 from swashplate.engine.trace import traced_force, traced_rates, unrolled_rates
-from swashplate.errors import SwashError
 
 FORCES = ("ax", "ay", "az")
 """Channels of the specific force, in the order in which a vehicle gives it."""
@@ -114,11 +113,8 @@ class VehicleFilter:
 
 @lru_cache(maxsize=16)
 def _library(equations: Equations, seen: tuple[int, ...]) -> Any:
-    """The filter in C, compiled; None where that cannot be had."""
-    try:
-        library = loaded(filter_source(equations, seen), options=_OPTIONS)
-    except (SwashError, OSError):  # no C of these equations, a compiler that refuses, a library that does not load
-        return None
+    """The filter in C, compiled."""
+    library = loaded(filter_source(equations, seen), options=_OPTIONS)
     library.run.argtypes, library.run.restype = _ARGUMENTS, None
     return library
 

@@ -12,7 +12,7 @@ from swashplate.arrays import Array
 from swashplate.engine.law import FELT, REFERENCES, LawGraph, draw_names
 from swashplate.engine.roots import require_casadi
 from swashplate.engine.symbols import SymbolArrays, expressions, symbols
-from swashplate.errors import ExportError
+from swashplate.engine.untraced import untraced
 from swashplate.models.vehicle import Vehicle
 
 Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
@@ -118,6 +118,6 @@ def law_of_step(step: Step, vehicle: Vehicle, memory: int, gains: int, *, drawn:
         after, commands = step(row[:memory], symbols(told), symbols(asked), row[memory:], SymbolArrays())
         results = casadi.vertcat(expressions(after), carried[memory:], expressions(commands))
     except Exception as error:  # whatever a step of another package does with numbers that are none
-        raise ExportError(f"CasADi cannot trace the step: {error}", where=getattr(step, "__name__", "step")) from error
+        raise untraced(error, "step", getattr(step, "__name__", "step")) from error
     function = casadi.Function("swash_traced", [carried, told, asked], [casadi.densify(results)], {"cse": True})
     return LawGraph(function, measured, told_names(vehicle, drawn), memory + gains, drawn, fixed=gains)

@@ -179,5 +179,5 @@ def test_equations_that_cannot_be_traced_are_refused() -> None:
         return rates(state, inputs, parameters, environment, xp)
 
     model: StochasticModel = stochastic_model(replace(vehicle, derivatives=own), POSE, 0.01)
-    with pytest.raises(ExportError, match="cannot trace the equations"):
+    with pytest.raises(ExportError, match=r"trace the equations in line \d+ of test_record_filter\.py, `xp\.arrays"):
         libraries.filter_code(model)
