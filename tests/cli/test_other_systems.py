@@ -4,60 +4,28 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 import swashplate
+from other_machine import hide_posix, started
 from swashplate import systems
 
 SOURCE = Path(swashplate.__file__).parent
-MODULES = ("fcntl", "resource", "termios", "pwd", "grp", "tty", "pty", "syslog")
-SIGNALS = tuple(
-    f"SIG{name}" for name in ("HUP", "XCPU", "XFSZ", "KILL", "ALRM", "CHLD", "USR1", "USR2", "PIPE", "QUIT")
-)
-OF_OS = tuple(
-    """
-    O_NONBLOCK O_NOFOLLOW O_CLOEXEC O_DIRECTORY O_SYNC killpg setpriority PRIO_PROCESS nice geteuid getegid getgid fork
-    forkpty pwrite pread set_blocking mkfifo mknod statvfs chown fchown fchmod setsid getpgid setpgid sched_setaffinity
-    sched_getaffinity sched_setscheduler wait3 wait4 getloadavg
-    """.split()  # noqa: SIM905
-)
-HIDING = f"""
-import asyncio, subprocess, tempfile, shutil, socket, multiprocessing.spawn, concurrent.futures, os, signal, sys
-subprocess.Popen.kill = lambda process: process.poll() is None and os.kill(process.pid, 9)
-for name in {MODULES!r}:
-    sys.modules[name] = None
-for name in {SIGNALS!r}:
-    if hasattr(signal, name):
-        delattr(signal, name)
-for name in {OF_OS!r}:
-    if hasattr(os, name):
-        delattr(os, name)
-"""
-"""`sitecustomize` of every Python process: the standard library is there first, for on Windows it has its own ways."""
 
 
 @pytest.fixture
 def other(tmp_path: Path) -> Path:
     """A folder to work in; on the path of Python is what hides the names."""
-    (tmp_path / "hiding").mkdir()
-    (tmp_path / "hiding" / "sitecustomize.py").write_text(HIDING)
+    hide_posix(tmp_path / "hiding")
     (tmp_path / "here").mkdir()
     return tmp_path / "here"
 
 
 def ran(other: Path, *words: str) -> str:
-    done = subprocess.run(
-        [sys.executable, *words], cwd=other, env={**os.environ, "PYTHONPATH": str(other.parent / "hiding")},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
-    return done.stdout
+    return started({**os.environ, "PYTHONPATH": str(other.parent / "hiding")}, other, *words)
 
 
 def swash(other: Path, *words: str) -> str:

@@ -117,3 +117,24 @@ def test_ziglang_compiles_what_gcc_does(tmp_path: Path, monkeypatch: pytest.Monk
     made = ctypes.CDLL(str(compiler.shared_library([tmp_path / "a.c"], tmp_path / "a.so")))
     made.twice.restype, made.twice.argtypes = ctypes.c_double, [ctypes.c_double]
     assert made.twice(2.5) == 5.0
+
+
+@pytest.mark.proof
+@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="the extra 'compiler' is not installed")
+@pytest.mark.parametrize(("target", "ending"), [("x86_64-windows-gnu", "dll"), ("aarch64-macos", "dylib")])
+def test_what_flies_and_fits_compiles_for_other_systems(target: str, ending: str, tmp_path: Path) -> None:
+    """Nobody runs it there; ziglang brings the headers and libraries of these systems."""
+    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
+    import swashplate as sp
+    from swashplate.engine.equations import equations_of
+    from swashplate.engine.fly import flight_code
+
+    program = compiler.ziglang()
+    assert program is not None
+    source = flight_code(equations_of(sp.vehicle("raptor50")), None, precision="double", lanes=1, quaternion=True)
+    (tmp_path / "fly.c").write_text(source, encoding="utf-8")
+    made = tmp_path / f"fly.{ending}"
+    command = [*program, "-target", target, *compiler.STRICT, "-w", "-fPIC", "-shared", "-o", str(made)]
+    code, _, said = compiler.ran([*command, str(tmp_path / "fly.c")], where=target)
+    assert code == 0, said
+    assert made.read_bytes()[:2] == (b"MZ" if ending == "dll" else b"\xcf\xfa")
