@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from swashplate.api.design_controller import design_controller
     from swashplate.api.design_maneuver import design_maneuver
     from swashplate.api.excitation import excitation
-    from swashplate.api.export import export_controller, export_flight, export_model
+    from swashplate.api.export import export_controller, export_model
     from swashplate.api.fit_ss import fit_ss
     from swashplate.api.fit_tf import fit_tf
     from swashplate.api.fit_time import fit_time
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from swashplate.api.load import load
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.needed_excitation import needed_excitation
-    from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
     from swashplate.api.plot_logs import plot_logs
     from swashplate.api.simulate_batch import simulate_batch
@@ -153,7 +152,6 @@ __all__ = [
     "evaluate_bench",
     "excitation",
     "export_controller",
-    "export_flight",
     "export_model",
     "fetch_dataset",
     "fit_ss",
@@ -183,7 +181,6 @@ __all__ = [
     "monte_carlo",
     "needed_excitation",
     "new_card",
-    "observability",
     "observe",
     "omit_derivatives",
     "open_logs",

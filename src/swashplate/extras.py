@@ -18,7 +18,6 @@ EXTRA_OF: Mapping[str, str] = {
     "pymavlink": "link",
     "pyulog": "logs",
     "rosbags": "logs",
-    "mcap": "mcap",
     "distributed": "scale",
     "pyarrow": "scale",
 }

@@ -1,18 +1,16 @@
-"""Blackbox logs at the command line: inspect, respond, export."""
+"""Blackbox logs at the command line: inspect, respond."""
 
 from __future__ import annotations
 
-import io
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import one_message, swash
+from commands import swash
 
 import made_blackbox_logs as made
 import swashplate as sp
-from swashplate.export.mcap import as_mcap
 
 LP, LD, GAIN, STEP = -6.0, 90.0, 0.35, 4000  # 1/s, rad/s^2, s/rad, us
 
@@ -104,19 +102,3 @@ def test_a_flight_of_feedback_alone_is_refused_in_words(tmp_path: Path) -> None:
     outcome = swash(*arguments, "--references", "p_demand")
     assert outcome.code == 2
     assert "reference 'p_demand' never moves" in outcome.err
-
-
-def test_export_as_mcap_and_what_it_refuses(tmp_path: Path) -> None:
-    ramp = np.arange(50)
-    (tmp_path / "a.bbl").write_bytes(
-        made.rotorflight({"gyroADC[0]": ramp}) + made.rotorflight({"gyroADC[0]": ramp[:9]})
-    )
-    reader = pytest.importorskip("mcap.reader", reason="the extra 'mcap' is not installed")
-    outcome = swash("export", f"{tmp_path / 'a.bbl'}#2", "--format", "mcap", "--out", tmp_path)
-    assert outcome.code == 0, outcome.err
-    written = (tmp_path / "a.mcap").read_bytes()
-    assert len(list(reader.make_reader(io.BytesIO(written)).iter_messages())) == 9
-    assert as_mcap(sp.read(tmp_path / "a.bbl", log=2)) == written
-    assert "mcap takes a flight" in one_message(swash("export", "coax", "--format", "mcap", "--mass", "1"))
-    assert "no file's name" in one_message(swash("export", tmp_path / "a.bbl", "--format", "mcap", "--name", "../x"))
-    assert "coax" in one_message(swash("export", "coax", "--format", "mcap", "--out", tmp_path))

@@ -1,4 +1,4 @@
-"""`swash control`: design to a file that simulate flies, observability in words, bad input."""
+"""`swash control`: design to a file that simulate flies, bad input."""
 
 from __future__ import annotations
 
@@ -34,12 +34,6 @@ def test_json_has_the_margins() -> None:
     assert at["least_stable_mode"]["real"] < 0.0
     assert at["margins"]["together"]["disc"] > 0.3
     assert at["uncertainty"]["eta_bar"] < 0.01
-
-
-def test_observability_says_it_in_words() -> None:
-    outcome = swash("control", "observability", "coax", "--sensors", "imu@100,sonar,flow", "--seconds", "2")
-    assert outcome.code == 0, outcome.err
-    assert "Not seen at all, and it does not fade:\n  place to the north\n  place to the east\n  heading" in outcome.out
 
 
 @pytest.mark.parametrize(

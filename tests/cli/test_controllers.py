@@ -64,19 +64,6 @@ def test_c_code_is_written_where_asked(tmp_path: Path) -> None:
     assert "void swash_step(float memory[5]" in (tmp_path / "c.c").read_text()
 
 
-def test_the_law_on_estimates_is_a_file_that_comes_back(tmp_path: Path) -> None:
-    from swashplate.control.laws.observed_autopilot import ObservedAutopilot
-
-    file = tmp_path / "estimated.toml"
-    how = ("--sensors", "imu@100,sonar,compass,flow@25+40ms", "--lag", "battery")
-    outcome = swash("decouple", "coax", *how, "--out", file)
-    assert outcome.code == 0, outcome.err
-    again = read_controller(file)
-    assert isinstance(again, ObservedAutopilot)
-    assert [str(s) for s in again.observer.plan.sensors] == ["imu@100", "sonar@20", "compass@20", "flow@25+40ms"]
-    assert again.autopilot == autopilot(sp.vehicle("coax"), sp.trim(sp.vehicle("coax")), mode="manual")
-
-
 def test_decoupling_of_a_linear_model_as_a_page(tmp_path: Path) -> None:
     outcome = swash("control", "decouple", "hybrid", "--report", tmp_path / "d.html")
     assert outcome.code == 0, outcome.err
@@ -116,7 +103,6 @@ def test_json_says_what_the_table_says() -> None:
         (("decouple", "coax", "--to-speed", "40"), "reaches"),
         (("decouple", "coax", "--drift", "0.4"), "--drift: was seen on a step"),
         (("decouple", "coax", "--step", "0.2", "--drift", "60"), "--drift: is 60 m, expected at most 6"),
-        (("decouple", "coax", "--sensors", "imu@100,mocap"), "--sensors: goes into the file of --out"),
         (("decouple", "coax", "--sensors", "imu,gyro", "--out", "c.toml"), "gyro and imu is there twice"),
         (("decouple", "coax", "--report", "path.pdf"), "ends in '.pdf', expected .html"),
         (("decouple", "raptor50"), "`swash control decouple` takes any linear model"),

@@ -109,13 +109,6 @@ def monte_carlo_of_the_coax(folder: Path) -> Values:
 
 
 @case()
-def observability(folder: Path) -> Values:
-    """What sensors see of the CoaX."""
-    told = swash_json("control", "observability", "coax", "--sensors", "imu@100,mocap@50+20ms")
-    return numbers(told)
-
-
-@case()
 def sensors_and_noise(folder: Path) -> Values:
     """A simulated log with the usual sensors, gaps and outliers, and what conditioning makes of it."""
     coax = sp.vehicle("coax")

@@ -20,11 +20,8 @@ from swashplate.control.lateness import lateness
 from swashplate.control.laws.autopilot import Autopilot, Mode, autopilot
 from swashplate.control.laws.decoupling import Lag, estimated_lag
 from swashplate.control.laws.learning import corrected_by_step, drift_sources, straightened
-from swashplate.control.laws.observed_autopilot import ObservedAutopilot
-from swashplate.control.lqg.design import design
 from swashplate.errors import SwashError
 from swashplate.export.controller_c import ControllerCode, Precision, controller_code
-from swashplate.filtering.sensor_suite import suite
 from swashplate.identification.core.result import Result
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.straightness import compose_straightness
@@ -111,8 +108,7 @@ class DecouplingDesign(Shown):
 
     Attributes:
         vehicle, hover: what it was made from.
-        controller: it flies; fed with the states, or on estimates where sensors were given.
-        law: the autopilot in it.
+        controller: the autopilot, fed with the states.
         mode: least stable of the loop [1/s].
         margins: None in mode "manual", where a pilot holds the lean.
         step: flown where one was asked for.
@@ -121,8 +117,7 @@ class DecouplingDesign(Shown):
 
     vehicle: Vehicle
     hover: Trim
-    controller: Autopilot | ObservedAutopilot
-    law: Autopilot
+    controller: Autopilot
     mode: complex
     margins: Margins | None
     step: FlownStep | None
@@ -131,12 +126,12 @@ class DecouplingDesign(Shown):
     def lag(self, *, less: float = 0.0) -> float:
         """Phase lag that is taken out at the hover's motor command [deg], with the battery by `less` volts lower."""
         volts = float(self.hover.environment.voltage) - less
-        return math.degrees(estimated_lag(self.law.numbers.law, self.hover.commands()["motor_lower"], volts))
+        return math.degrees(estimated_lag(self.controller.numbers.law, self.hover.commands()["motor_lower"], volts))
 
     @property
     def mixing(self) -> str:
         """Form of the equations that are inverted."""
-        return "rotation" if self.law.numbers.law.mixing > 0 else "as_printed"
+        return "rotation" if self.controller.numbers.law.mixing > 0 else "as_printed"
 
     def save(self, path: str | Path) -> Path:
         """Write the controller's file (.toml)."""
@@ -152,11 +147,11 @@ class DecouplingDesign(Shown):
         document: dict[str, Any] = {
             "vehicle": self.vehicle.name,
             "model": self.vehicle.card.title,
-            "mode": self.law.mode,
-            "rate": self.law.rate,
+            "mode": self.controller.mode,
+            "rate": self.controller.rate,
             "mixing": self.mixing,
             "lag_at_hover_deg": self.lag(),
-            "law": self.law.numbers.law._asdict(),
+            "law": self.controller.numbers.law._asdict(),
             "late": self.late,
             "least_stable_mode": {"real": self.mode.real, "imaginary": abs(self.mode.imag)},
         }
@@ -190,7 +185,7 @@ class DecouplingDesign(Shown):
         )
 
     def __repr__(self) -> str:
-        law, lag = self.law.numbers.law, self.lag()
+        law, lag = self.controller.numbers.law, self.lag()
         across = 100.0 * math.sin(math.radians(lag))
         rows = [
             ("form of the equations", self.mixing, ""),
@@ -202,7 +197,7 @@ class DecouplingDesign(Shown):
             ("pitch command against 1 m/s right", f"{-(law.across_v + law.across_v_linear) / law.linkage:+.3f}", "1"),
             ("least stable mode of the loop", f"{self.mode.real:+.3f} +- {abs(self.mode.imag):.3f}j", "1/s"),
         ]
-        head = (f"decoupling of {self.vehicle.name}, mode {self.law.mode}", "", "")
+        head = (f"decoupling of {self.vehicle.name}, mode {self.controller.mode}", "", "")
         parts = [f"late: {self.late}\n{text_table(head, rows, left=(0, 2))}"]
         parts += [repr(part) for part in (self.margins, self.step) if part is not None]
         return "\n\n".join(parts)
@@ -217,7 +212,6 @@ def decouple(
     speed_terms: bool = True,
     voltage: float | None = None,
     rate: float = 100.0,
-    sensors: str | None = None,
     step: float | None = None,
     to_speed: float | None = None,
     drift: float | None = None,
@@ -237,7 +231,6 @@ def decouple(
         mixing, speed_terms: of the decoupling; see `swashplate.control.laws.autopilot.autopilot`.
         voltage: battery of the hover [V]; the card's nominal one where not given.
         rate: of the controller [Hz].
-        sensors: fly on estimates from these, "imu@100,mocap@50+20ms", not on measurements.
         step: fly this step of the pitch command for 6 m, with and without the decoupling.
         to_speed: the same with the step that reaches this speed [m/s].
         drift: seen on the step with this law [m to the right after 6 m]: take it out.
@@ -279,7 +272,6 @@ def decouple(
     return DecouplingDesign(
         vehicle,
         hover,
-        made if sensors is None else _on_estimates(vehicle, made, sensors, float(hover.environment.voltage)),
         made,
         complex(slowest),
         None if made.mode == "manual" else loop_margins(vehicle, made, hover),
@@ -329,10 +321,6 @@ def _straight(vehicle: Vehicle, papers: Autopilot, hover: Trim, step: float | No
     command = command_for_speed(vehicle, flown, hover, speed=PAPERS_SPEED) if step is None else step
     law = straightened(vehicle, flown, hover, command=command).numbers.law
     return replace(papers, numbers=papers.numbers._replace(law=law))
-
-
-def _on_estimates(vehicle: Vehicle, made: Autopilot, sensors: str, voltage: float) -> ObservedAutopilot:
-    return ObservedAutopilot(made, design(vehicle, sensors=suite(sensors), rate=made.rate, voltage=voltage))
 
 
 def _flown(

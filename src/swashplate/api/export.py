@@ -8,13 +8,11 @@ from pathlib import Path
 
 from swashplate.control.controller_file import read_controller
 from swashplate.engine.c_text import Precision, identifier
-from swashplate.errors import SwashError
 from swashplate.export import formats
 from swashplate.export.control_json import read_linear
 from swashplate.export.controller_c import controller_code
 from swashplate.export.formats import Export, Model
 from swashplate.export.matlab import read_matlab
-from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.controller import Controller
@@ -93,25 +91,3 @@ def export_controller(path: str | Path, *, name: str | None = None, precision: P
     code = controller_code(read, precision="float" if precision == "single" else "double")
     told = f"One step: {code.operations} operations, {code.work_bytes} bytes of temporaries."
     return Export({f"{identifier(name or Path(path).stem)}.c": code.source.encode()}, (told,))
-
-
-def export_flight(flight: Flight | str | Path, *, name: str | None = None) -> Export:
-    """A flight, or what a report draws over time, as an MCAP file for Foxglove, Lichtblick, PlotJuggler and Rerun.
-
-    Args:
-        flight: as logged or simulated; or the path of a report's page (.html): its fits and predictions.
-        name: what the file is called; the log's or page's own name where None.
-
-    Raises:
-        SwashError: where the extra `mcap` is missing, the name is no file's, or the page draws nothing over time.
-    """
-    from swashplate.export.mcap import as_mcap
-
-    if not isinstance(flight, Flight):
-        from swashplate.reporting.page_series import page_series
-
-        flight = page_series(flight)
-    called = Path(flight.provenance.source).stem if name is None else name
-    if not called or Path(called).name != called:
-        raise SwashError(f"'{called}' is no file's name.", channel="--name")
-    return Export({f"{called}.mcap": as_mcap(flight)}, flight.provenance.damage)

@@ -1,4 +1,4 @@
-"""`swash control`: linear-quadratic controllers with an observer, and what sensors can see."""
+"""`swash control`: linear-quadratic controllers with an observer."""
 
 from __future__ import annotations
 
@@ -6,20 +6,17 @@ from typing import Annotated
 
 import typer
 
-from swashplate.cli import autopilot_gains, control_check, decouple_linear, observability, options
+from swashplate.cli import autopilot_gains, control_check, decouple_linear, options
 from swashplate.cli import conditions as given
 from swashplate.cli import controller_options as shared
 from swashplate.cli.lateness import Delay, delays_from
 
 app = typer.Typer(
-    help="Model-based controllers with an observer, and what sensors can observe.",
+    help="Model-based controllers with an observer, and gains of autopilots.",
     rich_markup_mode=None,
     no_args_is_help=True,
 )
 app.command("check", short_help="Margins, handling qualities and steps of a controller.")(control_check.check)
-app.command("observability", short_help="Which states of a vehicle sensors can observe, and which not.")(
-    observability.observability
-)
 app.command("gains", short_help="Gains of ArduPilot or PX4 for a vehicle, with margins.")(autopilot_gains.gains)
 app.command("decouple", short_help="Decouple the axes of any linear model.")(decouple_linear.decouple)
 

@@ -19,7 +19,6 @@ _LAG = "Phase lag that makes the model's step straight (straight; by default in 
 _STEP = "Fly this step of the pitch command for 6 m, with and without the decoupling."
 _DRIFT = "Drift that a flown step with this law had [m to the right after 6 m]; the new law corrects it."
 _GUSTS = "With a step: fly drawn models, or without --fit this one, in gusts: none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s]."  # fmt: skip # noqa: E501
-_SENSORS = "Fly on estimates from these, e.g. imu@100,mocap@50+20ms, not on measurements."
 
 
 def decouple(
@@ -49,7 +48,6 @@ def decouple(
         Path | None,
         typer.Option("--report", metavar="FILE", help="Compare the two paths as HTML; to 1.8 m/s without a --step."),
     ] = None,
-    sensors: Annotated[str | None, typer.Option("--sensors", help=_SENSORS)] = None,
     fit: Annotated[
         Path | None,
         typer.Option("--fit", metavar="FILE", help="With a step: also on models drawn from a fit.json."),
@@ -66,8 +64,6 @@ def decouple(
     The law inverts the lower rotor's equations with the model's numbers (Fankhauser et al., eqs 19 to 22).
     """
     shared.check_suffixes((report, ".html", "--report"), (out, ".toml", "--out"), (c_code, ".c", "--c"))
-    if sensors is not None and (c_code is not None or out is None):
-        raise SwashError("goes into the file of --out; the C of --c takes measurements.", channel="--sensors")
     import swashplate as sp
     from swashplate.api.decouple import PAPERS_SPEED
     from swashplate.cli.console import doing
@@ -82,7 +78,6 @@ def decouple(
             speed_terms=speed_terms,
             voltage=voltage,
             rate=rate,
-            sensors=sensors,
             step=step,
             to_speed=PAPERS_SPEED if report is not None and step is None and to_speed is None else to_speed,
             drift=drift,

@@ -1,4 +1,4 @@
-"""`swash export`: a model as C, an FMU, an S-function, or matrices; a controller as C; a flight as MCAP."""
+"""`swash export`: a model as C, an FMU, an S-function, or matrices; a controller as C."""
 
 from __future__ import annotations
 
@@ -18,10 +18,6 @@ if TYPE_CHECKING:
     from swashplate.simulation.trim import Trim
 
 
-MCAP = "mcap"
-"""The format of flights; those of models are in `FORMATS`, other packages' too."""
-
-
 class CodePrecision(StrEnum):
     DOUBLE = "double"
     SINGLE = "single"
@@ -33,7 +29,7 @@ def export(
         typer.Argument(
             metavar="MODEL",
             help="A vehicle's name, a card or model file, a linear model's file (also .json or .mat of an export), "
-            "a controller's file, or a flight's for mcap.",
+            "or a controller's file.",
         ),
     ],
     form: Annotated[
@@ -41,8 +37,7 @@ def export(
         typer.Option(
             "--format",
             help="c: C99 step, rates, Jacobians. fmu: FMI 2.0 co-simulation. simulink: S-function. control: JSON for "
-            "python-control. matlab: .mat. mcap: a flight for Foxglove, "
-            "Lichtblick, PlotJuggler and Rerun. web: one HTML file in which the model flies, for any browser. "
+            "python-control. matlab: .mat. web: one HTML file in which the model flies, for any browser. "
             "Or another package's.",
         ),
     ],
@@ -74,8 +69,7 @@ def export(
     """Write a model, published or identified, in the format of another program, with the equations that fly here.
 
     A controller's file (`swash decouple --out`) is written as C. Formats c, fmu, simulink and web need the extra
-    'model', web the extra 'compiler' too; fmu has compiled code where there is a C compiler. Format mcap takes a
-    flight, or a report.html for its fits and predictions over time, and needs the extra 'mcap'. Examples:
+    'model', web the extra 'compiler' too; fmu has compiled code where there is a C compiler. Examples:
 
     swash export coax --format c --out firmware
 
@@ -84,27 +78,19 @@ def export(
     swash export raptor50 --format matlab --speed 10
 
     swash export fit/model.toml --format web --out model.html
-
-    swash export flight.bbl --format mcap
-
-    swash export out/report.html --format mcap --name prediction
     """
     import swashplate as sp
     from swashplate.cli.console import as_json
     from swashplate.documents import kind_of
     from swashplate.export.formats import FORMATS
 
-    if form != MCAP and form not in FORMATS:
-        raise SwashError(
-            f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join((*FORMATS, MCAP))}."
-        )
+    if form not in FORMATS:
+        raise SwashError(f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join(FORMATS)}.")
     one_file = out.suffix in _ENDINGS and not out.is_dir()
     name = out.stem if one_file and name is None else name
     only_vehicles = {"--speed": speed, "--mass": mass, "--set": changed, "--option": switched, "--delays": delays}
     refused = [option for option, value in only_vehicles.items() if value is not None]
-    if form == MCAP:
-        made = _flight(model, name, refused)
-    elif kind_of(model) == "controller":
+    if kind_of(model) == "controller":
         if form != "c":
             raise SwashError("is a controller: --format c writes its step.", where=model, channel=f"--format {form}")
         if refused:
@@ -125,7 +111,7 @@ def export(
         typer.echo(f"Written: {', '.join(written)}")
 
 
-_ENDINGS = (".c", ".fmu", ".html", ".json", ".mat", ".mcap")
+_ENDINGS = (".c", ".fmu", ".html", ".json", ".mat")
 
 
 def _as_file(made: Export, out: Path) -> Export:
@@ -141,19 +127,6 @@ def _as_file(made: Export, out: Path) -> Export:
     if out.name in made.files:
         return made
     return replace(made, files={out.name if file == alike[0] else file: text for file, text in made.files.items()})
-
-
-def _flight(flight: str, name: str | None, refused: list[str]) -> Export:
-    import swashplate as sp
-    from swashplate.cli.reading import read
-    from swashplate.flights.readers.windows import split_log, split_window
-
-    if refused:
-        raise SwashError("is for vehicles, and mcap takes a flight.", where=flight, channel=", ".join(refused))
-    if flight.endswith(".html"):
-        return sp.export_flight(flight, name=name)
-    called = Path(split_log(split_window(flight)[0])[0]).stem
-    return sp.export_flight(read(flight), name=called if name is None else name)
 
 
 def _model(

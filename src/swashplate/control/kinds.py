@@ -110,7 +110,6 @@ CONTROLLERS: Registry[ControllerKind[Any]] = Registry(
         "ardupilot": "swashplate.control.laws.ardupilot.kind:KIND",
         "autopilot": "swashplate.control.laws.autopilot_kind:KIND",
         "lqg": "swashplate.control.lqg.kind:KIND",
-        "observed-autopilot": "swashplate.control.laws.observed_autopilot_kind:KIND",
         "rotorflight": "swashplate.control.laws.rotorflight.kind:KIND",
     },
 )

@@ -50,7 +50,6 @@ def steady_gains(plan: ObserverPlan, numbers: Numbers, model: LinearModel, perio
         raise ControllerError(
             "the observer's covariance does not settle.",
             channel="gain",
-            hint="`swash control observability` says what the sensors do not see.",
         ) from None
     gains, covariances = np.zeros((period, N, len(noise))), np.zeros((period, N, N))
     P = P * np.outer(scale, scale)

@@ -54,12 +54,6 @@ def _finely(name: str, sigma: float) -> tuple[float, str]:
     return (1e3, f"m{known.shown_unit}") if fine else (known.shown_factor, unit_words(known.shown_unit))
 
 
-def _round(value: float) -> float:
-    """The nearest 1, 2 or 5 times a power of ten below a positive number."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))
-
-
 def residual_time(pieces: Mapping[str, Sequence[tuple[Array, Array]]], sigma: Mapping[str, float]) -> Figure:
     """Residuals against time with the +-2 sigma that the model promises.
 

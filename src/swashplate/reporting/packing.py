@@ -11,7 +11,6 @@ import base64
 import gzip
 import hashlib
 import json
-import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
@@ -30,8 +29,6 @@ from swashplate.reporting.structure import Figure
 _LEVELS = 65534
 _GAP = 65535
 """The level that stands for no number."""
-LARGEST = 256 << 20
-"""Bytes that a page's figures may unpack to."""
 
 
 @cache
@@ -69,34 +66,6 @@ def figures_text(figures: Sequence[Figure]) -> str:
     specs = [{"name": figure.identifier, **_spec(figure.spec, rows)} for figure in figures]
     text = json.dumps(specs, separators=(",", ":"), allow_nan=False).encode("utf-8")
     return _squeezed(len(text).to_bytes(4, "little") + text + bytes(rows))
-
-
-def read_figures(text: str) -> list[dict[str, Any]]:
-    """What `figures_text` wrote, each with its rows as lists (None is a gap): what the page's script does.
-
-    Raises:
-        ValueError: where it unpacks to more than `LARGEST`; and whatever damaged text leads to.
-    """
-    machine = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)  # with gzip's header
-    unpacked = machine.decompress(base64.b64decode(text), LARGEST)
-    if not machine.eof:
-        raise ValueError(f"they are cut off, or unpack to more than {LARGEST:,} bytes")
-    size = int.from_bytes(unpacked[:4], "little")
-    rows = unpacked[4 + size :]
-    specs: list[dict[str, Any]] = json.loads(unpacked[4 : 4 + size])
-    for spec in specs:
-        for trace in spec["data"]:
-            for side in ("x", "y"):
-                if isinstance(trace.get(side), dict) and "at" in trace[side]:
-                    trace[side] = _row(trace[side], rows)
-    return specs
-
-
-def _row(place: Mapping[str, Any], rows: bytes) -> list[float | None]:
-    n, at = place["n"], place["at"]
-    high, low = (np.frombuffer(rows, dtype=np.uint8, count=n, offset=at + k * n).astype(np.int64) for k in (0, 1))
-    levels = np.cumsum(256 * high + low) % 65536
-    return [None if level == _GAP else float(place["low"] + place["step"] * level) for level in levels]
 
 
 def _squeezed(content: bytes) -> str:

@@ -31,11 +31,10 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "control decouple": ("decouple_axes",),
     "control design": ("design_controller",),
     "control gains": ("autopilot_gains",),
-    "control observability": ("observability",),
     "data fetch": ("fetch_dataset",),
     "data list": ("datasets",),
     "derivatives": ("derivatives", "compare_derivatives", "omit_derivatives"),
-    "export": ("export_model", "export_controller", "export_flight"),
+    "export": ("export_model", "export_controller"),
     "identify": ("identify_and_validate", "identify"),
     "linearize": ("linearize", "in_form"),
     "link ardupilot": ("link_ardupilot", "write_ardupilot_parameters", "check_autopilot"),
@@ -63,7 +62,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 STUDIES = (
     "campaign", "campaign_results", "check_controller", "combine", "compare", "decouple", "decouple_axes", "demo",
     "derivatives", "design_controller", "evaluate_bench", "fit_ss", "fit_tf", "fit_time", "fly_maneuver",
-    "identify_and_validate", "monte_carlo", "observability", "respond", "resume_campaign", "track",
+    "identify_and_validate", "monte_carlo", "respond", "resume_campaign", "track",
     "trim_curve", "validate_linear",
 )  # fmt: skip
 """Verbs whose result is worth a page."""

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from report_pages import read_figures
 from report_samples import fit, modes, validation
 from swashplate.errors import SwashError
 from swashplate.reporting.figures.of_flight import over_time
 from swashplate.reporting.html import render, write_page
-from swashplate.reporting.packing import figures_text, read_figures
+from swashplate.reporting.packing import figures_text
 from swashplate.reporting.report import report
 from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.theme import line

@@ -162,7 +162,7 @@ def steady_filter(
             f"no sensor sees {hidden[0]} (mode {_named(hidden[0].mode)}).",
             where=where,
             channel="sensors",
-            hint="Add a sensor that does, or hold less: `swash control observability` says who sees what.",
+            hint="Add a sensor that does, or hold less.",
         )
     try:
         # In units of the scaling and of each reading's noise: metres beside radians per second cost digits.

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.arrays import Array, Complex
-from swashplate.atomic import write_bytes, write_text
+from swashplate.atomic import write_text
 from swashplate.control.analysis.rate_gain_names import ROTORFLIGHT
 from swashplate.errors import SwashError
 from swashplate.flights.csv_export import write_csv
@@ -296,10 +296,6 @@ def _files(
     def table(k: int, name: str) -> Path:
         return write_csv(records[k][0], folder / name)[0]
 
-    def recording(k: int, name: str) -> Path:
-        (content,) = resolve("export_flight")(swept[k].part, name="sweep").files.values()
-        return write_bytes(folder / name, content)
-
     files: dict[str, Make] = {}
     if any(one.parameters for study in studies for one in study.material.gains):
         files[named] = parameters
@@ -312,5 +308,4 @@ def _files(
         for stem, name in wanted.items():
             files[f"{stem}{end}{Path(name).suffix}"] = partial(saved, study, place, name)
         files[f"sweep{end}.csv"] = partial(table, k, f"sweep{end}.csv")
-        files[f"sweep{end}.mcap"] = partial(recording, k, f"sweep{end}.mcap")
     return {**files, "responses.nc": measured}

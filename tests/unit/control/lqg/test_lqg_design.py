@@ -14,7 +14,6 @@ from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
 from swashplate.control.lqg.file import lqg_document, lqg_from
-from swashplate.control.lqg.observability import in_words, observability
 from swashplate.control.lqg.optimal import regulator, steady_filter, unreached, unseen
 from swashplate.control.lqg.steady_loop import Watched, crossovers, response
 from swashplate.control.lqg.weights import DISC, total_delays
@@ -23,7 +22,6 @@ from swashplate.filtering.sensor_suite import suite
 from swashplate.models.catalogue import vehicle
 from swashplate.simulation.discretisation import with_late_inputs, zero_order_hold
 from swashplate.simulation.linearize import linearize
-from swashplate.simulation.trim import trim
 
 SENSORS = "gyro@100,mocap@50+20ms"
 
@@ -128,22 +126,6 @@ def test_a_place_is_held_as_tightly_as_delays_and_margins_allow(made: Lqg) -> No
     assert promised_disc(S) < DISC or np.any(crossovers(w, S) > most)
     strays, strayed = (analyse(controller).spread["x"] for controller in (made, wide))
     assert strays < 0.85 * strayed
-
-
-def test_observability_in_words() -> None:
-    coax = vehicle("coax")
-    hover = trim(coax)
-    blind = observability(coax, hover, suite("imu@100,sonar,pressure,flow@25+40ms"), seconds=4.0)
-    assert [in_words(d) for d in blind.hidden] == ["place to the north", "place to the east", "heading"]
-    whole = observability(coax, hover, suite("imu@100,mocap@100+10ms"), seconds=4.0)
-    assert not whole.hidden
-    assert "Nothing that lasts stays unseen" in repr(whole)
-    still = observability(coax, hover, suite("imu@100,sonar"), seconds=4.0)
-    faint = [in_words(d) for d in still.faint]
-    assert "speed ahead" in faint
-    assert any(text.startswith("bar's roll angle, together with") for text in faint)
-    known = {k.name: k for k in whole.known}
-    assert known["eta_bar"].sigma < 0.1 * known["eta_bar"].before
 
 
 def test_a_controller_comes_back_from_its_file(made: Lqg, tmp_path: Path) -> None:

@@ -38,8 +38,8 @@ function fit(home, found) {
 const FILES = { gains: "Parameters", report: "Report", model: "Model", sweep: "CSV", responses: "Responses", fit: "Fit", verification: "Verification" };
 
 function label(name, several) {
-  const [, stem, end, suffix] = /^([a-z]+)(?:-(\w+))?\.(\w+)$/.exec(name);
-  return `${suffix === "mcap" ? "MCAP" : FILES[stem]}${several && end ? ` ${end}` : ""}`;
+  const [, stem, end] = /^([a-z]+)(?:-(\w+))?\.\w+$/.exec(name);
+  return `${FILES[stem]}${several && end ? ` ${end}` : ""}`;
 }
 
 const link = (name, several) =>
