@@ -95,7 +95,7 @@ def commands(folder: Path, own: Path) -> dict[str, list[str]]:
     fit = ["--vehicle", str(own / "start.toml"), *seen, "--keep-unexcited", "--out", str(own / "fit")]
     return {
         "identify": ["identify", *fit],
-        "validate": ["validate", "--model", str(own / "fit" / "model.toml"), *seen, "--out", str(own / "judged")],
+        "validate": ["validate", "--vehicle", str(own / "fit" / "model.toml"), *seen, "--out", str(own / "judged")],
         "control design": ["control", "design", "coax", "--out", law],
         "control check": ["control", "check", "coax", "--controller", law, "--out", str(own / "check")],
     }

@@ -37,10 +37,10 @@ REPORTS: dict[str, tuple[list[str], str]] = {
         "responses/report.html",
     ),
     "report-bench": (
-        ["bench simulate records --seed 1 --quiet", "bench records --out card.toml --report bench.html"],
+        ["bench simulate records --seed 1 --quiet", "bench records --out card.toml --out bench.html"],
         "bench.html",
     ),
-    "report-speed": (["derivatives raptor50 --speed 0-12/3 --plot speed.html"], "speed.html"),
+    "report-speed": (["vehicle derivatives raptor50 --speed 0-12/3 --plot speed.html"], "speed.html"),
 }
 
 

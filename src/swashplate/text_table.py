@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -121,3 +121,19 @@ def _grown(block: Numbered, natural: Sequence[int], width: int) -> Numbered:
 def text_table(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,), keys: int = 1) -> str:
     """A `TextTable` as text, as wide as the screen has room."""
     return TextTable(head, rows, left, keys).text(screen_width())
+
+
+def text_columns(
+    head: Iterable[str],
+    rows: Iterable[Iterable[str]],
+    *,
+    left: int = 1,
+    words: Iterable[int] = (),
+    keys: int = 1,
+    title: str | None = None,
+) -> TextTable:
+    """Text cells as a table; the first `left` columns and those of `words` are words, the others numbers.
+
+    Where it is too wide the first `keys` columns stand again before the rest.
+    """
+    return TextTable(tuple(head), [tuple(row) for row in rows], (*range(left), *words), keys, title or "")

@@ -284,7 +284,9 @@ def test_replay_scrubs_and_shows_the_prediction(visit_: Any, tmp_path: Path) -> 
     sp.simulate_maneuver(raptor, "doublet:roll,0.5s,0.02", controller=sp.state_hold, lead=1, tail=2).save(
         tmp_path / "flight.nc"
     )
-    with _served("replay", tmp_path / "flight.nc", "--model", "barred.toml", "--ahead", "1", cwd=tmp_path) as url:
+    with _served(
+        "live", "barred.toml", "--replay", tmp_path / "flight.nc", "--settings", "ahead=1", cwd=tmp_path
+    ) as url:
         visit = visit_(url)
         visit.page.wait_for_selector("html[data-ready]", state="attached", timeout=_WAIT)
         visit.of("swash.go(1.3)")

@@ -1,4 +1,4 @@
-"""What `swash trim --plot` and `swash derivatives --plot` write, in a real browser: drawn, without an error."""
+"""What `swash vehicle trim --out` and `derivatives --out` write, in a real browser: drawn, without an error."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_the_page_is_drawn_says_nothing_and_fetches_nothing(
     browser: Any, tmp_path: Path, verb: str, size: tuple[int, int]
 ) -> None:
     page = tmp_path / f"{verb}.html"
-    outcome = CliRunner().invoke(app, [verb, "raptor50", "--speed", "0-8/4", "--plot", str(page)])
+    outcome = CliRunner().invoke(app, ["vehicle", verb, "raptor50", "--speed", "0-8/4", "--out", str(page)])
     assert outcome.exit_code == 0, outcome.output
     seen = Visit(browser, page, size)
     assert seen.said == []

@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import tomli_w
 from typer.testing import CliRunner
 
 from swashplate.cli.app import app
@@ -35,6 +38,13 @@ def swash_process(*arguments: str | Path, cwd: Path | None = None, **environment
         command, cwd=cwd, env={**os.environ, **environment}, capture_output=True, text=True, timeout=300, check=False
     )
     return Outcome(done.returncode, done.stdout, done.stderr)
+
+
+def saying(**settings: Any) -> Path:
+    """A file of settings, for `--settings`."""
+    place = Path(tempfile.mkdtemp()) / "settings.toml"
+    place.write_text(tomli_w.dumps(settings), encoding="utf-8")
+    return place
 
 
 def one_message(outcome: Outcome) -> str:

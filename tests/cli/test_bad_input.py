@@ -22,7 +22,7 @@ from swashplate.models.card import packaged_cards
 
 LONG = 600  # samples: 4 s, long enough for what is not about length
 SERVOS = ("servo_roll", "servo_pitch")
-TOLD_BY_NOTHING = ("--free", ",".join(FREE), "--tie", TIE, "--method", "output-error")
+TOLD_BY_NOTHING = ("--free", ",".join(FREE), "--settings", f"tie={TIE}", "--method", "output-error")
 """The same free parameters as in the end-to-end test: nothing compiles anew."""
 
 
@@ -135,7 +135,7 @@ def test_a_flight_whose_inputs_are_all_constant_is_refused(simulated: Path, tmp_
     path = _standing(logs / "a.mat")
     for arguments in (
         ("identify", "--vehicle", "coax", "--flight", path, "--out", tmp_path / "fit"),
-        ("validate", "--model", "coax", "--flight", path, "--out", tmp_path / "fit"),
+        ("validate", "--vehicle", "coax", "--flight", path, "--out", tmp_path / "fit"),
     ):
         message = one_message(swash(*arguments))
         for part in ("a.mat", "servo_roll", "no input ever moves", "fly a sweep"):
@@ -214,9 +214,9 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
     change, expected = CARDS[case]
     card = _card(change, tmp_path / "card.toml")
     for arguments in (
-        ("vehicles", "show", card),
+        ("vehicle", "show", card),
         ("identify", "--vehicle", card, "--flight", simulated, "--out", tmp_path / "fit"),
-        ("validate", "--model", card, "--flight", simulated, "--out", tmp_path / "fit"),
+        ("validate", "--vehicle", card, "--flight", simulated, "--out", tmp_path / "fit"),
         ("simulate", "--vehicle", card, "--maneuver", "step:roll,1s", "--out", tmp_path / "flight.nc"),
     ):
         message = one_message(swash(*arguments))
@@ -236,9 +236,9 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
         (("--fix", "mass=0.3", "--fix", "mass=0.4"), ("mass", "twice")),
         (("--prior", "mass=0.3"), ("--prior", "2 numbers")),
         (("--prior", "tau_f_upper=1,-1"), ("tau_f_upper", "positive")),
-        (("--tie", "a_beta_u = __import__('os')"), ("__import__",)),
-        (("--tie", "nonsense = mass"), ("nonsense",)),
-        (("--tie", "drag_x = drag_y", "--tie", "drag_y = drag_x"), ("circle", "drag_x")),
+        (("--settings", "tie=a_beta_u = __import__('os')"), ("__import__",)),
+        (("--settings", "tie=nonsense = mass"), ("nonsense",)),
+        (("--settings", "tie=drag_x = drag_y", "--settings", "tie=drag_y = drag_x"), ("circle", "drag_x")),
         (("--prior", "mass=0.3,0.1"), ("mass", "not free")),
         (("--free", "tau_f_uper"), ("tau_f_uper",)),
         (("--free", "mass,mass"), ("twice",)),
@@ -247,8 +247,8 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
             ("--wind", "--method", "output-error"),
             ("wind", "'output-error' does not know it", "filter-error"),
         ),
-        (("--cutoff", "80"), ("80",)),
-        (("--cutoff", "0.05"), ("simulated.nc", "10.000 s", "0.05 Hz", "20.000 s")),
+        (("--settings", "cutoff=80"), ("80",)),
+        (("--settings", "cutoff=0.05"), ("simulated.nc", "10.000 s", "0.05 Hz", "20.000 s")),
     ],
 )
 def test_a_wrong_option_is_refused(
@@ -290,12 +290,12 @@ def test_what_a_simulation_cannot_fly_is_said_first(tmp_path: Path) -> None:
     for extra, expected in (
         (("--sag", "5"), ("voltage", "falls to", "smaller sag")),
         (("--rate", "60"), ("60 Hz", "multiple of the controller's 50 Hz", "Give 50 Hz")),
-        (("--option", "bar"), ("--option", "bar=true")),
+        (("--set", "bar"), ("--set", "NAME=VALUE")),
     ):
         message = one_message(swash(*command, *extra))
         for part in expected:
             assert part in message, message
-    message = one_message(swash("trim", "raptor50", "--speed", "0-4/2", "--plot", tmp_path / "a.pdf"))
+    message = one_message(swash("vehicle", "trim", "raptor50", "--speed", "0-4/2", "--out", tmp_path / "a.pdf"))
     assert "expected .html" in message
     assert list(tmp_path.iterdir()) == []
 
@@ -327,7 +327,7 @@ def test_a_window_outside_the_flight_is_refused(simulated: Path) -> None:
 def test_a_place_that_cannot_be_written_to_is_named_as_given(simulated: Path, tmp_path: Path) -> None:
     """Not by the temporary file that was to be renamed."""
     assert "nowhere/n.toml: " in one_message(
-        swash("vehicles", "new", tmp_path / "nowhere" / "n.toml", "--mass", "4", "--radius", "0.6")
+        swash("vehicle", "new", tmp_path / "nowhere" / "n.toml", "--mass", "4", "--radius", "0.6")
     )
     inside = _text(tmp_path / "fit", "mine") / "deeper"
     message = one_message(swash("identify", "--vehicle", "coax", "--flight", simulated, "--out", inside))
@@ -343,8 +343,10 @@ def test_an_output_folder_that_is_a_file_is_refused(simulated: Path, tmp_path: P
 
 def test_an_option_of_one_value_is_not_given_twice() -> None:
     """Only the last would count, and nobody would be told."""
-    assert "--speed: is given more than once" in one_message(swash("trim", "coax", "--speed", "1", "--speed=2"))
-    twice = ("fit-ss", "--search", "responses", "--rename", "lateral=a", "--rename", "longitudinal=b")
+    assert "--speed: is given more than once" in one_message(
+        swash("vehicle", "trim", "coax", "--speed", "1", "--speed=2")
+    )
+    twice = ("identify", "--responses", "responses", "--search", "--rename", "lateral=a", "--rename", "longitudinal=b")
     assert "--rename: is given more than once. Give its values once, by commas." in one_message(swash(*twice))
 
 
@@ -356,8 +358,8 @@ def test_an_option_of_one_value_is_not_given_twice() -> None:
         ("identify --vehicle raptor5", "Did you mean 'raptor50'?"),
         ("export raptor5", "Did you mean 'raptor50'?"),
         ("control check raptor5", "Did you mean 'raptor50'?"),
-        ("fit-tf none", "none: there is no such file"),
-        ("stitch none.toml", "none.toml: there is no such file"),
+        ("identify --responses none", "none: there is no such file"),
+        ("vehicle stitch none.toml", "none.toml: there is no such file"),
         ("campaign run none.toml", "none.toml: there is no such file"),
         ("campaign report none", "none: there is no such file"),
         ("link accept none --vehicle raptor50", "none: there is no such file"),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import one_message, swash
+from commands import one_message, saying, swash
 
 import swashplate as sp
 from simulated_flights import FREE, TIE
@@ -34,7 +34,7 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_records_become_a_card_and_a_report(records: Path, tmp_path: Path) -> None:
-    done = swash("bench", records, "--out", tmp_path / "card.toml", "--report", tmp_path / "report.html")
+    done = swash("bench", records, "--out", tmp_path / "card.toml", "--out", tmp_path / "report.html")
     assert (done.code, done.err) == (0, "")
     assert "bench: drive_steps from steps_upper.csv" in done.out
     assert "Kept as published, no record: k_drive_voltage" in done.out
@@ -77,7 +77,10 @@ def test_repeats_sharpen_what_comes_out(tmp_path: Path) -> None:
     sigmas = []
     for repeats in ("1", "4"):
         folder = tmp_path / repeats
-        assert swash("bench", "simulate", folder, "--only", "supply", "--repeats", repeats, "--quiet").out == ""
+        assert (
+            swash("bench", "simulate", folder, "--only", "supply", "--quiet", "--settings", saying(repeats=repeats)).out
+            == ""
+        )
         assert swash("bench", folder, "--out", tmp_path / "c.toml", "--quiet").out == ""
         sigmas.append(read_card(tmp_path / "c.toml").parameters["k_drive_voltage"].sigma or 0.0)
     assert sigmas[1] == pytest.approx(0.5 * sigmas[0], rel=0.4)
@@ -114,7 +117,7 @@ def test_a_bad_record_ends_without_a_card(records: Path, tmp_path: Path, spoil: 
     for file in records.glob("*.csv"):
         text = file.read_text(encoding="utf-8")
         (folder / file.name).write_text(spoil(text) if file.name == "fan_front.csv" else text, encoding="utf-8")
-    done = swash("bench", folder, "--out", tmp_path / "card.toml", "--report", tmp_path / "report.html")
+    done = swash("bench", folder, "--out", tmp_path / "card.toml", "--out", tmp_path / "report.html")
     assert message in one_message(done)
     assert [path.name for path in tmp_path.iterdir()] == ["records"]
 
@@ -160,7 +163,7 @@ def test_what_spoils_a_measurement_ends_in_words_without_a_card(
     folder.mkdir()
     for record in _bench_of(procedure):
         write_record(_cells(spoil)(record) if record.name == file else record, folder / record.name)
-    done = swash("bench", folder, "--out", tmp_path / "card.toml", "--report", tmp_path / "report.html")
+    done = swash("bench", folder, "--out", tmp_path / "card.toml", "--out", tmp_path / "report.html")
     words = one_message(done)
     assert file in words
     assert message in words
@@ -193,15 +196,15 @@ def test_inspect_shows_a_record_of_the_virtual_bench(records: Path) -> None:
 
 
 def test_places_that_cannot_be_written_to_are_found_first(records: Path, tmp_path: Path) -> None:
-    assert "expected .toml" in one_message(swash("bench", records, "--out", tmp_path / "card.json"))
-    assert "the folder does not exist" in one_message(swash("bench", records, "--report", tmp_path / "no" / "r.html"))
+    assert "expected one of .toml, .html" in one_message(swash("bench", records, "--out", tmp_path / "card.json"))
+    assert "the folder does not exist" in one_message(swash("bench", records, "--out", tmp_path / "no" / "r.html"))
     assert "is not a folder and not a file" in one_message(swash("bench", tmp_path / "nothing"))
 
 
 @pytest.mark.proof  # what a card fixes and holds is in tests/unit/identification/core/test_prior_card.py
 def test_a_bench_card_is_the_prior_of_a_flight(records: Path, simulated: Path, tmp_path: Path) -> None:
     assert swash("bench", records, "--out", tmp_path / "card.toml", "--quiet").code == 0
-    asked = ("--free", ",".join(FREE), "--tie", TIE, "--method", "output-error")
+    asked = ("--free", ",".join(FREE), "--settings", f"tie={TIE}", "--method", "output-error")
     done = swash(
         "identify", "--vehicle", "coax", "--flight", simulated, *asked, "--prior", tmp_path / "card.toml",
         "--prior", "linkage_lower=0.13,0.05", "--out", tmp_path / "fit",

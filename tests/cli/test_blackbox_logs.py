@@ -72,7 +72,8 @@ def test_gains_come_in_the_firmwares_own_names(chirped: Path, tmp_path: Path) ->
     arguments = ("--inputs", "mixer_roll", "--outputs", "p", "--references", "p_demand", "--band", "0.5-8")
     assert swash("respond", chirped, *arguments, "--out", tmp_path / "out", "-q").code == 0
     outcome = swash(
-        "fit-tf",
+        "identify",
+        "--responses",
         tmp_path / "out" / "responses.nc",
         "--input",
         "mixer_roll",

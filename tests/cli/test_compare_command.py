@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import one_message, swash
+from commands import one_message, saying, swash
 
 from swashplate.flights.flight import Flight
 
@@ -62,4 +62,4 @@ def test_what_is_refused(models: tuple[Path, Path], tmp_path: Path) -> None:
     assert "1 given, expected two or more" in one_message(swash("compare", models[0]))
     assert "expected .html" in one_message(swash("compare", *models, "--out", tmp_path / "a.pdf"))
     assert "is neither a vehicle's name nor a file" in one_message(swash("compare", models[0], tmp_path / "no.toml"))
-    assert "Give flights too" in one_message(swash("compare", *models, "--outputs", "p"))
+    assert "Give flights too" in one_message(swash("compare", *models, "--settings", saying(outputs="p")))

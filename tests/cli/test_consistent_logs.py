@@ -67,7 +67,7 @@ def test_a_wrong_scale_goes_with_the_responses_into_the_fit(tmp_path: Path) -> N
     words = "log.csv: q: is 1.2"
     for told in (done.out, done.err, (out / "report.html").read_text(encoding="utf-8")):
         assert words in told
-    fit = swash("fit-tf", out / "responses.nc", "--input", "mixer_pitch", "--form", "0/1")
+    fit = swash("identify", "--responses", out / "responses.nc", "--input", "mixer_pitch", "--form", "0/1")
     assert fit.code == 2
     assert words in fit.out
     taken = swash("respond", path, *ASK, "--as-logged")

@@ -23,7 +23,7 @@ def test_a_design_is_flown_from_its_file(tmp_path: Path) -> None:
     assert outcome.code == 0, outcome.err
     flight = sp.read(flown)
     assert 0.005 < np.max(np.abs(flight.values("x"))) < 0.5
-    other = swash(*command[:1], "--vehicle", "coax", "--option", "bar=false", *command[3:], "--out", flown)
+    other = swash(*command[:1], "--vehicle", "coax", "--set", "bar=false", *command[3:], "--out", flown)
     assert other.code == 2
     assert "was designed on another aircraft than this 16-state one" in other.err
 
@@ -42,12 +42,12 @@ def test_json_has_the_margins() -> None:
         (("--sensors", "imu@100"), "no sensor sees x (mode an integrator)"),
         (("--sensors", "radar"), "'radar' is no sensor"),
         (("--sensors", "mocap@10", "--rate", "20"), "20 Hz is too slow for the mode"),
-        (("--state-weights", "1,2,3"), "state weights: are for 3 of 22: x, y, z"),
-        (("--input-weights", "1,2"), "input weights: are for 2 of 4: motor_lower, motor_upper"),
+        (("--settings", "state_weights=1,2,3"), "state weights: are for 3 of 22: x, y, z"),
+        (("--settings", "input_weights=1,2"), "input weights: are for 2 of 4: motor_lower, motor_upper"),
         (("--method", "lqr", "--gain", "steady"), "gain: has no observer"),
         (("--delay", "-5"), "--delay: is -5 ms, expected 0 to 1000"),
         (("--delay", "rudder=20"), "rudder: expected motor_lower"),
-        (("--out", "c.json"), "ends in '.json', expected .toml"),
+        (("--out", "c.json"), "ends in '.json', expected one of .toml, .html, .c"),
     ],
 )
 def test_bad_input_gives_2_and_says_why(arguments: tuple[str, ...], said: str) -> None:
@@ -90,7 +90,13 @@ def without(text: str, name: str) -> str:
 def test_a_card_without_a_number_is_named(tmp_path: Path) -> None:
     card = tmp_path / "card.toml"
     card.write_text(without(sp.vehicle("coax").card.to_toml(), "k_thrust_upper"))
-    for verb in (("control", "design"), ("decouple",)):
+    for verb in (
+        ("control", "design"),
+        (
+            "control",
+            "decouple",
+        ),
+    ):
         outcome = swash(*verb, card)
         assert outcome.code == 2
         assert "card.toml: k_thrust_upper: is missing. Add [parameters.k_thrust_upper]" in outcome.err

@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
-from commands import swash
+from commands import saying, swash
 
 import swashplate as sp
 from simulated_flights import FREE, TIE
 from swashplate.flights.csv_export import write_csv
 
-ASKED = ("--free", ",".join(FREE), "--tie", TIE)
+ASKED = ("--free", ",".join(FREE), "--settings", f"tie={TIE}")
 METHOD = ("--method", "output-error")  # nothing disturbs this flight, and it is the quicker one
 
 
@@ -36,7 +36,7 @@ def test_the_truth_is_recovered(fitted: Path) -> None:
 def test_the_model_is_a_vehicle_like_any_other(fitted: Path) -> None:
     model = sp.vehicle(fitted / "model.toml")
     assert model.card.parameters["tau_f_upper"].status == "identified"
-    assert swash("vehicles", "show", fitted / "model.toml").code == 0
+    assert swash("vehicle", "show", fitted / "model.toml").code == 0
 
 
 def test_the_report_is_there(fitted: Path) -> None:
@@ -46,15 +46,15 @@ def test_the_report_is_there(fitted: Path) -> None:
 def test_the_model_validates(fitted: Path, simulated: Path) -> None:
     outcome = swash(
         "validate",
-        "--model",
+        "--vehicle",
         fitted / "model.toml",
         "--flight",
         simulated,
         "--horizons",
         "0.5,1",
-        "--every",
-        "0.5",
         "--json",
+        "--settings",
+        saying(every=0.5),
     )
     assert outcome.code == 0, outcome.err
     scores = json.loads(outcome.out)["scores"]

@@ -31,7 +31,7 @@ pytest.importorskip("casadi", reason="the extra 'model' is not installed")
 )
 def test_a_vehicle_in_each_format(form: str, files: set[str], tmp_path: Path) -> None:
     out = tmp_path / "deep" / "folder"
-    outcome = swash("export", "coax", "--format", form, "--out", out, "--option", "bar=false")
+    outcome = swash("export", "coax", "--format", form, "--out", out, "--set", "bar=false")
     assert outcome.code == 0, outcome.err
     assert {file.name for file in out.iterdir()} == files
     assert all(name in outcome.out for name in files)
@@ -39,7 +39,7 @@ def test_a_vehicle_in_each_format(form: str, files: set[str], tmp_path: Path) ->
 
 def test_an_identified_model_with_another_name_mass_and_precision(tmp_path: Path) -> None:
     sp.vehicle("coax", bar=False).with_values({"tau_f_lower": 0.123}, status="identified").save(tmp_path / "model.toml")
-    arguments = ("--format", "c", "--out", tmp_path, "--name", "my heli", "--mass", "0.3", "--precision", "single")
+    arguments = ("--format", "c", "--out", tmp_path, "--name", "my heli", "--set", "mass=0.3", "--precision", "float")
     document = json.loads(swash("export", tmp_path / "model.toml", *arguments, "--json").out)
     assert [Path(file).name for file in document["files"]] == ["my_heli.h", "my_heli.c", "my_heli_example.c"]
     source = (tmp_path / "my_heli.c").read_text()
@@ -69,7 +69,7 @@ def test_a_linear_model_and_a_controller(tmp_path: Path) -> None:
     controller = tmp_path / "hold.toml"
     coax = sp.vehicle("coax")
     save_controller(sp.autopilot(coax, sp.trim(coax)), controller)
-    outcome = swash("export", controller, "--format", "c", "--out", tmp_path, "--precision", "single")
+    outcome = swash("export", controller, "--format", "c", "--out", tmp_path, "--precision", "float")
     assert outcome.code == 0, outcome.err
     assert "void swash_step(float memory" in (tmp_path / "hold.c").read_text()
     assert "is a controller" in one_message(swash("export", controller, "--format", "fmu"))
@@ -80,7 +80,7 @@ def test_without_a_compiler_the_fmu_has_its_sources_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    outcome = swash("export", "coax", "--format", "fmu", "--out", tmp_path, "--option", "bar=false")
+    outcome = swash("export", "coax", "--format", "fmu", "--out", tmp_path, "--set", "bar=false")
     assert outcome.code == 0
     assert "no C compiler" in outcome.err or fmu.fmu_platform() is None
     assert (tmp_path / "coax.fmu").stat().st_size > 10_000
@@ -100,9 +100,9 @@ def test_without_casadi_it_says_which_extra(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("coax", "--format", "fmu", "--precision", "single"), "are double"),
+        (("coax", "--format", "fmu", "--precision", "float"), "are double"),
         (("coax", "--format", "c", "--name", "///"), "gives no name"),
-        (("coax", "--format", "c", "--speed", "0-2"), "takes one speed"),
+        (("coax", "--format", "c", "--speed", "0-2"), "--speed: '0-2' is not a number"),
         (("raptor50", "--format", "c", "--speed", "60"), "needs theta0 = 61.2 deg, but its limit is 15.0 deg"),
         (("nothing.toml", "--format", "c"), "neither a vehicle's name nor a file"),
     ],

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import one_message, swash
+from commands import one_message, saying, swash
 from scipy import signal
 
 import swashplate as sp
@@ -88,7 +88,9 @@ def swept(folder: Path) -> Path:
 
 def test_from_a_log_to_a_model_that_is_verified(folder: Path, swept: Path) -> None:
     out, unseen = folder / "model", log(folder / "unseen.csv", seed=2, seconds=40.0)
-    done = swash("fit-ss", "rotor_body", swept, "--out", out, "--hold-out", unseen, "--gains")
+    done = swash(
+        "identify", "--structure", "rotor_body", "--responses", swept, "--out", out, "--hold-out", unseen, "--gains"
+    )
     assert done.code == 0, done.err
     assert "ATC_RAT_RLL_FF" in done.out
     fit = json.loads((out / "fit.json").read_text(encoding="utf-8"))
@@ -100,7 +102,7 @@ def test_from_a_log_to_a_model_that_is_verified(folder: Path, swept: Path) -> No
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "Which gains, with which margins?" in page
     assert page.count("fitted-responses") > 0
-    again = swash("validate", "--model", out / "model.toml", "--flight", unseen, "--out", folder / "validated")
+    again = swash("validate", "--vehicle", out / "model.toml", "--flight", unseen, "--out", folder / "validated")
     assert again.code == 0, again.err
     assert "J_rms" in again.out
     assert (folder / "validated" / "report.html").is_file()
@@ -108,13 +110,25 @@ def test_from_a_log_to_a_model_that_is_verified(folder: Path, swept: Path) -> No
 
 def test_transfer_functions_are_tried_and_saved(folder: Path, answered: Path) -> None:
     out = folder / "tf"
-    done = swash("fit-tf", answered, "--input", "mixer_roll", "--outputs", "p", "--out", out, "--json")
+    done = swash("identify", "--responses", answered, "--input", "mixer_roll", "--outputs", "p", "--out", out, "--json")
     assert done.code == 0, done.err
     document = json.loads(done.out)
     assert len(document["tried"]) > 5
     assert max(document["fit"]["costs"].values()) < 50.0
     assert (out / "model.toml").is_file()
-    fixed = swash("fit-tf", answered, "--input", "mixer_roll", "--outputs", "p", "--form", "2/4", "--fix", "tau=0.05")
+    fixed = swash(
+        "identify",
+        "--responses",
+        answered,
+        "--input",
+        "mixer_roll",
+        "--outputs",
+        "p",
+        "--form",
+        "2/4",
+        "--fix",
+        "tau=0.05",
+    )
     assert fixed.code == 0
     assert "fixed" in fixed.out
     (gain,) = (line for line in fixed.out.splitlines() if line.startswith("  K "))
@@ -124,19 +138,19 @@ def test_transfer_functions_are_tried_and_saved(folder: Path, answered: Path) ->
 def test_responses_are_multiplied_divided_and_inverted(folder: Path, answered: Path) -> None:
     """A response over itself is one; what is combined goes on into the next command."""
     pair = f"{answered}:p/mixer_roll"
-    inverse = swash("combine", "inverse", pair, "--out", folder / "inverse")
+    inverse = swash("respond", pair, "--combine", "inverse", "--out", folder / "inverse")
     assert inverse.code == 0, inverse.err
     assert {file.name for file in (folder / "inverse").iterdir()} == {"responses.nc", "responses.json", "report.html"}
-    one = swash("combine", "product", pair, folder / "inverse", "--json")
+    one = swash("respond", pair, folder / "inverse", "--combine", "product", "--json")
     assert one.code == 0, one.err
     kept = json.loads((folder / "inverse" / "responses.json").read_text(encoding="utf-8"))
     assert json.loads(one.out).keys() == kept.keys()
     assert "mixer_roll / p" in inverse.out
-    assert "Did you mean 'ratio'?" in one_message(swash("combine", "ration", pair, pair))
-    assert "takes two responses" in one_message(swash("combine", "ratio", pair))
-    assert "responses of one pair" in one_message(swash("combine", "inverse", answered))
-    assert "no such file" in one_message(swash("combine", "inverse", folder / "nothing.nc"))
-    assert "it takes one or two" in one_message(swash("combine", "ratio", pair, pair, pair))
+    assert "Did you mean 'ratio'?" in one_message(swash("respond", pair, pair, "--combine", "ration"))
+    assert "takes two responses" in one_message(swash("respond", pair, "--combine", "ratio"))
+    assert "responses of one pair" in one_message(swash("respond", answered, "--combine", "inverse"))
+    assert "no such file" in one_message(swash("respond", folder / "nothing.nc", "--combine", "inverse"))
+    assert "it takes one or two" in one_message(swash("respond", pair, pair, pair, "--combine", "ratio"))
 
 
 def test_transfer_functions_start_a_model_and_tell_margins(folder: Path, answered: Path) -> None:
@@ -144,23 +158,45 @@ def test_transfer_functions_start_a_model_and_tell_margins(folder: Path, answere
     for name, output in (("mixer_roll", "p"), ("mixer_pitch", "q")):
         places.append(folder / f"tf_{output}")
         done = swash(
-            "fit-tf", answered, "--input", name, "--outputs", output, "--form", "2/4", "--margins", "--out", places[-1]
+            "identify",
+            "--responses",
+            answered,
+            "--input",
+            name,
+            "--outputs",
+            output,
+            "--form",
+            "2/4",
+            "--margins",
+            "--out",
+            places[-1],
         )
         assert done.code == 0, done.err
         assert f"{output} / {name} (flight): crossover" in done.out
         assert f"{output} / {name} (model): crossover" in done.out
         assert f"{ {'p': 'phi', 'q': 'theta'}[output] } / {name} (model): bandwidth" in done.out
         assert "+- 0 " not in done.out
-    done = swash("fit-ss", "rotor_body", answered, "--start-from", ",".join(map(str, places)), "--json")
+    done = swash(
+        "identify",
+        "--structure",
+        "rotor_body",
+        "--responses",
+        answered,
+        "--start-from",
+        ",".join(map(str, places)),
+        "--json",
+    )
     assert done.code == 0, done.err
     found = {p["name"]: p["value"] for p in json.loads(done.out)["fit"]["estimates"]}
     assert found["Lb"] == pytest.approx(3000.0, rel=0.05)
-    refused = swash("fit-ss", "rotor_body", answered, "--start-from", str(folder / "nothing.toml"))
+    refused = swash(
+        "identify", "--structure", "rotor_body", "--responses", answered, "--start-from", str(folder / "nothing.toml")
+    )
     assert "neither a vehicle's name nor a file" in one_message(refused)
 
 
 def test_gains_come_from_transfer_functions_too_and_their_lack_is_said(swept: Path) -> None:
-    ask = ("fit-tf", swept, "--input", "mixer_roll", "--form", "2/4")
+    ask = ("identify", "--responses", swept, "--input", "mixer_roll", "--form", "2/4")
     done = swash(*ask, "--outputs", "p", "--gains", "--json")
     assert done.code == 0, done.err
     (roll,) = json.loads(done.out)["gains"]
@@ -173,7 +209,17 @@ def test_gains_come_from_transfer_functions_too_and_their_lack_is_said(swept: Pa
 
 
 def test_the_fitted_flight_is_no_hold_out(answered: Path, flown: Path) -> None:
-    done = swash("fit-ss", "rotor_body", answered, "--hold-out", flown, "--starts", "1")
+    done = swash(
+        "identify",
+        "--structure",
+        "rotor_body",
+        "--responses",
+        answered,
+        "--hold-out",
+        flown,
+        "--settings",
+        saying(starts=1),
+    )
     assert "NOT A HOLD-OUT" in done.out
 
 
@@ -198,7 +244,7 @@ def test_noise_is_not_a_response(folder: Path) -> None:
     done = swash("respond", path, "--inputs", "mixer_roll", "--outputs", "p", "--out", folder / "noise")
     assert done.code == 2
     assert "do not use its responses" in done.err
-    refused = one_message(swash("fit-tf", folder / "noise", "--input", "mixer_roll", "--outputs", "p"))
+    refused = one_message(swash("identify", "--responses", folder / "noise", "--input", "mixer_roll", "--outputs", "p"))
     assert "p / mixer_roll" in refused
 
 
@@ -206,35 +252,51 @@ def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: 
     ask = ("--inputs", "mixer_roll", "--outputs", "p")
     assert "named as a reference" in one_message(swash("respond", flown, *ask, "--references", "p"))
     assert "same stretch of the same log" in one_message(swash("respond", flown, flown, *ask))
-    assert "shortest window 500 s" in one_message(swash("respond", flown, *ask, "--windows", "500"))
-    assert "are not all positive" in one_message(swash("respond", flown, *ask, "--windows", "0"))
+    assert "shortest window 500 s" in one_message(swash("respond", flown, *ask, "--settings", saying(windows="500")))
+    assert "are not all positive" in one_message(swash("respond", flown, *ask, "--settings", saying(windows="0")))
     assert "the flight has no such channel" in one_message(
         swash("respond", flown, "--inputs", "stick", "--outputs", "p")
     )
     assert "Did you mean 'mixer_roll'?" in one_message(swash("respond", flown, "--inputs", "roll", "--outputs", "p"))
     assert "is not LOW-HIGH" in one_message(swash("respond", flown, *ask, "--band", "10-1"))
-    assert "no such file" in one_message(swash("fit-tf", folder / "nothing.nc", "--input", "mixer_roll"))
-    assert "does not hold frequency responses" in one_message(swash("fit-tf", flown, "--input", "mixer_roll"))
-    assert "is no input of these responses" in one_message(swash("fit-tf", answered, "--input", "stick"))
-    assert "neither a ready structure nor a file" in one_message(swash("fit-ss", "rotorbody", answered))
-    assert "is no form" in one_message(swash("fit-tf", answered, "--input", "mixer_roll", "--form", "two"))
+    assert "no such file" in one_message(
+        swash("identify", "--responses", folder / "nothing.nc", "--input", "mixer_roll")
+    )
+    assert "does not hold frequency responses" in one_message(
+        swash("identify", "--responses", flown, "--input", "mixer_roll")
+    )
+    assert "is no input of these responses" in one_message(
+        swash("identify", "--responses", answered, "--input", "stick")
+    )
+    assert "neither a ready structure nor a file" in one_message(
+        swash("identify", "--structure", "rotorbody", "--responses", answered)
+    )
+    assert "is no form" in one_message(
+        swash("identify", "--responses", answered, "--input", "mixer_roll", "--form", "two")
+    )
     bad = folder / "bad.toml"
     from importlib import resources
 
     text = (resources.files("swashplate.models.linear") / "structures" / "rotor_body.toml").read_text(encoding="utf-8")
     bad.write_text(text.replace('b = "Lb"', 'b = "Lbb"'), encoding="utf-8")
-    message = one_message(swash("fit-ss", bad, answered))
+    message = one_message(swash("identify", "--structure", bad, "--responses", answered))
     assert "'Lbb'" in message
     bad.write_text(text.replace('b = "Lb"', 'b = "Lb/0"'), encoding="utf-8")
-    assert "divides by zero" in one_message(swash("fit-ss", bad, answered))
+    assert "divides by zero" in one_message(swash("identify", "--structure", bad, "--responses", answered))
     fixed = [word for name in structure("rotor_body").free for word in ("--fix", f"{name}=0.3")]
-    assert "every parameter is fixed" in one_message(swash("fit-ss", "rotor_body", answered, *fixed))
+    assert "every parameter is fixed" in one_message(
+        swash("identify", "--structure", "rotor_body", "--responses", answered, *fixed)
+    )
     assert "Did you mean 'Lb'" in message
-    assert "is no parameter" in one_message(swash("fit-ss", "rotor_body", answered, "--start", "Lbb=3"))
+    assert "is no parameter" in one_message(
+        swash("identify", "--structure", "rotor_body", "--responses", answered, "--start", "Lbb=3")
+    )
     for option in ("--start", "--fix"):
-        outside = one_message(swash("fit-ss", "rotor_body", answered, option, "tau_f=-1"))
+        outside = one_message(
+            swash("identify", "--structure", "rotor_body", "--responses", answered, option, "tau_f=-1")
+        )
         assert "tau_f: is given as -1, expected 0.002 to 1 s" in outside
-    ask = ("fit-tf", answered, "--input", "mixer_roll", "--outputs", "p", "--form", "1/2", "--fix")
+    ask = ("identify", "--responses", answered, "--input", "mixer_roll", "--outputs", "p", "--form", "1/2", "--fix")
     for held, words in (
         ("tau=-1", "expected 0 to 0.5 s"), ("omega_pole=-3", "expected above 0 rad/s"),
         ("zeta_pole=-3", "expected -2 to 10 in the form 1/2"), ("K=0", "expected other than 0"),
@@ -267,48 +329,52 @@ def test_a_unit_that_is_none_is_named(folder: Path, answered: Path, old: str, ne
     assert old in ready
     bad = folder / "unit.toml"
     bad.write_text(ready.replace(old, new, 1), encoding="utf-8")
-    assert words in one_message(swash("fit-ss", bad, answered))
+    assert words in one_message(swash("identify", "--structure", bad, "--responses", answered))
 
 
 def test_single_pairs_have_bands_of_their_own_or_are_left_out(answered: Path) -> None:
-    ask = ("fit-ss", "rotor_body", answered, "--starts", "1", "--json")
-    done = swash(*ask, "--band", "0.3-10", "--band", "p/mixer_roll=0.5,8", "--without", "q/mixer_roll")
+    ask = ("identify", "--structure", "rotor_body", "--responses", answered, "--json", "--settings", saying(starts=1))
+    done = swash(*ask, "--band", "0.3-10", "--band", "p/mixer_roll=0.5,8", "--settings", "without=q/mixer_roll")
     assert done.code == 0, done.err
     fit = json.loads(done.out)["fit"]
     assert set(fit["costs"]) == {"p / mixer_roll", "p / mixer_pitch", "q / mixer_pitch"}
     assert fit["settings"]["bands_hz"] == {"p/mixer_roll": [0.5, 8.0]}
     assert "Did you mean 'p/mixer_roll'?" in one_message(swash(*ask, "--band", "p/mixer_rol=1-2"))
-    assert "Did you mean 'q/mixer_roll'?" in one_message(swash(*ask, "--without", "q/mixerroll"))
+    assert "Did you mean 'q/mixer_roll'?" in one_message(swash(*ask, "--settings", "without=q/mixerroll"))
     assert "two bands are given for all pairs" in one_message(swash(*ask, "--band", "1-2", "--band", "1-3"))
     assert "is not LOW-HIGH" in one_message(swash(*ask, "--band", "p/mixer_roll=5"))
 
 
 def test_structures_are_listed_shown_composed_and_searched(folder: Path, answered: Path) -> None:
-    listed = swash("structures", "list")
+    listed = swash("vehicle", "structures")
     assert listed.code == 0
     assert "rotor_body" in listed.out
     assert "Pitt-Peters" in listed.out
-    assert json.loads(swash("structures", "--json").out)["parts"]["torque"].startswith("engine")
+    assert json.loads(swash("vehicle", "structures", "--json").out)["parts"]["torque"].startswith("engine")
     out = folder / "composed.toml"
-    shown = swash("structures", "show", "compose:cyclic+flap", "--out", out)
+    shown = swash("vehicle", "structures", "compose:cyclic+flap", "--out", out)
     assert shown.code == 0, shown.err
     assert "tau_f db/dt = -tau_f p + Ba a - b + Blat lateral + Blon longitudinal" in shown.out
     assert structure(str(out)).name == "cyclic+flap"
-    assert "exists already" in one_message(swash("structures", "show", "compose:cyclic+flap", "--out", out))
-    assert "Did you mean 'flap'?" in one_message(swash("structures", "show", "compose:cyclic+flapp"))
+    assert "exists already" in one_message(swash("vehicle", "structures", "compose:cyclic+flap", "--out", out))
+    assert "Did you mean 'flap'?" in one_message(swash("vehicle", "structures", "compose:cyclic+flapp"))
     names = ("--rename", "lateral=mixer_roll,longitudinal=mixer_pitch")
-    fitted = swash("fit-ss", out, answered, *names, "--json")
+    fitted = swash("identify", "--structure", out, "--responses", answered, *names, "--json")
     assert fitted.code == 0, fitted.err
     found = {p["name"]: p["value"] for p in json.loads(fitted.out)["fit"]["estimates"]}
     assert found["Lb"] == pytest.approx(3000.0, rel=0.05)
-    assert "Say --rename lateral=mixer_roll" in one_message(swash("fit-ss", out, answered))
+    assert "Say --rename lateral=mixer_roll" in one_message(
+        swash("identify", "--structure", out, "--responses", answered)
+    )
     some = "compose:cyclic,compose:cyclic+flap_decoupled,compose:cyclic+flap"
-    searched = swash("fit-ss", some, answered, "--search", *names, "--out", folder / "searched")
+    searched = swash(
+        "identify", "--structure", some, "--responses", answered, "--search", *names, "--out", folder / "searched"
+    )
     assert searched.code == 0, searched.err
     assert "*cyclic+flap " in searched.out
     assert "Picked cyclic+flap" in searched.out
     assert "Which structures were tried?" in (folder / "searched" / "report.html").read_text(encoding="utf-8")
-    assert "a structure and responses are needed" in one_message(swash("fit-ss", answered))
+    assert "--flight: is missing" in one_message(swash("identify", "--structure", answered))
 
 
 def test_an_unstable_start_is_named_and_the_fit_is_kept(folder: Path, answered: Path) -> None:
@@ -320,7 +386,7 @@ def test_an_unstable_start_is_named_and_the_fit_is_kept(folder: Path, answered: 
         ready.replace('Lb = {value = 1000.0, unit = "1/s^2", lower = 0.0}', "Lb = {value = -1000.0}"), encoding="utf-8"
     )
     out = folder / "unstable"
-    done = swash("fit-ss", text, answered, "--starts", "1", "--out", out)
+    done = swash("identify", "--structure", text, "--responses", answered, "--out", out, "--settings", saying(starts=1))
     assert done.code == 2
     assert "is unstable" in done.err
     assert (out / "fit.json").is_file()
@@ -350,8 +416,9 @@ def test_a_model_is_fitted_in_time_and_verified_on_another_log(folder: Path, flo
     out, unseen = folder / "time", log(folder / "unseen_time.csv", seed=7, seconds=15.0)
     short = log(folder / "short.csv", seed=8, seconds=12.0)
     done = swash(
-        "fit-time", "rotor_body", short, "--no-shifts", "--hold-out", unseen, "--out", out,
-        "--start", "Lb=2000", "--start", "Blat=0.15", "--fix", "tau_pitch=0.05", "--iterations", "25",
+        "identify", "--structure", "rotor_body", "--flight", short, "--hold-out", unseen, "--out", out, "--start",
+        "Lb=2000", "--start", "Blat=0.15", "--fix", "tau_pitch=0.05", "--settings",
+        saying(iterations=25, shifts=False),
     )  # fmt: skip
     assert done.code == 0, done.err
     fit = json.loads((out / "fit.json").read_text(encoding="utf-8"))
@@ -362,8 +429,12 @@ def test_a_model_is_fitted_in_time_and_verified_on_another_log(folder: Path, flo
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "identified in time" in page
     assert "NOT A HOLD-OUT" not in page
-    assert "method is 'magic'" in one_message(swash("fit-time", "rotor_body", short, "--method", "magic"))
-    assert "is no parameter" in one_message(swash("fit-time", "rotor_body", short, "--start", "Lbb=3"))
+    assert "method is 'magic'" in one_message(
+        swash("identify", "--structure", "rotor_body", "--flight", short, "--method", "magic")
+    )
+    assert "is no parameter" in one_message(
+        swash("identify", "--structure", "rotor_body", "--flight", short, "--start", "Lbb=3")
+    )
 
 
 @pytest.mark.parametrize("number", [signals.SIGINT, signals.SIGTERM])
@@ -371,9 +442,21 @@ def test_a_stopped_fit_is_kept_as_far_as_it_came(
     folder: Path, monkeypatch: pytest.MonkeyPatch, number: signals.Signals
 ) -> None:
     short = log(folder / "short.csv", seed=8, seconds=12.0)
-    ask = ("fit-time", "rotor_body", short, "--no-shifts", "--start", "Lb=2000", "--start", "Blat=0.15")
+    ask = (
+        "identify",
+        "--structure",
+        "rotor_body",
+        "--flight",
+        short,
+        "--start",
+        "Lb=2000",
+        "--start",
+        "Blat=0.15",
+        "--settings",
+        saying(shifts=False),
+    )
     two, out, none = folder / "two", folder / f"stopped_{number}", folder / f"none_{number}"
-    assert swash(*ask, "--iterations", "2", "--out", two).code == 0
+    assert swash(*ask, "--settings", "iterations=2", "--out", two).code == 0
     # As the console script has them, also where a shell in the background had SIGINT ignored.
     before = signals.signal(signals.SIGTERM, lambda *_: sys.exit(128 + signals.SIGTERM))
     ignored = signals.signal(signals.SIGINT, signals.default_int_handler)
@@ -412,11 +495,23 @@ def test_a_channel_of_another_name_is_flown_along_where_asked_or_where_the_respo
     renamed = folder / "renamed"
     ask = ("--inputs", "mixer_roll,mixer_pitch", "--outputs", "p=p_gyro,q", "--band", "0.2-12")
     assert swash("respond", other, *ask, "--out", renamed).code == 0
-    fitted = swash("fit-ss", "rotor_body", renamed, "--starts", "1", "--hold-out", other, "--out", renamed)
+    fitted = swash(
+        "identify",
+        "--structure",
+        "rotor_body",
+        "--responses",
+        renamed,
+        "--hold-out",
+        other,
+        "--out",
+        renamed,
+        "--settings",
+        saying(starts=1),
+    )
     assert fitted.code == 0, fitted.err
-    checked = ("validate", "--model", renamed / "model.toml", "--flight", other)
+    checked = ("validate", "--vehicle", renamed / "model.toml", "--flight", other)
     assert "  p   " not in swash(*checked).out
-    done = swash(*checked, "--rename", "p=p_gyro")
+    done = swash(*checked, "--settings", "rename=p=p_gyro")
     assert done.code == 0, done.err
     assert "  p   " in done.out
-    assert "Did you mean 'p_gyro'?" in one_message(swash(*checked, "--rename", "p=p_gyr"))
+    assert "Did you mean 'p_gyro'?" in one_message(swash(*checked, "--settings", "rename=p=p_gyr"))

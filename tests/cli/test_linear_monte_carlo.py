@@ -50,8 +50,8 @@ def test_linear_models_are_flown_in_many_versions(law: tuple[str, ...], tmp_path
     controller, worst = tmp_path / "linear.toml", tmp_path / "worst.nc"
     design = ("control", "design", "thirteen_state", *law, "--rate", "50")
     assert swash(*design, "--out", controller, "--quiet").code == 0
-    fly = ("simulate", "--vehicle", "thirteen_state", "--controller", controller, "--out", worst)
-    many = (*fly, "--maneuver", "doublet:lateral,0.5s,0.1", "--monte-carlo", "5")
+    fly = ("control", "monte-carlo", "--vehicle", "thirteen_state", "--controller", controller, "--out", worst)
+    many = (*fly, "--maneuver", "doublet:lateral,0.5s,0.1", "--count", "5")
     outcome = swash(*many, "--fit", fit_of(tmp_path / "fit.json"), "--vary", "Xu=20%")
     assert outcome.code == 0, outcome.err
     assert "5 flights, 0 lost" in outcome.out
@@ -63,7 +63,7 @@ def test_linear_models_are_flown_in_many_versions(law: tuple[str, ...], tmp_path
     assert drawn["u_by_u"] != pytest.approx(-0.05, rel=1e-4)
     for options, said in (
         (("--gusts", "indoor", "--payload", "0.1"), "--gusts, --payload: a linear model has no equations for wind"),
-        (("--tolerances",), "has a standard deviation (cramer_rao)"),
+        (("--settings", "tolerances=true"), "has a standard deviation (cramer_rao)"),
         (("--vary", "Mq=5%"), "Mq: is no parameter of the model"),
         (("--fit", worst), "is no text file, expected JSON. `swash identify"),
     ):

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from commands import one_message, swash
+from commands import one_message, saying, swash
 
 import swashplate as sp
 from heli_autopilot import servo_packet
@@ -27,10 +27,10 @@ IDLE = [1500, 1500, 1500, 1500, 1000, 1000]
         (["ardupilot", "--vehicle", "lynx"], "no servo mapping 'lynx'"),
         (["ardupilot", "--vehicle", "coax", "--servos", "raptor50"], "the equations of 'coax'"),
         (["ardupilot", "--vehicle", "coax", "--servos", "none.toml"], "neither the name of a servo mapping nor a file"),
-        (["ardupilot", "--vehicle", "coax", "--listen", "nonsense"], "no IPv4 address"),
+        (["ardupilot", "--vehicle", "coax", "--settings", "listen=nonsense"], "no IPv4 address"),
         (["ardupilot", "--vehicle", "coax", "--record", "flight.txt"], "expected .nc or .csv"),
         (["ardupilot", "--vehicle", "coax", "--record", "nowhere/flight.nc"], "the folder does not exist"),
-        (["ardupilot", "--vehicle", "coax", "--voltage", "-1"], "expected 0 to 1000"),
+        (["ardupilot", "--vehicle", "coax", "--settings", "voltage=-1"], "expected 0 to 1000"),
         (["px4", "--vehicle", "lynx"], "no servo mapping 'lynx_px4'"),
         (["px4", "--vehicle", "x8"], "a multirotor's motors have no servo mapping"),
         (["ardupilot", "--vehicle", "crazyflie"], "Fly it with `swash live`"),
@@ -57,7 +57,7 @@ def test_a_check_without_an_autopilot_is_exit_2(verb: str) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"udp:127.0.0.1:{taken.getsockname()[1]}"
-        command = ["link", verb, "--vehicle", "coax", "--check", "--timeout", "0.3", "--mavlink"]
+        command = ["link", "check", "--firmware", verb, "--vehicle", "coax", "--settings", "timeout=0.3", "--mavlink"]
         assert "is in use by another program" in one_message(swash(*command, address))
     assert "no autopilot was heard within 0.3 s" in one_message(swash(*command, address))
 
@@ -136,7 +136,16 @@ def test_a_model_file_is_a_vehicle(tmp_path: Path) -> None:
 
 def test_listening_beyond_this_machine_is_warned_of() -> None:
     outcome = swash(
-        "link", "ardupilot", "--vehicle", "coax", "--listen", "0.0.0.0", "--port", "0", "--idle-exit", "0.1"
+        "link",
+        "ardupilot",
+        "--vehicle",
+        "coax",
+        "--port",
+        "0",
+        "--idle-exit",
+        "0.1",
+        "--settings",
+        saying(listen="0.0.0.0"),
     )
     assert outcome.code == 0
     assert "Listening beyond this machine" in outcome.err
@@ -145,12 +154,12 @@ def test_listening_beyond_this_machine_is_warned_of() -> None:
 @pytest.mark.proof  # what the file says is in tests/unit/links/test_link_parameters.py
 def test_parameters_for_ardupilot_are_written_and_nothing_waits(tmp_path: Path) -> None:
     file = tmp_path / "raptor50.parm"
-    outcome = swash("link", "ardupilot", "--vehicle", "raptor50", "--write-parameters", file)
+    outcome = swash("link", "parameters", "--vehicle", "raptor50", "--out", file)
     assert outcome.code == 0, outcome.err
-    assert f"written: {file}" in " ".join(outcome.err.split())
+    assert outcome.out.strip() == f"Written: {file}"
     assert "H_SW_TYPE,3\n" in file.read_text(encoding="utf-8")
 
 
 def test_a_place_where_no_parameters_can_be_written_is_refused(tmp_path: Path) -> None:
-    refused = swash("link", "ardupilot", "--vehicle", "raptor50", "--write-parameters", tmp_path / "no" / "x.parm")
+    refused = swash("link", "parameters", "--vehicle", "raptor50", "--out", tmp_path / "no" / "x.parm")
     assert "the folder does not exist" in one_message(refused)

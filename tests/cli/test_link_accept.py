@@ -21,10 +21,10 @@ def test_what_is_refused(tmp_path: Path) -> None:
     assert "there is no such file" in one_message(swash(*command))
     assert "'0.4' is not LOW-HIGH" in one_message(swash(*command, "--band", "0.4"))
     assert "'rol' is none of roll, pitch, yaw, heave" in one_message(swash(*command, "--axes", "rol"))
-    given = [*command[:2], BINARY, *command[3:], "--defaults", tmp_path / "no.parm", "--instance", "61"]
+    given = [*command[:2], BINARY, *command[3:], "--defaults", tmp_path / "no.parm", "--settings", "instance=61"]
     assert "no.parm: --defaults: there is no such file" in one_message(swash(*given))
     assert not (tmp_path / "out").exists()
-    ended = one_message(swash(*command[:2], "/bin/true", *command[3:], "--instance", "61"))
+    ended = one_message(swash(*command[:2], "/bin/true", *command[3:], "--settings", "instance=61"))
     assert "/bin/true: the binary ended with exit code 0; it said nothing." in ended
     assert "gains" not in ended
 
@@ -40,7 +40,7 @@ def test_a_command_that_is_stopped_leaves_no_binary_behind(number: signal.Signal
         "PYTHONPATH": os.pathsep.join(sys.path),
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
     }
-    with subprocess.Popen([*command, "--out", str(out), "--instance", "62"], env=environment) as trial:
+    with subprocess.Popen([*command, "--out", str(out), "--settings", "instance=62"], env=environment) as trial:
         until = time.monotonic() + 120.0
         while not (out / "sitl" / "pid").exists():
             assert time.monotonic() < until

@@ -32,14 +32,16 @@ def page_is_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_a_port_in_use_is_told() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
-        for command in (["live", "coax"], ["replay", "nothing.nc"]):
+        for command in (["live", "coax"], ["live", "--replay", "nothing.nc"]):
             assert "--port 0 takes any free port" in one_message(swash(*command, "--port", port))
 
 
-@pytest.mark.parametrize("command", [["live", "coax"], ["replay", "nothing.nc"]])
+@pytest.mark.parametrize("command", [["live", "coax"], ["live", "--replay", "nothing.nc"]])
 def test_other_machines_are_let_in_only_when_asked_to(command: list[str]) -> None:
-    assert "--allow-remote" in one_message(swash(*command, "--host", "0.0.0.0", "--port", "0"))
-    assert "no address of this machine" in one_message(swash(*command, "--host", "nowhere.invalid", "--port", "0"))
+    assert "allow_remote=true" in one_message(swash(*command, "--settings", "host=0.0.0.0", "--port", "0"))
+    assert "no address of this machine" in one_message(
+        swash(*command, "--settings", "host=nowhere.invalid", "--port", "0")
+    )
 
 
 def test_live_refuses_what_cannot_fly(tmp_path: Path) -> None:
@@ -80,7 +82,11 @@ def test_a_linear_model_flies_by_hand_but_stands_under_no_autopilot(
 
 def test_what_is_misspelt_is_told_before_what_a_checkout_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(libraries, "PAGE", tmp_path / "nothing")
-    for command in (["live", "nosuch"], ["replay", "nothing.nc"], ["replay", "nothing.nc", "--model", "nosuch"]):
+    for command in (
+        ["live", "nosuch"],
+        ["live", "--replay", "nothing.nc"],
+        ["live", "nosuch", "--replay", "nothing.nc"],
+    ):
         assert "vendor" not in one_message(swash(*command, "--port", "0"))
     told = one_message(swash("live", "coax", "--port", "0", "--controller", _broken(tmp_path)))
     assert "is not TOML" in told
@@ -94,9 +100,9 @@ def _broken(folder: Path) -> Path:
 
 
 def test_replay_refuses_what_it_cannot_show(tmp_path: Path) -> None:
-    assert "nothing.nc" in one_message(swash("replay", "nothing.nc", "--port", "0"))
+    assert "nothing.nc" in one_message(swash("live", "--replay", "nothing.nc", "--port", "0"))
     (tmp_path / "poor.csv").write_text("time [s],p [rad/s]\n" + "".join(f"{0.01 * i},{i % 7}\n" for i in range(300)))
-    told = one_message(swash("replay", tmp_path / "poor.csv", "--model", "coax", "--port", "0"))
+    told = one_message(swash("live", "coax", "--replay", tmp_path / "poor.csv", "--port", "0"))
     assert "lacks x, y, z" in told
     assert "It has p" in told
 

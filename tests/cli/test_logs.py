@@ -59,7 +59,7 @@ def test_a_log_cut_off_is_named_where_a_model_is_held_against_it(tmp_path: Path)
     whole = dataflash(ardupilot_rows())
     path.write_bytes(whole[: len(whole) // 2])
     model.write_text(to_toml(structure("rotor_body")), encoding="utf-8")
-    done = swash("validate", "--model", model, "--flight", path, "--out", tmp_path / "out")
+    done = swash("validate", "--vehicle", model, "--flight", path, "--out", tmp_path / "out")
     assert done.code == 2
     assert "cut off" in done.err
     assert "what was read is used" in done.out  # the numbers come all the same, marked

@@ -44,18 +44,24 @@ def test_rotor_speed_is_measured_from_vibration_and_saved(tmp_path: Path) -> Non
     turning = np.exp(-2j * np.pi * 35.0 * time) + 0.5 * rng.standard_normal(900) + 0.5j * rng.standard_normal(900)
     log, out = tmp_path / "log.nc", tmp_path / "out.nc"
     Flight.from_arrays(time, {"phi": 1e-3 * turning.real, "theta": 1e-3 * turning.imag}).save(log)
-    outcome = swash("rotor-speed", log, "--line", "omega_upper=-40..-30", "--out", out)
+    outcome = swash("inspect", log, "--rotor-speed", "--line", "omega_upper=-40..-30", "--out", out)
     assert outcome.code == 0
     assert "omega_upper: 219." in outcome.out
     assert np.mean(Flight.load(out).values("omega_upper")) == pytest.approx(2 * np.pi * 35.0, abs=0.4)
-    refused = swash("rotor-speed", log, "--line", "omega_lower=30..40")
+    refused = swash("inspect", log, "--rotor-speed", "--line", "omega_lower=30..40")
     assert refused.code != 0
     assert "no line stands out" in refused.err
-    assert "is no line" in swash("rotor-speed", log, "--line", "omega_lower").err
+    assert "is no line" in swash("inspect", log, "--rotor-speed", "--line", "omega_lower").err
 
 
 def test_vehicles_are_listed_with_what_they_are() -> None:
-    for arguments in (("vehicles",), ("vehicles", "list")):
+    for arguments in (
+        (
+            "vehicle",
+            "list",
+        ),
+        ("vehicle", "list"),
+    ):
         outcome = swash(*arguments)
         assert outcome.code == 0
         for name, card in packaged_cards().items():
@@ -64,7 +70,7 @@ def test_vehicles_are_listed_with_what_they_are() -> None:
 
 
 def test_a_vehicle_is_shown_with_every_number() -> None:
-    outcome, card = swash("vehicles", "show", "coax"), packaged_cards()["coax"]
+    outcome, card = swash("vehicle", "show", "coax"), packaged_cards()["coax"]
     assert outcome.code == 0
     assert card.trust in outcome.out
     for name, parameter in card.parameters.items():
@@ -73,13 +79,13 @@ def test_a_vehicle_is_shown_with_every_number() -> None:
 
 
 def test_a_vehicle_as_json_and_its_hover() -> None:
-    document, card = json.loads(swash("vehicles", "show", "coax", "--json", "--trim").out), packaged_cards()["coax"]
+    document, card = json.loads(swash("vehicle", "show", "coax", "--json", "--trim").out), packaged_cards()["coax"]
     assert {name: entry["value"] for name, entry in document["parameters"].items()} == card.values()
     hover = document["trim"]["states"]
     weight = card.values()["mass"] * 9.81
     thrust = sum(card.values()[f"k_thrust_{r}"] * hover[f"omega_{r}"] ** 2 for r in ("upper", "lower"))
     assert thrust == pytest.approx(weight, rel=1e-2)  # the two discs are level: the air's density differs a little
-    assert "eigenvalue" in swash("vehicles", "show", "coax", "--trim").out
+    assert "eigenvalue" in swash("vehicle", "show", "coax", "--trim").out
 
 
 def test_data_sets_are_listed_with_where_they_are() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import one_message, swash
+from commands import one_message, saying, swash
 
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.series import parse
@@ -43,9 +43,9 @@ def test_ardupilots_schedule_and_parameters(tmp_path: Path) -> None:
     flight = read(tmp_path / "a.csv")
     chirp = Chirp.planned(10, 0.1, (0.5, 8.0), record=60.0, fade=3.0)
     np.testing.assert_array_equal(flight.values("roll"), chirp.signal(flight.time("roll")))
-    document = json.loads(swash("maneuver", SWEEP, "--ardupilot", "--sid-axis", "7", "--json").out)
+    document = json.loads(swash("maneuver", SWEEP, "--ardupilot", "--json", "--settings", saying(sid_axis=7)).out)
     assert document["ardupilot"]["SID_AXIS"] == 7.0
-    assert document["written"] == []
+    assert "written" not in document
     assert {check["rule"] for check in document["checks"]} >= {"sample rate", "length", "windows"}
 
 
@@ -56,13 +56,13 @@ def test_ardupilots_schedule_and_parameters(tmp_path: Path) -> None:
         ((SWEEP, "--out", "a.txt"), "expected .csv"),
         ((SWEEP, "--out", "nowhere/a.csv"), "nowhere"),
         ((SWEEP, "--noise", "1"), "--noise and --gain"),
-        ((SWEEP, "--noise", "1", "--gain", "1", "--coherence", "1"), "make no sense"),
+        ((SWEEP, "--noise", "1", "--gain", "1", "--settings", "coherence=1"), "make no sense"),
         (("doublet:roll,1s", "--ardupilot"), "flies sweeps only"),
         (("sweep:tail,1-2Hz,60s", "--ardupilot"), "'tail' has no SID_AXIS"),
-        ((SWEEP, "--ardupilot", "--sid-axis", "99"), "99 is no SID_AXIS"),
-        ((SWEEP, "--sid-axis", "7"), "without --ardupilot"),
-        ((SWEEP, "--ardupilot", "--sid-axis", "12"), "12 is the yaw mixer, and the sweep is one of roll"),
-        (("sweep:heave,0.5-8Hz,60s", "--ardupilot", "--sid-axis", "10"), "the sweep is one of heave"),
+        ((SWEEP, "--ardupilot", "--settings", "sid_axis=99"), "99 is no SID_AXIS"),
+        ((SWEEP, "--settings", "sid_axis=7"), "without --ardupilot"),
+        ((SWEEP, "--ardupilot", "--settings", "sid_axis=12"), "12 is the yaw mixer, and the sweep is one of roll"),
+        (("sweep:heave,0.5-8Hz,60s", "--ardupilot", "--settings", "sid_axis=10"), "the sweep is one of heave"),
         (("sweep:roll,0.5-8Hz,60s,15", "--ardupilot"), "beyond the mixer's range"),
         (("sweep:roll,0.02-2Hz,300s", "--ardupilot"), "SID_T_REC"),
     ],

@@ -13,7 +13,7 @@ from swashplate.api.designed_maneuver import DesignedManeuver, Offer
 from swashplate.flights.maneuvers.composed import composed
 from swashplate.flights.maneuvers.series import parse
 
-ASKED = ("maneuver", "design", "--for", "coax", "--unknown", "tau_f_upper, linkage_lower")
+ASKED = ("maneuver", "design", "--vehicle", "coax", "--unknown", "tau_f_upper, linkage_lower")
 PEAKS = {"attitude": 5.0, "rate": 50.0, "place": 0.5}
 
 
@@ -43,7 +43,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         found.update(rest, vehicle=vehicle.name, unknown=unknown)
         return made(found["best"])
 
-    monkeypatch.setitem(vars(sp), "design_maneuver", stand_in)
+    monkeypatch.setattr("swashplate.api.design_maneuver.design_maneuver", stand_in)
     return found
 
 
@@ -62,20 +62,20 @@ def test_the_command_is_the_call(asked: dict[str, Any], tmp_path: Path) -> None:
     assert (outcome.code, outcome.err) == (0, "")
     for words in ("multisine", "What each second buys", "FLIGHT CARD", "roll at most 0.2, pitch at most 0.1", "d.txt"):
         assert words in outcome.out
-    assert asked["unknown"] == ["tau_f_upper", "linkage_lower"]
+    assert asked["unknown"] == ("tau_f_upper", "linkage_lower")
     assert asked["limits"] == {"attitude": 6.0, "seconds": 10.0}
     assert asked["band"] == (0.5, 8.0)
-    assert asked["axes"] == ["roll", "pitch"]
+    assert asked["axes"] == ("roll", "pitch")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["d.csv", "d.txt"]
 
 
 def test_a_script_is_written_where_the_design_can_be_flown_as_angles(asked: dict[str, Any], tmp_path: Path) -> None:
-    outcome = swash(*ASKED, "--script", tmp_path / "d.lua")
+    outcome = swash(*ASKED, "--out", tmp_path / "d.lua")
     assert (outcome.code, outcome.err) == (0, "")
     assert "d.lua" in outcome.out
     assert "local LINES" in (tmp_path / "d.lua").read_text(encoding="utf-8")
     asked["best"] = "sweep"
-    assert "the best offer is the sweep" in one_message(swash(*ASKED, "--script", tmp_path / "e.lua"))
+    assert "the best offer is the sweep" in one_message(swash(*ASKED, "--out", tmp_path / "e.lua"))
     assert not (tmp_path / "e.lua").exists()
 
 
@@ -89,12 +89,11 @@ def test_a_sweep_that_is_best_comes_with_ardupilots_parameters(asked: dict[str, 
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (("--limits", "attitude"), "is 'attitude', expected NAME=VALUE"),
-        (("--limits", "attitude=steep"), "is 'attitude=steep', expected NAME=VALUE"),
-        (("--limits", "place=2,seconds=9,place=3"), "--limits: says place twice"),
-        (("--band", "fast"), "is 'fast', expected LOW-HIGH"),
-        (("--out", "design.txt"), "expected .csv"),
-        (("--script", "design.txt"), "expected .lua"),
+        (("--limits", "attitude"), "'attitude' is not NAME=VALUE"),
+        (("--limits", "attitude=steep"), "'steep' is not a number"),
+        (("--limits", "place=2,seconds=9,place=3"), "--limits: place is given twice"),
+        (("--band", "fast"), "'fast' is not LOW-HIGH"),
+        (("--out", "design.txt"), "expected one of .csv, .lua"),
     ],
 )
 def test_what_cannot_be_read_is_refused(asked: dict[str, Any], more: tuple[str, ...], words: str) -> None:

@@ -27,12 +27,15 @@ def words(text: str) -> set[str]:
     "verb",
     [
         ("inspect", "FLOWN"),
-        ("vehicles",),
-        ("vehicles", "show", "coax"),
-        ("trim", "raptor50", "--speed", "0-10/5"),
-        ("derivatives", "raptor50"),
+        (
+            "vehicle",
+            "list",
+        ),
+        ("vehicle", "show", "coax"),
+        ("vehicle", "trim", "raptor50", "--speed", "0-10/5"),
+        ("vehicle", "derivatives", "raptor50"),
         ("maneuver", "sweep:roll,0.5-8Hz,30s,0.1"),
-        ("bench", "plan", "coax", "--accuracy", "0.05"),
+        ("bench", "plan", "--accuracy", "0.05"),
     ],
     ids=" ".join,
 )

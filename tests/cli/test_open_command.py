@@ -35,9 +35,9 @@ def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
 
 
 def test_an_address_of_others_must_be_meant() -> None:
-    done = CliRunner().invoke(app, ["open", "--port", "0", "--host", "0.0.0.0"])
+    done = CliRunner().invoke(app, ["open", "--port", "0", "--settings", "host=0.0.0.0"])
     assert done.exit_code == 2
-    assert "--allow-remote" in done.output
+    assert "allow_remote=true" in done.output
 
 
 def test_the_page_is_served_with_the_options_of_the_reading(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -16,9 +16,12 @@ from commands import one_message, swash
 
 import swashplate as sp
 from swashplate.api import identification
+from swashplate.api.question import VerbQuestion
+from swashplate.atomic import folder_when_complete
 from swashplate.cli.app import app
 from swashplate.cli.console import as_json
-from swashplate.cli.outputs import folder_when_complete, place_of, told
+from swashplate.cli.generate import checked_endings
+from swashplate.cli.run import told, written
 from swashplate.errors import IdentificationError, SwashError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
@@ -71,6 +74,12 @@ def _validation(fit: Result[Any, Any], flights: list[Flight]) -> Validation:
     )
 
 
+class Paged(VerbQuestion[None]):
+    """Writes a page and a fit."""
+
+    files = ("report.html", "fit.json")
+
+
 class Work:
     """Stands in for the minutes of computing; a test changes what comes out of it."""
 
@@ -105,6 +114,8 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Iterator[Work]:
         monkeypatch.setitem(vars(sp), verb, getattr(done, verb))  # in the dictionary: nothing else is loaded
     for verb in ("identify", "validate"):
         monkeypatch.setattr(identification, verb, getattr(done, verb))
+    monkeypatch.setattr("swashplate.validation.verb.validate", done.validate)
+    monkeypatch.setattr("swashplate.reporting.report.report", done.report)
     monkeypatch.setattr(identification, "structure_of", lambda *results, title: results)
     monkeypatch.setattr(
         "swashplate.api.report_folder.write_page", lambda path, results: done.report(*results, path=path)
@@ -171,7 +182,7 @@ def test_identify_writes_four_files_and_ends_with_its_summary(work: Work, simula
     assert _names(tmp_path / "deep") == ["fit"]
     assert sp.vehicle(out / "model.toml").card.values()["tau_f_upper"] == 1.3
     assert json.loads((out / "fit.json").read_text())["estimates"][0]["sigma_corrected"] is None  # NaN is not JSON
-    last = outcome.out.rstrip().splitlines()[-6:]
+    last = [line for line in outcome.out.splitlines() if line][-6:]
     assert [line.split(":")[0] for line in last] == ["What", "Fit", "Prediction", "Verdict", "Warnings", "Report"]
     assert "81" in last[2]
     assert "35" in last[2]
@@ -181,12 +192,20 @@ def test_identify_writes_four_files_and_ends_with_its_summary(work: Work, simula
 
 
 def test_what_the_user_said_reaches_the_identification(work: Work, simulated: Path) -> None:
-    said = ("--free", "tau_f_upper,linkage_lower", "--method", "output-error", "--fix", "mass=0.333", "--tie")
+    said = ("--free", "tau_f_upper,linkage_lower", "--method", "output-error", "--fix", "mass=0.333", "--settings")
     outcome = _identify(
-        simulated, *said, "a_beta_u = a_alpha_v", "--prior", "tau_f_upper=1.6,0.4", "--iterations", "7", "--rate", "50"
+        simulated,
+        *said,
+        "tie=a_beta_u = a_alpha_v",
+        "--prior",
+        "tau_f_upper=1.6,0.4",
+        "--settings",
+        "iterations=7",
+        "--rate",
+        "50",
     )
     assert outcome.code == 0
-    assert work.asked["free"] == ["tau_f_upper", "linkage_lower"]
+    assert work.asked["free"] == ("tau_f_upper", "linkage_lower")
     assert work.asked["method"] == "output-error"
     assert work.asked["fixed"] == {"mass": 0.333}
     assert work.asked["ties"] == ("a_beta_u = a_alpha_v",)
@@ -239,7 +258,9 @@ def test_json_is_all_that_stands_on_standard_output(work: Work, simulated: Path)
     document = json.loads(_identify(simulated, "--json").out)
     assert document["fit"]["estimates"][0]["name"] == "tau_f_upper"
     assert document["validation"] is None
-    assert json.loads(swash("validate", "--model", "coax", "--flight", simulated, "--json").out)["kind"] == "validation"
+    assert (
+        json.loads(swash("validate", "--vehicle", "coax", "--flight", simulated, "--json").out)["kind"] == "validation"
+    )
 
 
 def test_quiet_is_quiet(work: Work, simulated: Path, tmp_path: Path) -> None:
@@ -249,7 +270,7 @@ def test_quiet_is_quiet(work: Work, simulated: Path, tmp_path: Path) -> None:
 
 def test_validate_prints_every_rival_and_the_verdict(work: Work, simulated: Path, tmp_path: Path) -> None:
     out = tmp_path / "validation"
-    outcome = swash("validate", "--model", "coax", "--flight", simulated, "--horizons", "0.5,1", "--out", out)
+    outcome = swash("validate", "--vehicle", "coax", "--flight", simulated, "--horizons", "0.5,1", "--out", out)
     assert outcome.code == 0, outcome.err
     assert work.asked["horizons"] == (0.5, 1.0)
     for part in ("fit % model", "card", "hold", "rms", "Theil", "81", "35", "cannot be judged"):
@@ -259,7 +280,7 @@ def test_validate_prints_every_rival_and_the_verdict(work: Work, simulated: Path
 
 def test_wrong_horizons_are_refused(work: Work, simulated: Path) -> None:
     for text in ("-1,2", "soon"):
-        message = one_message(swash("validate", "--model", "coax", "--flight", simulated, f"--horizons={text}"))
+        message = one_message(swash("validate", "--vehicle", "coax", "--flight", simulated, f"--horizons={text}"))
         assert "--horizons" in message
 
 
@@ -274,7 +295,6 @@ def test_a_folder_is_replaced_file_by_file(tmp_path: Path) -> None:
     for name in ("old", "both", "mine"):
         (target / name).write_text("before", encoding="utf-8")
     with folder_when_complete(target, ours=("old", "both", "new")) as folder:
-        assert folder is not None
         for name in ("both", "new"):
             (folder / name).write_text("after", encoding="utf-8")
         assert _names(target)[-3:] == ["both", "mine", "old"]
@@ -286,47 +306,49 @@ def test_a_folder_is_replaced_file_by_file(tmp_path: Path) -> None:
 
 
 def test_an_output_is_a_file_or_a_folder_by_its_ending(tmp_path: Path) -> None:
-    ours = ("report.html", "fit.json")
-    with folder_when_complete(tmp_path / "deep" / "mine.json", ours=ours) as folder:
-        assert folder is not None
-        for name in ours:
+    asked = Paged()
+    with written(asked, tmp_path / "mine.json") as (folder, names):
+        assert names == ("mine.json",)
+        for name in asked.files:
             (folder / name).write_text(name)
-    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["mine.json"]
-    assert (tmp_path / "deep" / "mine.json").read_text() == "fit.json"
-    (tmp_path / "run.json").mkdir()
-    assert place_of(tmp_path / "run.json", "fit.json", ours) == tmp_path / "run.json" / "fit.json"
-    assert place_of(tmp_path / "v1.2", "fit.json", ours) == tmp_path / "v1.2" / "fit.json"
-    with (
-        pytest.raises(SwashError, match=r"ends in '\.pdf', expected one of \.html, \.json, or a folder for all"),
-        folder_when_complete(tmp_path / "a.pdf", ours=ours),
-    ):
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.json"]
+    assert (tmp_path / "mine.json").read_text() == "fit.json"
+    for folder_named in ("run.json", "v1.2"):
+        (tmp_path / folder_named).mkdir()
+        with written(asked, tmp_path / folder_named) as (_, names):
+            assert names == asked.files
+    with pytest.raises(SwashError, match=r"ends in '\.pdf', expected one of \.html, \.json, or a folder for all"):
+        checked_endings(asked, [tmp_path / "a.pdf"])
+    with pytest.raises(SwashError, match="the folder does not exist"), written(asked, tmp_path / "deep" / "mine.json"):
         pass
 
 
 def test_a_vehicle_is_an_argument_or_an_option_in_every_verb() -> None:
-    one, other = swash("trim", "coax", "--json"), swash("trim", "--json", "--vehicle", "coax")
+    one, other = swash("vehicle", "trim", "coax", "--json"), swash("vehicle", "trim", "--json", "--vehicle", "coax")
     assert one.code == 0
     assert json.loads(one.out) == json.loads(other.out)
-    assert "Did you mean 'rmax'?" in one_message(swash("trim", "--vehicle=rmaxx"))
+    assert "Did you mean 'rmax'?" in one_message(swash("vehicle", "trim", "--vehicle=rmaxx"))
     assert "Did you mean 'rmax'?" in one_message(
         swash("simulate", "rmaxx", "--maneuver", "doublet:roll,0.5s,0.2", "-o", "a.nc")
     )
-    assert "Did you mean 'rotor_body'?" in one_message(swash("fit-ss", "rotor_bodi", "responses.nc"))
-    for words in (("validate", "rmaxx"), ("validate", "--vehicle", "rmaxx"), ("validate", "--model=rmaxx")):
+    assert "Did you mean 'rotor_body'?" in one_message(
+        swash("identify", "--structure", "rotor_bodi", "--responses", "responses.nc")
+    )
+    for words in (("validate", "rmaxx"), ("validate", "--vehicle", "rmaxx"), ("validate", "--vehicle=rmaxx")):
         assert "Did you mean 'rmax'?" in one_message(swash(*words, "--flight", "none.nc"))
     assert "Did you mean 'rmax'?" in one_message(swash("maneuver", "design", "--vehicle", "rmaxx", "--unknown", "mass"))
-    assert "--model: is given more than once" in one_message(swash("validate", "--vehicle", "a", "--model", "b"))
+    assert "--vehicle: is given more than once" in one_message(swash("validate", "--vehicle", "a", "--vehicle", "b"))
 
 
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("trim raptor50 --set mas=3", "Did you mean 'mass'?"),
-        ("trim raptor50 --option bars=true", "Did you mean 'bar'?"),
-        ("trim coax --option rottor=true", "Did you mean 'rotor'?"),
-        ("vehicles rmaxx", "Did you mean 'rmax'?"),
-        ("vehicles lst", "Did you mean 'list'?"),
-        ("structures hybird", "Did you mean 'hybrid'?"),
+        ("vehicle trim raptor50 --set mas=3", "Did you mean 'mass'?"),
+        ("vehicle trim raptor50 --set bars=true", "Did you mean 'bar'?"),
+        ("vehicle trim coax --set mixin=rotation", "Did you mean 'mixing'?"),
+        ("vehicle rmaxx", "Did you mean 'rmax'?"),
+        ("vehicle lst", "Did you mean 'list'?"),
+        ("vehicle structures hybird", "Did you mean 'hybrid'?"),
         ("bench plann", "Did you mean 'plan'?"),
         ("data fetch coax65", "Did you mean 'coax56'?"),
     ],
@@ -338,17 +360,19 @@ def test_a_name_that_is_nearly_right_is_asked_after(line: str, words: str) -> No
 
 
 def test_the_last_line_names_what_was_written(tmp_path: Path) -> None:
-    ours = ("responses.nc", "report.html")
-    assert told(tmp_path / "mine.nc", ours) == f"Written: {tmp_path / 'mine.nc'}"
-    assert told(tmp_path / "study", ours) == f"Report: {tmp_path / 'study' / 'report.html'}"
+    study = tmp_path / "study"
+    study.mkdir()
+    (study / "report.html").touch()
+    assert told([tmp_path / "mine.json"]) == f"Written: {tmp_path / 'mine.json'}"
+    assert told([study]) == f"Report: {study / 'report.html'}"
 
 
 def test_what_was_meant_comes_before_a_long_list(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("time [s],phi [deg],servo_roll\n" + "".join(f"{k / 100},{k},0.1\n" for k in range(20)))
-    told = one_message(swash("plot", log, "--channels", "servo_rol", "-o", tmp_path / "a.png"))
+    told = one_message(swash("inspect", log, "--channels", "servo_rol", "-o", tmp_path / "a.png"))
     assert told.index("Did you mean 'servo_roll'?") < told.index("It has phi, servo_roll.")
-    done = swash("plot", log, "-o", tmp_path / "a.png")
+    done = swash("inspect", log, "-o", tmp_path / "a.png")
     assert (done.code, (tmp_path / "a.png").is_file()) == (0, True)
 
 

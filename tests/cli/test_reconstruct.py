@@ -12,12 +12,12 @@ import swashplate as sp
 
 def test_a_flight_is_reconstructed_and_written(simulated: Path, tmp_path: Path) -> None:
     out = tmp_path / "corrected.nc"
-    done = swash("reconstruct", simulated, "-o", out)
+    done = swash("inspect", simulated, "--reconstruct", "-o", out)
     assert done.code == 0, done.err
     assert f"Written: {out}" in done.out
     flight = sp.read(out)
     assert flight.history[-1].operation == "correct_sensors"
-    told = json.loads(swash("reconstruct", simulated, "--json").out)
+    told = json.loads(swash("inspect", simulated, "--reconstruct", "--json").out)
     assert set(told) == {"biases", "scales", "time_shifts", "lever", "notes", "wind"}
     assert sorted(told["biases"]) == sorted(flight.history[-1].details["biases"])
     assert told["biases"] or any("not measured" in note for note in told["notes"])

@@ -20,7 +20,7 @@ from swashplate.cli.console import console
 from swashplate.flights import inspect as inspect_module
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["identify", "--help"], ["vehicles", "show", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["identify", "--help"], ["vehicle", "show", "--help"]])
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     code = (
         "import sys\nfrom swashplate.cli.app import app\n"
@@ -154,7 +154,7 @@ def test_a_closed_pipe_is_quiet(simulated: Path) -> None:
 
 
 def test_closed_streams_are_no_bug_and_no_file_takes_their_place(tmp_path: Path) -> None:
-    words = "import sys; from swashplate.__main__ import main; sys.argv[1:] = ['structures']; main()"
+    words = "import sys; from swashplate.__main__ import main; sys.argv[1:] = ['vehicle', 'structures']; main()"
     asked = 'exec "$0" -c "$1" <&- >&- 2>"$2"'
     ended = subprocess.run(["sh", "-c", asked, sys.executable, words, str(tmp_path / "said")], check=False)
     assert (ended.returncode, (tmp_path / "said").read_text()) == (0, "")
@@ -163,7 +163,7 @@ def test_closed_streams_are_no_bug_and_no_file_takes_their_place(tmp_path: Path)
 @pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.proof)])
 def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path, number: signal.Signals) -> None:
     code = (
-        "import signal, time\nfrom swashplate.cli import identify\nfrom swashplate.cli.app import main\n"
+        "import signal, time\nfrom swashplate.cli.app import main\n"
         "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"  # `nohup make test` would hand down that it is ignored
         "from swashplate.api import identification\n"
         "def slow(*_, **__):\n    print('fitting', flush=True)\n    time.sleep(60)\n"
@@ -192,14 +192,22 @@ from swashplate.__main__ import main
 if wanted == "the command line":
     from typer.core import TyperGroup
     TyperGroup.make_context = lambda *_, **__: os.kill(os.getpid(), signal.SIGINT)
-sys.argv = ["swash", "trim", "--vehicle", "coax"]
+sys.argv = ["swash", "vehicle", "trim", "--vehicle", "coax"]
 main()
 """
 
 
 @pytest.mark.parametrize(
     "loaded",
-    ["swashplate.threads", "swashplate.cli.app", "typer", "swashplate.cli.trim", "numpy", "casadi", "the command line"],
+    [
+        "swashplate.threads",
+        "swashplate.cli.app",
+        "typer",
+        "swashplate.api.verbs.steady",
+        "numpy",
+        "casadi",
+        "the command line",
+    ],
 )
 def test_an_interrupt_while_something_is_loaded_ends_in_words(loaded: str) -> None:
     words = [sys.executable, "-P", "-c", INTERRUPTED, loaded]

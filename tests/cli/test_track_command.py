@@ -25,7 +25,7 @@ def log(tmp_path: Path) -> Path:
 
 def test_it_shows_writes_and_exports(log: Path, tmp_path: Path) -> None:
     out, code = tmp_path / "out", tmp_path / "code"
-    done = swash("track", log, "--equation", EQUATION, "--held", "servo_pitch", "--out", out, "--c", code)
+    done = swash("track", log, "--equation", EQUATION, "--held", "servo_pitch", "--out", out, "--code", code)
     assert (done.code, done.err) == (0, "")
     assert "Mq" in done.out
     assert "stood still 4.99 to 5.20 s: a value that is no number" in done.out
@@ -42,7 +42,7 @@ def test_what_cannot_be_told_ends_with_a_message(log: Path) -> None:
         (("--equation", "q_dot"), "is no equation"),
         ((), "--equation"),
         (("--equation", EQUATION, "--band", "5-1"), "--band"),
-        (("--equation", EQUATION, "--delay", "servo_pitch=late"), "--delay"),
+        (("--equation", EQUATION, "--settings", "delay=servo_pitch=late"), "delay"),
     ):
         done = swash("track", log, *arguments)
         assert done.code == 2

@@ -57,7 +57,7 @@ def test_from_a_yaw_sweep_to_gains(tmp_path: Path) -> None:
     asked = ("--inputs", "mixer_yaw", "--outputs", "r", "--references", "sid_target")
     done = swash("respond", log, *asked, "--out", responses)
     assert done.code == 0, done.err
-    done = swash("fit-ss", "yaw", responses, "--gains", "--json")
+    done = swash("identify", "--structure", "yaw", "--responses", responses, "--gains", "--json")
     assert done.code == 0, done.err
     document = json.loads(done.out)
     found = {p["name"]: p["value"] for p in document["fit"]["estimates"]}

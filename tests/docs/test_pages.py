@@ -20,6 +20,7 @@ import typer
 import report_samples
 import swashplate as sp
 from swashplate.cli.app import app
+from swashplate.cli.generate import asked
 from swashplate.flights import datasets
 from swashplate.reporting.compose import compose
 
@@ -121,11 +122,15 @@ def test_a_command_is_one_that_the_command_line_takes(name: str, command: Any) -
         assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE)
         return
     assert words[0] == "swash", f"{name}: `{command.line}` is neither swash nor make"
-    parsed, rest = _command_line(), words[1:]
-    context = parsed.make_context("swash", list(rest), resilient_parsing="--help" in rest)
-    while hasattr(parsed, "commands") and rest and rest[0] in parsed.commands:
-        parsed, rest = parsed.commands[rest[0]], rest[1:]
-        context = parsed.make_context(parsed.name, list(rest), parent=context, resilient_parsing="--help" in rest)
+    parsed, rest, helped = _command_line(), words[1:], "--help" in words
+    context = first = parsed.make_context("swash", list(rest), resilient_parsing=helped)
+    while hasattr(parsed, "commands") and (rest := [*context._protected_args, *context.args]):
+        parsed = parsed.commands[rest[0]]
+        context = parsed.make_context(parsed.name, rest[1:], parent=context, resilient_parsing=helped)
+    settings = first.params["settings"] or ()
+    if hasattr(parsed, "question") and not helped and not any(text.endswith(".toml") for text in settings):
+        with context:
+            asked(parsed.question, {k: v for k, v in context.params.items() if k != "out_"}, settings=settings)
 
 
 @pytest.mark.parametrize("name", [name for name, text in PAGES.items() if "<!-- generated:" in text])

@@ -43,8 +43,8 @@ def holds_in_flight(folder: Path) -> Values:
 
 @case()
 def decoupling(folder: Path) -> Values:
-    """`swash decouple` with a step, and the gains in its file."""
-    told = swash_json("decouple", "coax", "--step", "0.2", "--lag", "20", "--out", folder / "law.toml")
+    """`swash control decouple` with a step, and the gains in its file."""
+    told = swash_json("control", "decouple", "coax", "--step", "0.2", "--lag", "20", "--out", folder / "law.toml")
     return named("told", numbers(told)) | named("file", numbers(toml(folder / "law.toml")))
 
 
@@ -58,7 +58,7 @@ def toml(path: Path) -> Any:
 @case()
 def decoupling_checked(folder: Path) -> Values:
     """Margins, handling qualities, steps, coupling and gusts of the decoupling autopilot."""
-    swash("decouple", "coax", "--mode", "place", "--out", folder / "place.toml", "-q")
+    swash("control", "decouple", "coax", "--mode", "place", "--out", folder / "place.toml", "-q")
     how = ("--duration", "10", "--gusts", "indoor")
     return numbers(swash_json("control", "check", "coax", "--controller", folder / "place.toml", *how))
 
@@ -81,8 +81,8 @@ def lqg_of_a_state_space_model(folder: Path) -> Values:
     told = swash_json("control", "design", "thirteen_state", *sensors, "--out", folder / "lqg.toml")
     found = named("told", numbers(told)) | named("file", numbers(toml(folder / "lqg.toml"), 12))
     how = ("--controller", folder / "lqg.toml", "--maneuver", "doublet:lateral,0.5s,0.1", "--vary", "Lb=10%")
-    what = ("--monte-carlo", "8", "--out", folder / "worst.nc")
-    swash("simulate", "--vehicle", "thirteen_state", *how, *what, "-q")
+    what = ("--count", "8", "--out", folder / "worst.nc")
+    swash("control", "monte-carlo", "--vehicle", "thirteen_state", *how, *what, "-q")
     return found | named("worst", extract.of_flight(sp.read(folder / "worst.nc"), most=4))
 
 
@@ -99,12 +99,12 @@ def lqr_over_speed(folder: Path) -> Values:
 @case()
 def monte_carlo_of_the_coax(folder: Path) -> Values:
     """Eight drawn aircraft under the decoupling autopilot."""
-    swash("decouple", "coax", "--mode", "place", "--out", folder / "place.toml", "-q")
+    swash("control", "decouple", "coax", "--mode", "place", "--out", folder / "place.toml", "-q")
     how = ("--controller", folder / "place.toml", "--maneuver", "doublet:pitch,0.4s,0.05")
     how = (*how, "--vary", "mass=2%", "--vary", "tau_f_upper=10%")
     more = ("--gusts", "indoor", "--battery", "12.5-11.5", "--payload", "0.01", "--delay", "0.02", "--seed", "2")
-    what = ("--monte-carlo", "8", "--out", folder / "worst.nc", "-q")
-    swash("simulate", "--vehicle", "coax", *how, *more, *what)
+    what = ("--count", "8", "--out", folder / "worst.nc", "-q")
+    swash("control", "monte-carlo", "--vehicle", "coax", *how, *more, *what)
     return extract.of_flight(sp.read(folder / "worst.nc"), most=6)
 
 

@@ -96,7 +96,7 @@ def c_of_the_coax(folder: Path) -> Values:
 @case(needs=["casadi"])
 def c_of_the_others(folder: Path) -> Values:
     """A helicopter in single precision and with speed, a state-space model, the S-function, the FMU."""
-    found = named("raptor50", exported(folder, "raptor50", "c", "--speed", "5", "--precision", "single"))
+    found = named("raptor50", exported(folder, "raptor50", "c", "--speed", "5", "--precision", "float"))
     found |= named("lynx", exported(folder, "lynx", "c"))
     found |= named("thirteen", exported(folder, "thirteen_state", "c"))
     found |= named("simulink", exported(folder, "coax", "simulink"))
@@ -116,8 +116,8 @@ def linear_exports(folder: Path) -> Values:
 @case(needs=["casadi"])
 def c_of_controllers(folder: Path) -> Values:
     """The decoupling autopilot and two observers with their gains as C."""
-    swash("decouple", "coax", "--mode", "place", "--c", folder / "place.c", "-q")
+    swash("control", "decouple", "coax", "--mode", "place", "--out", folder / "place.c", "-q")
     sensors = ("--sensors", "imu@100,mocap@50+20ms", "-q")
-    swash("control", "design", "coax", *sensors, "--gain", "steady", "--c", folder / "steady.c")
-    swash("control", "design", "thirteen_state", "--sensors", "gyro@100,mocap@100", "--c", folder / "linear.c", "-q")
+    swash("control", "design", "coax", *sensors, "--gain", "steady", "--out", folder / "steady.c")
+    swash("control", "design", "thirteen_state", "--sensors", "gyro@100,mocap@100", "--out", folder / "linear.c", "-q")
     return of_folder(folder)

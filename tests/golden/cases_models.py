@@ -63,12 +63,12 @@ def trimmed(name: str) -> Values:
     """Trims over speed and the linear model of the first one, row by row; modes of all."""
     speeds = SPEEDS.get(name, "0-10/5")
     found: Values = {}
-    for told in swash_json("trim", name, "--speed", speeds)["trims"]:
+    for told in swash_json("vehicle", "trim", name, "--speed", speeds)["trims"]:
         at = f"{told['speed']:g}"
         found |= {f"{at}.{key}": value for key, value in (told["inputs"] | told["states"]).items()}
         if told.get("power") is not None:
             found[f"{at}.power"] = told["power"]
-    for k, model in enumerate(swash_json("linearize", name, "--speed", speeds)["models"]):
+    for k, model in enumerate(swash_json("vehicle", "linearize", name, "--speed", speeds)["models"]):
         at = f"{model['speed']:g}"
         for matrix, columns in (("A", model["states"]), ("B", model["inputs"])) if k == 0 else ():
             for state, row in zip(model["states"], model[matrix], strict=True):
@@ -96,17 +96,17 @@ def trims_off_the_straight(folder: Path) -> Values:
     found: Values = {}
     for label, how in {
         "climb": ("--climb", "2"),
-        "lateral": ("--lateral", "3"),
-        "turn": ("--speed", "6", "--turn", "10"),
-        "wind": ("--wind", "3,1,0.2"),
-        "high and heavy": ("--altitude", "1500", "--mass", "9.0"),
-        "bar": ("--option", "bar=true"),
+        "lateral": ("--settings", "lateral=3"),
+        "turn": ("--speed", "6", "--settings", "turn=10"),
+        "wind": ("--settings", "wind=3,1,0.2"),
+        "high and heavy": ("--settings", "altitude=1500", "--set", "mass=9.0"),
+        "bar": ("--set", "bar=true"),
     }.items():
-        (told,) = swash_json("trim", "raptor50", *how)["trims"]
+        (told,) = swash_json("vehicle", "trim", "raptor50", *how)["trims"]
         found |= named(label, told["inputs"] | told["states"])
     for label, how in {"full": (), "flapping": ("--form", "flapping"), "paper": ("--form", "paper")}.items():
         vehicle = "coax" if label == "full" else "raptor50"
-        (model,) = swash_json("linearize", vehicle, *how)["models"]
+        (model,) = swash_json("vehicle", "linearize", vehicle, *how)["models"]
         found[f"{label}.eigenvalues"] = sorted_values(np.linalg.eigvals(np.array(model["A"])))
     return found
 
@@ -114,7 +114,7 @@ def trims_off_the_straight(folder: Path) -> Values:
 @case(light=True)
 def derivatives_by_contributor(folder: Path) -> Values:
     """Of the Raptor at 8 m/s."""
-    (table,) = swash_json("derivatives", "raptor50", "--speed", "8")["tables"]
+    (table,) = swash_json("vehicle", "derivatives", "raptor50", "--speed", "8")["tables"]
     return by_contributor(table)
 
 
@@ -131,13 +131,13 @@ def derivatives_of_the_others(folder: Path) -> Values:
     """Of every helicopter in hover and at 10 m/s, and their bounds from the card's tolerances."""
     found: Values = {}
     for name in HELICOPTERS:
-        for table in swash_json("derivatives", name, "--speed", "0-10/10")["tables"]:
+        for table in swash_json("vehicle", "derivatives", name, "--speed", "0-10/10")["tables"]:
             values = {key: float(told["value"]) for key, told in table["derivatives"].items()}
             for letter in "XYZLMN":
                 chosen = [v for k, v in values.items() if k.startswith(letter)]
                 found |= apart(f"{name}.{table['speed']:g}.{letter}", thinned(chosen, 3))
     how = ("--uncertainty", "--draws", "20", "--seed", "3")
-    told = swash_json("derivatives", "raptor50", "--speed", "5", *how)
+    told = swash_json("vehicle", "derivatives", "raptor50", "--speed", "5", *how)
     return found | named("bounds", dict(list(extract.of_json(told, without=("by", "unit"), most=6).items())[:120]))
 
 

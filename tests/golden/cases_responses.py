@@ -101,7 +101,7 @@ def sweeps_of_others(folder: Path) -> Values:
     return found | named("sidpac", extract.of_transfer_function(fit))
 
 
-@case(data=["vehicles"])
+@case(data=["vehicle", "list"])
 def r50_from_sweeps(folder: Path) -> Values:
     """Published hover derivatives of an R-50 flown in a loop in gusts, identified from its sweeps, 13 states."""
     import r50
@@ -130,9 +130,9 @@ def coax_sweeps_on_the_command_line(folder: Path) -> Values:
     given = ("--inputs", "servo_roll,servo_pitch", "--outputs", "p,q", "--band", "0.1-8")
     swash("respond", *logs, *given, "--out", out, "-q")
     how = ("--input", "servo_pitch", "--outputs", "q", "--form", "1/3", "--band", "0.2-8", "--margins")
-    found = named("tf", numbers(swash_json("fit-tf", out, *how)))
-    how = ("--band", "0.3-8", "--starts", "1", "--reduce")
-    return found | named("ss", numbers(swash_json("fit-ss", "coaxial", out, *how), 6))
+    found = named("tf", numbers(swash_json("identify", "--responses", out, *how)))
+    how = ("--band", "0.3-8", "--settings", "starts=1", "--settings", "reduce=true")
+    return found | named("ss", numbers(swash_json("identify", "--structure", "coaxial", "--responses", out, *how), 6))
 
 
 def numbers(document: Any, most: int = 12) -> Values:

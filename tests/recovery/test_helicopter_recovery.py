@@ -75,7 +75,7 @@ def test_they_come_back_by_filter_error_and_the_model_predicts_another_flight(tm
            "--sensors", "clean", "--seed", 2, "--out", tmp_path / "again.nc", "-q")  # fmt: skip
     compare = (
         "validate",
-        "--model",
+        "--vehicle",
         tmp_path / "fit" / "model.toml",
         "--flight",
         tmp_path / "again.nc",
@@ -84,7 +84,9 @@ def test_they_come_back_by_filter_error_and_the_model_predicts_another_flight(tm
     )
     _swash(*compare, "--out", tmp_path / "check", "-q")
     fits = _fits(json.loads((tmp_path / "check" / "validation.json").read_text(encoding="utf-8")))
-    against_truth = _fits(json.loads(_swash(*compare, "--published", tmp_path / "true.toml", "--json", "-q")))
+    against_truth = _fits(
+        json.loads(_swash(*compare, "--settings", f"published={tmp_path / 'true.toml'}", "--json", "-q"))
+    )
     for channel in ("phi", "theta", "p", "q"):
         assert fits["model", channel] > fits["published card", channel], channel
         # What even the truth cannot predict is noise in the start: no better is to be had, and not much less.

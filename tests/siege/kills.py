@@ -60,10 +60,10 @@ def _two(words: str, old: str, new: str) -> Command:
 
 QUICK: Mapping[str, Command] = {
     "maneuver": _two("maneuver sweep:pitch,0.5-4Hz,*s --out OUT/series.csv", "30", "34"),
-    "plot to SVG": _two("plot INPUTS/log.csv --channels * --out OUT/plot.svg", "p", "phi"),
-    "plot to HTML": _two("plot INPUTS/log.csv --channels * --out OUT/plot.html", "p", "phi"),
+    "plot to SVG": _two("inspect INPUTS/log.csv --channels * --out OUT/plot.svg", "p", "phi"),
+    "plot to HTML": _two("inspect INPUTS/log.csv --channels * --out OUT/plot.html", "p", "phi"),
     "respond": _two("respond INPUTS/log.csv --inputs servo_roll --outputs p --band *Hz --out OUT/found", "1-6", "1-8"),
-    "fit-tf": _two("fit-tf INPUTS/responses.nc --input servo_roll --form * --out OUT/fit", "0/1", "1/2"),
+    "fit-tf": _two("identify --responses INPUTS/responses.nc --input servo_roll --form * --out OUT/fit", "0/1", "1/2"),
     "compare": _two("compare INPUTS/responses.nc INPUTS/*.nc --out OUT/page.html", "responses", "narrow"),
 }
 """That start quickly."""
@@ -71,18 +71,18 @@ SLOW: Mapping[str, Command] = {
     "bench simulate": _two("bench simulate OUT/bench --only * --seed 1", "thrust", "bar_linkage"),
     "simulate": _two("simulate --vehicle coax --maneuver doublet:roll,0.5s,* --out OUT/flight.nc", "0.1", "0.2"),
     "simulate, CSV": _two("simulate --vehicle coax --maneuver doublet:roll,0.5s,* --out OUT/a.csv", "0.1", "0.2"),
-    "linearize": _two("linearize raptor50 --speed * --out OUT/models", "0-5/5", "0-8/4"),
+    "linearize": _two("vehicle linearize raptor50 --speed * --out OUT/models", "0-5/5", "0-8/4"),
     "export, C": _two("export * --format c --out OUT/code", "coax", "raptor50"),
     "export, MATLAB": _two("export raptor50 --format matlab --speed * --out OUT/made", "2", "4"),
     "export, FMU": _two("export * --format fmu --out OUT/made", "coax", "raptor50"),
-    "track": _two("track INPUTS/log.csv --equation p_dot=Lp#p+bias --rate * --out OUT/track", "40", "50"),
+    "track": _two("track INPUTS/log.csv --equation p_dot=Lp#p+bias --out OUT/track --settings rate=*", "40", "50"),
     "identify": _two(
-        "identify --vehicle coax --flight INPUTS/flight.nc --free flight --method output-error --rate 20 --iterations *"
-        " --out OUT/fit",
+        "identify --vehicle coax --flight INPUTS/flight.nc --free flight --method output-error --rate 20 --out OUT/fit "
+        "--settings iterations=*",
         "1",
         "2",
     ),
-    "stitch": _two("stitch INPUTS/at0.toml INPUTS/at5.toml --title * --out OUT/model.toml", "a", "b"),
+    "stitch": _two("vehicle stitch INPUTS/at0.toml INPUTS/at5.toml --out OUT/model.toml --settings title=*", "a", "b"),
 }
 
 
@@ -364,7 +364,7 @@ def _made_inputs(siege: Siege, inputs: Path) -> None:
     made = [
         f"respond {inputs}/log.csv --inputs servo_roll --outputs p --band 1-8Hz --out {out}",
         f"respond {inputs}/log.csv --inputs servo_roll --outputs p --band 2-6Hz --out {out}/narrow",
-        f"linearize raptor50 --speed 0-5/5 --out {out}/models",
+        f"vehicle linearize raptor50 --speed 0-5/5 --out {out}/models",
         f"simulate --vehicle coax --maneuver sweep:pitch,0.5-4Hz,8s --out {out}/flight.nc",
     ]
     for words in made:

@@ -45,12 +45,13 @@ from .target import Target, Use, by_bytes, by_entries, by_hdf5, by_matlab
 # ---- what reads them ---------------------------------------------------------------------------------------------
 def _look(path: Path, **how: Any) -> None:
     """Reads it; some as `swash inspect` does, some go on (conditioned, saved, loaded): a hundred times as long."""
-    from swashplate.cli.inspect import inspect
+    from swashplate.api.verbs.look import Inspect
 
     lot = zlib.crc32(path.read_bytes()) % 64 if path.is_file() else 0
     if lot < 4 and not how:
         with contextlib.redirect_stdout(io.StringIO()):
-            inspect(str(path), **how)
+            asked = Inspect([str(path)])
+            print(*asked.text(asked.answer(), 80))
     elif lot < 48 or not is_bench(path):
         flight = sp.read(path, **how)
         if lot == 4:

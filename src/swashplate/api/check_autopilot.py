@@ -131,7 +131,7 @@ def check_autopilot(
     if firmware not in ADDRESSES:
         raise SwashError(f"'{firmware}' is none, expected {' or '.join(ADDRESSES)}.", channel="firmware")
     if not (0.0 < timeout <= 600.0 and 0.0 < listen <= 600.0):
-        raise SwashError("expected seconds above 0 and up to 600.", channel="--timeout")
+        raise SwashError("expected seconds above 0 and up to 600.", channel="timeout")
     expected = _expected(vehicle, firmware, name, servos)
     packed = firmware == "px4"
     with Connection(mavlink or ADDRESSES[firmware], timeout=timeout) as connection:

@@ -17,7 +17,7 @@ def load_controller(path: str | Path) -> Controller:
     """A controller from its file, of any type that is known here or in another package.
 
     Args:
-        path: what `swash decouple --out`, `swash control design --out` or `save` of their results wrote.
+        path: what `swash control decouple --out`, `swash control design --out` or `save` of their results wrote.
 
     Raises:
         ControllerError: naming the file and the entry that is missing, unknown or of the wrong size.

@@ -80,7 +80,7 @@ def export_controller(path: str | Path, *, name: str | None = None, precision: P
     """A controller's file as the C of its step.
 
     Args:
-        path: what `swash decouple` or `swash control design` wrote.
+        path: what `swash control decouple` or `swash control design` wrote.
         name: what the file begins with; the controller file's name where None.
         precision: "double" or "single".
 

@@ -98,7 +98,7 @@ def fit_ss(
         raise SwashError(
             "a fit takes one structure.",
             channel="structure",
-            hint="Name one (compose:body+flap, see `swash structures list`), or let --search find it.",
+            hint="Name one (compose:body+flap, see `swash vehicle structures`), or let --search find it.",
         )
     begun = given[0] if given else structure(WIDEST)
     responses, remarks = under_names_of(begun, responses, names)

@@ -238,7 +238,7 @@ def write_ardupilot_parameters(
     """
     file = Path(path)
     if not file.absolute().parent.is_dir():
-        raise SwashError("the folder does not exist.", where=file.parent, channel="--write-parameters")
+        raise SwashError("the folder does not exist.", where=file.parent, channel="--out")
     mapping = mapping_of(vehicle, servos, name=name, suffix="")
     settings = parameters(mapping, vehicle, trim) | gains_to_write(mapping, vehicle, trim, notice=notice)
     return write_text(file, parameter_file(settings, title=vehicle.card.title))
@@ -278,7 +278,7 @@ def _plant(asked: _Asked, suffix: Literal["", "_px4"], notice: Say) -> tuple[Pla
     around = environment_of(asked.vehicle, asked.environment)
     if asked.voltage is not None:
         if not 0.0 < asked.voltage < 1000.0:
-            raise SwashError(f"is {asked.voltage:g} V, expected 0 to 1000.", channel="--voltage")
+            raise SwashError(f"is {asked.voltage:g} V, expected 0 to 1000.", channel="voltage")
         around = around._replace(voltage=asked.voltage)
     aircraft = standing(asked.vehicle.with_values(asked.truth) if asked.truth else asked.vehicle)
     mapping = mapping_of(aircraft, asked.servos, name=asked.name, suffix=suffix)

@@ -38,8 +38,8 @@ def live(
 
     Args:
         vehicle: what flies.
-        controller: one, or its file. An autopilot (`swash decouple`) flies in all modes; any other in "position", on
-            its own sensors where it has some, with its commands as late as it takes them to be.
+        controller: one, or its file. An autopilot (`swash control decouple`) flies in all modes; any other in
+            "position", on its own sensors where it has some, with its commands as late as it takes them to be.
         estimate: parameters ("mass") and equations ("q_dot = Mq*q + Md*servo_pitch + bias") that recursive estimators
             follow while you fly; the page shows each with two standard errors (`links.estimating`).
         truth: numbers of the card that what flies has instead, which the estimators have to find.

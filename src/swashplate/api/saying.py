@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import webbrowser
 from collections.abc import Callable
+from contextvars import ContextVar
 from typing import Protocol
+
+QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
+"""Whether `tell` says nothing."""
 
 
 class Say(Protocol):
@@ -15,6 +20,28 @@ class Say(Protocol):
 
 def silent(what: str, *, done: float = 0.0, total: float | None = None, note: str = "") -> None:
     """Says nothing."""
+
+
+def tell(words: str) -> None:
+    """Results that come while a verb runs, on standard output."""
+    if not QUIET.get():
+        print(words, flush=True)
+
+
+def notice(words: str) -> None:
+    """What the user must know while a verb runs, on standard error."""
+    print(words, file=sys.stderr, flush=True)
+
+
+def notice_unless_quiet(words: str) -> None:
+    """What is going on while a verb runs, on standard error."""
+    if not QUIET.get():
+        notice(words)
+
+
+def ready(address: str) -> None:
+    """Say where a page is."""
+    tell(f"Open {address} in a browser; Ctrl-C here ends it.")
 
 
 def announce(address: str, *, open_page: bool, ready: Callable[[str], None], say: Callable[[str], None]) -> None:

@@ -5,55 +5,135 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from typing import Annotated, NoReturn
+from collections.abc import Iterator
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
-from swashplate.cli import (
-    bench,
-    campaign,
-    combine,
-    compare,
-    control,
-    data,
-    decouple,
-    demo,
-    derivatives,
-    export,
-    fit_ss,
-    fit_tf,
-    fit_time,
-    identify,
-    inspect,
-    link,
-    live,
-    maneuver,
-    open,
-    plot,
-    reconstruct,
-    replay,
-    respond,
-    rotor_speed,
-    simulate,
-    stitch,
-    structures,
-    track,
-    trim,
-    validate,
-    vehicles,
-)
 from swashplate.cli.guard import Guarded
 from swashplate.cli.terminal import over
+from swashplate.cli.verbs import VERBS, Verb
 from swashplate.systems import HANGUP
+
+_EVERYWHERE = {"--json": 0, "--quiet": 0, "-q": 0, "--debug": 0, "--settings": 1}
+"""Options of every verb, which may stand anywhere, and how many values they take."""
+
+
+class _Verbs(dict[str, Any]):
+    """Commands by name; each is made when it is asked for."""
+
+    def __init__(self, verbs: dict[str, Verb]) -> None:
+        super().__init__(dict.fromkeys(verbs))
+        self._verbs = verbs
+
+    def __getitem__(self, name: str) -> Any:
+        if super().__getitem__(name) is None:
+            self[name] = _made(name, self._verbs[name])
+        return super().__getitem__(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        return self[name] if name in self else default  # noqa: SIM401
+
+    def values(self) -> Any:
+        return [self[name] for name in self]
+
+    def items(self) -> Any:
+        return [(name, self[name]) for name in self]
+
+
+def _made(name: str, verb: Verb) -> Any:
+    """The command of a verb, or the group."""
+    if verb.verbs:
+        help = verb.help + (f" `{verb.usual}` need not be typed." if verb.usual else "")
+        return VerbGroup(name=name, help=help, no_args_is_help=verb.usual == "", rich_markup_mode=None,
+                         context_settings=_HELP, verbs=verb.verbs, usual=verb.usual)  # fmt: skip
+    from swashplate.cli.generate import command_of, question_at
+    from swashplate.cli.run import carry_out
+
+    made = command_of(question_at(f"swashplate.api.verbs.{verb.question}"), name, carry_out)
+    made.context_settings = _HELP
+    made.short_help = verb.help
+    return made
+
+
+_HELP = {"help_option_names": ["-h", "--help"]}
+
+
+class VerbGroup(TyperGroup):
+    """A group whose verbs are made when they are asked for, listed under their doors.
+
+    The usual verb of a group is taken where the first word is none of its verbs, nor like one, nor an option.
+    """
+
+    def __init__(self, *, verbs: dict[str, Verb], usual: str = "", **attrs: Any) -> None:
+        attrs["commands"] = _Verbs(verbs)
+        super().__init__(**attrs)
+        self.verbs, self.usual = verbs, usual
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        first = args[0] if args else "-"
+        if self.usual:
+            mistyped = get_close_matches(first, list(self.verbs)) and not Path(first).exists()
+            theirs = (first.startswith("-") and first != "-") or first in self.verbs or mistyped
+            if not theirs:
+                args = [self.usual, *args]
+        return super().parse_args(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """The verbs under their doors, without making them."""
+        doors = dict.fromkeys(verb.door for verb in self.verbs.values())
+        for door in doors:
+            with formatter.section(door or "Commands"):
+                formatter.write_dl([(name, verb.help) for name, verb in self.verbs.items() if verb.door == door])
+
+
+class AllVerbs(Guarded, VerbGroup):
+    """All verbs. What every verb takes may stand anywhere on the line."""
+
+    def __init__(self, **attrs: Any) -> None:
+        super().__init__(verbs=VERBS, **attrs)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        return super().parse_args(ctx, in_front(args))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        within = [f"swash {name} {args[0]}" for name, verb in VERBS.items() if args[0] in verb.verbs]
+        if args[0] not in VERBS and within:
+            ctx.fail(f"No such command '{args[0]}'. Did you mean '{within[0]}'?")
+        return super().resolve_command(ctx, args)
+
+
+def in_front(words: list[str]) -> list[str]:
+    """The line with the options of every verb before the verb."""
+    front: list[str] = []
+    rest: list[str] = []
+    waiting = iter(words)
+    for word in waiting:
+        if word == "--":
+            return [*front, *rest, word, *waiting]
+        count = _EVERYWHERE.get(word.partition("=")[0])
+        (rest if count is None else front).append(word)
+        if count and "=" not in word:
+            front += _next(waiting)
+    return [*front, *rest]
+
+
+def _next(words: Iterator[str]) -> list[str]:
+    value = next(words, None)
+    return [] if value is None else [value]
+
 
 app = typer.Typer(
     name="swash",
-    cls=Guarded,
+    cls=AllVerbs,
     help="From a small helicopter's flight log to a validated model.",
     rich_markup_mode=None,  # plain help: rich takes longer to load than everything else that --help needs
     pretty_exceptions_enable=False,
     invoke_without_command=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=_HELP,
 )
 
 
@@ -71,52 +151,35 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def root(
     context: typer.Context,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON instead of tables.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="No progress, no tables: files and exit code only.")
     ] = False,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--settings",
+            metavar="FILE.toml|NAME=VALUE",
+            help="Options of the verb from a file, and its rarer ones, which its help lists. May be repeated.",
+        ),
+    ] = None,
     debug: Annotated[
         bool, typer.Option("--debug", help="Show the full traceback of an error (or set SWASHPLATE_DEBUG=1).")
     ] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
 ) -> None:
-    """From a small helicopter's flight log to a validated model. Without a verb, a page to try it on opens."""
+    """From a small helicopter's flight log to a validated model. Without a verb, a page to try it on opens.
+
+    The options below may stand anywhere on the line, with every verb.
+    """
+    context.meta.update(json=json, quiet=quiet, settings=settings or ())
     if context.invoked_subcommand is None:
-        open.open_(port=None, open_page=True)
+        from swashplate.api.verbs.look import Open
+        from swashplate.cli.run import carry_out
 
-
-app.command("identify", short_help="Identify a vehicle from flights, with a report.")(identify.identify)
-app.command("validate", short_help="Predict flights with a model and judge the predictions.")(validate.validate)
-app.command("respond", short_help="Frequency responses from logs of sweeps.")(respond.respond)
-app.command("fit-tf", short_help="Fit transfer functions to frequency responses.")(fit_tf.fit_tf)
-app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
-app.command("fit-time", short_help="Fit a state-space model to records in time.")(fit_time.fit_time)
-app.command("track", short_help="Estimate along a log, sample by sample as on board.")(track.track)
-app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
-app.command("open", short_help="Look at any log in the browser: one page for all of it.")(open.open_)
-app.command("live", short_help="Fly a model in the browser, in real time.")(live.live)
-app.command("replay", short_help="Look at a logged flight beside a model's prediction.")(replay.replay)
-app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
-app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
-app.command("plot", short_help="Draw logs over time or frequency, also several over each other.")(plot.plot)
-app.command("rotor-speed", short_help="Measure rotor speed from vibration in a log.")(rotor_speed.rotor_speed)
-app.command("reconstruct", short_help="Find biases and scale factors of a flight's sensors, and remove them.")(
-    reconstruct.reconstruct
-)
-app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
-app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
-app.command("stitch", short_help="One model from linear models at several speeds.")(stitch.stitch)
-app.command("combine", short_help="Multiply, divide, invert responses; close or open a loop.")(combine.combine)
-app.command("compare", short_help="Responses, models or fits side by side.")(compare.compare)
-app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
-app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)
-app.add_typer(bench.app, name="bench")
-app.add_typer(campaign.app, name="campaign")
-app.add_typer(maneuver.app, name="maneuver")
-app.add_typer(link.app, name="link")
-app.add_typer(control.app, name="control")
-app.add_typer(vehicles.app, name="vehicles")
-app.add_typer(structures.app, name="structures")
-app.add_typer(data.app, name="data")
-app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)
+        carry_out(Open(open_page=True), ())
 
 
 def _open_closed_streams() -> None:

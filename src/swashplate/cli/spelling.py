@@ -8,8 +8,6 @@ from typing import Any
 import typer
 
 _VEHICLE = "--vehicle"
-_SAME = (_VEHICLE, "--model", "--for")
-"""Options that take a vehicle: the first that a verb has is meant by `--vehicle`."""
 
 
 def spelled(command: Any, given: Sequence[str]) -> list[str]:
@@ -24,16 +22,14 @@ def spelled(command: Any, given: Sequence[str]) -> list[str]:
     if verbs is not None:
         return [words[0], *spelled(verbs[words[0]], words[1:])] if words and words[0] in verbs else words
     options = {name for parameter in command.params for name in parameter.opts if name.startswith("-")}
-    named = next((name for name in _SAME if name in options), None)
-    if named is not None:
-        words = [named + word[len(_VEHICLE) :] if word.partition("=")[0] == _VEHICLE else word for word in words]
+    named = _VEHICLE in options
     _refuse_repeated(command, words)
     arguments = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
-    takes_place = bool(arguments) and arguments[0].metavar in ("VEHICLE", "MODEL")
-    if takes_place and named is None:
+    takes_place = bool(arguments) and arguments[0].name in ("vehicle", "model")
+    if takes_place and not named:
         return _as_argument(words)
-    if named is not None and not arguments and words and not words[0].startswith("-"):
-        return [named, *words]
+    if named and not arguments and words and not words[0].startswith("-"):
+        return [_VEHICLE, *words]
     return words
 
 

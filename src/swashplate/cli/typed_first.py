@@ -47,8 +47,8 @@ def _place(path: str | Path) -> None:
 
 
 _LOOKS: Mapping[str, Callable[[str], None]] = {
-    **dict.fromkeys(("log", "flight", "hold_out"), _log),
-    **dict.fromkeys(("vehicle", "model", "for_"), _vehicle),
+    **dict.fromkeys(("log", "logs", "flight", "hold_out", "replay"), _log),
+    **dict.fromkeys(("vehicle", "model"), _vehicle),
     **dict.fromkeys(("responses", "file", "folder", "points", "binary", "mapping", "controller"), _place),
 }
 """How a name is looked at, by the parameter that holds it."""

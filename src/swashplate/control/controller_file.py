@@ -33,7 +33,7 @@ def read_controller(path: str | Path) -> Controller:
         raise ControllerError(
             f"kind is {document.get('kind')!r:.60}, expected 'controller'.",
             where=path,
-            hint="`swash decouple MODEL --out FILE` writes one.",
+            hint="`swash control decouple MODEL --out FILE` writes one.",
         )
     name = document.get("type")
     if not isinstance(name, str) or name not in CONTROLLERS:

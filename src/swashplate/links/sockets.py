@@ -19,7 +19,7 @@ def is_loopback(address: str) -> bool:
         return ipaddress.IPv4Address(address).is_loopback
     except ValueError:
         raise LinkError(
-            f"'{address}' is no IPv4 address.", channel="--listen", hint="For example 127.0.0.1, or 0.0.0.0 for all."
+            f"'{address}' is no IPv4 address.", channel="listen", hint="For example 127.0.0.1, or 0.0.0.0 for all."
         ) from None
 
 
@@ -65,4 +65,4 @@ def _why(error: OSError, address: str, port: int) -> str:
 def _hint(error: OSError) -> str:
     if error.errno == errno.EADDRINUSE:
         return "Stop the other program (another simulator?) or give another --port."
-    return "Give another --port or --listen."
+    return "Give another --port."

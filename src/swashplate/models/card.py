@@ -18,7 +18,7 @@ from swashplate.meant import taking_names
 from swashplate.registry import nearest
 
 CARD_SCHEMA = 1
-_HINT = "A card is a TOML file; `swash vehicles new` writes one, and logs are --flight."
+_HINT = "A card is a TOML file; `swash vehicle new` writes one, and logs are --flight."
 STATUSES = ("measured", "published", "identified", "derived", "assumed")
 _TABLES = {
     "kind",
@@ -233,7 +233,7 @@ def card_from(document: Mapping[str, Any], *, path: str = "") -> Card:
     """
     if document.get("kind") != "vehicle":
         linear = "A linear model, not a card: `swashplate.vehicle` takes it."
-        hint = "A card begins with the line kind = 'vehicle'; `swash vehicles new` writes one."
+        hint = "A card begins with the line kind = 'vehicle'; `swash vehicle new` writes one."
         raise CardError(
             f"kind is {document.get('kind')!r}, expected 'vehicle'." if "kind" in document else "says no kind.",
             where=path,

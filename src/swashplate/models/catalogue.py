@@ -83,7 +83,7 @@ def vehicle(name_or_file: str | Path, **options: bool | str) -> Vehicle:
         raise CardError(
             "is neither a vehicle's name nor a file.",
             where=text,
-            hint=f"{near} Names are {', '.join(dict.fromkeys(names))}; see 'swash vehicles'.".strip(),
+            hint=f"{near} Names are {', '.join(dict.fromkeys(names))}; see 'swash vehicle list'.".strip(),
         )
     return from_card(replace(card, options={**card.options, **options}))
 

@@ -145,7 +145,7 @@ def _sources(vehicle: Vehicle, sources: Sequence[tuple[str, float]]) -> Table:
         ("number", "unit", "share of the variance [%]"),
         rows,
         note="Linear regression over the drawn models. A step flown once with the law measures it: "
-        "`swash decouple ... --drift` corrects the law by what was measured.",
+        "`swash control decouple ... --drift` corrects the law by what was measured.",
     )
 
 

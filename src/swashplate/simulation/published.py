@@ -147,7 +147,7 @@ def compare_derivatives(vehicle: Vehicle, at: Trim, path: str | Path, *, primed:
         SwashError: for a file that cannot be read, a flight that turns, or a vehicle without a single rotor.
     """
     if at.turn:
-        raise SwashError("takes straight flight.", channel="--published", hint="Leave out --turn.")
+        raise SwashError("takes straight flight.", channel="--published", hint="Leave out the turn.")
     sense = getattr(vehicle.options, "sense", 1.0)
     flight = {name: at.states().get(name, 0.0) for name in ("u", "v", "w")}
     return hold_against(vehicle, at, read_published(path, sense=sense, flight=flight), primed=primed)
@@ -220,7 +220,7 @@ def _assumptions(vehicle: Vehicle, primed: bool) -> Iterable[Assumption]:
     for name, values, new_trim in _SWITCHES:
         for value in values:
             if getattr(options, name, value) != value:
-                words = f"--option {name}={str(value).lower()}"
+                words = f"--set {name}={str(value).lower()}"
                 yield Assumption(words, option=(name, value), new_trim=new_trim)
     for name, new_trim in _ZEROS:
         if card.get(name):

@@ -294,7 +294,7 @@ def started_from(vehicle: Vehicle) -> Vehicle:
         raise CardError(
             "does not say from which card it was identified.",
             where=vehicle.card.path or vehicle.card.title,
-            hint="Name that card with --published CARD, or identify the model anew.",
+            hint="Name that card with --settings published=CARD, or identify the model anew.",
         )
     return vehicle
 

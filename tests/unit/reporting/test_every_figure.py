@@ -27,7 +27,7 @@ from swashplate.reporting.theme import axis, base_layout, line
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim_curve import trim_curve
 
-_WAYS = ("plot", "explore", "_repr_html_", "save")
+_WAYS = ("inspect", "explore", "_repr_html_", "save")
 _UNIT = re.compile(r"\[[^\]]+\]")
 
 

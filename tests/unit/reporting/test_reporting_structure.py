@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from report_samples import fit, flight, modes, validation
-from swashplate.cli.tables import fit_table
 from swashplate.errors import SwashError
 from swashplate.flights.provenance import Problem, ProcessingStep
 from swashplate.identification.core import result_file
@@ -26,6 +25,7 @@ from swashplate.reporting.figures_time import Series, time_figures
 from swashplate.reporting.sections_fit import parameters
 from swashplate.reporting.sections_validation import apart
 from swashplate.reporting.structure import Cell, Report, Section, Table
+from swashplate.reporting.terminal_tables import fit_table
 from swashplate.reporting.terms import TERMS
 from swashplate.reporting.theme import packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash

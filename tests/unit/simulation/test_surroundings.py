@@ -30,11 +30,11 @@ def test_what_is_given_stays_and_what_is_open_is_the_vehicles() -> None:
 
 def test_command_line_and_python_fly_in_the_same_air() -> None:
     for name in ("crazyflie", "raptor50"):
-        (told,) = json.loads(swash("trim", name, "--json").out)["trims"]
+        (told,) = json.loads(swash("vehicle", "trim", name, "--json").out)["trims"]
         at = sp.trim(sp.vehicle(name))
         assert told["inputs"] == at.commands()
         assert told["air_density"] == at.environment.air_density
-    (high,) = json.loads(swash("trim", "raptor50", "--altitude", "2000", "--json").out)["trims"]
+    (high,) = json.loads(swash("vehicle", "trim", "raptor50", "--json", "--settings", "altitude=2000").out)["trims"]
     assert high["air_density"] == pytest.approx(air_density(2000.0))
     assert high["inputs"]["theta0"] > told["inputs"]["theta0"]
 

@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 from swashplate.errors import CampaignError
 from swashplate.extras import library
 
-_CA, _CERTIFICATE, _KEY = _OPTIONS = ("--tls-ca-file", "--tls-cert", "--tls-key")
+_CA, _CERTIFICATE, _KEY = _OPTIONS = ("tls_ca_file", "tls_cert", "tls_key")
 _HOW = "docs/howto/campaigns.md shows how to make the files and how to start both with TLS."
 
 
@@ -95,7 +95,8 @@ class DaskScheduler:
                 "speaks without TLS: every user of its machine, and everybody who reaches its port, can run commands "
                 "as its owner, as the owner of each worker, and as you here.",
                 where=self.address,
-                hint=f"Start it with --protocol tls. {_HOW} If everybody who reaches it may do that: --insecure.",
+                hint=f"Start it with --protocol tls. {_HOW} If everybody who reaches it may do that: "
+                "--settings insecure=true.",
             )
         return make(require_encryption=False)
 

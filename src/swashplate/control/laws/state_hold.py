@@ -90,7 +90,9 @@ def state_hold(
         )
     except np.linalg.LinAlgError:
         raise SwashError(
-            "no state feedback holds this trim.", where=vehicle.name, hint="Check its controls with `swash linearize`."
+            "no state feedback holds this trim.",
+            where=vehicle.name,
+            hint="Check its controls with `swash vehicle linearize`.",
         ) from None
     K = along @ (((effort * spans) ** 2)[:, None] * B.T @ cost)
     if trim.speed or trim.lateral or trim.climb or trim.turn:

@@ -109,17 +109,17 @@ def _chirp(planned: Maneuver, axis: int | None) -> Chirp:
     if number is None or number not in AXES:
         raise ManeuverError(
             f"'{planned.axes[0]}' has no SID_AXIS." if axis is None else f"{axis} is no SID_AXIS.",
-            channel="--sid-axis",
+            channel="sid_axis",
             hint="; ".join(f"{n} {name} [{unit}]" for n, (name, unit) in AXES.items()) + ".",
         )
     name, unit = AXES[number]
     mixer = MIXER.get(planned.axes[0])
     if mixer is not None and number <= max(MIXER.values()) and name.split()[0] != AXES[mixer][0].split()[0]:
-        raise ManeuverError(f"{number} is the {name}, and the sweep is one of {planned.axes[0]}.", channel="--sid-axis")
+        raise ManeuverError(f"{number} is the {name}, and the sweep is one of {planned.axes[0]}.", channel="sid_axis")
     if unit == "1" and planned.amplitude > 1.0:
         raise ManeuverError(
             f"an amplitude of {planned.amplitude:g} is beyond the mixer's range of one.",
             channel="--ardupilot",
-            hint="Give the mixer's share, for example 0.1; in deg/s with --sid-axis 7, 8 or 9.",
+            hint="Give the mixer's share, for example 0.1; in deg/s with --settings sid_axis=7, 8 or 9.",
         )
     return Chirp.planned(number, planned.amplitude, planned.band, record=planned.duration, fade=FADE * planned.duration)

@@ -353,5 +353,5 @@ def _known(vehicle: Vehicle, names: Iterable[str]) -> None:
         raise IdentificationError(
             f"'{vehicle.name}' has no such parameter.",
             channel=", ".join(unknown),
-            hint=f"Parameters are listed by 'swash vehicles show {vehicle.name}'.",
+            hint=f"Parameters are listed by 'swash vehicle show {vehicle.name}'.",
         )

@@ -96,7 +96,7 @@ def lacking_words(model: StateSpaceModel, missed: Sequence[str]) -> str:
         whole = [*(p for p in PARTS if p in (*kept, first)), *pairs_of(composed)]
         text += f" Try {PREFIX}{'+'.join(whole)}, or --search."
     else:
-        text += " Compose one with it (swash structures list), or let --search find the parts."
+        text += " Compose one with it (swash vehicle structures), or let --search find the parts."
     return text
 
 

@@ -133,7 +133,7 @@ def fit_targets(
             f"the structure '{model.name}' answers nothing at all at {', '.join(t.name for t in unheard)}, which the "
             "flight shows.",
             hint="Take a structure that joins them, or leave them out: "
-            + " ".join(f"--without {t.output}/{t.input}" for t in unheard),
+            + " ".join(f"--settings without={t.output}/{t.input}" for t in unheard),
         )
     if traceless:
         warnings.append(f"no fitted response sees {', '.join(traceless)}: held at the start values.")

@@ -223,7 +223,7 @@ def _matrices(
         raise FlightError(
             f"the longest record has {longest:.3g} s, the shortest window {min(lengths):.3g} s.",
             where=", ".join(piece.name for piece in pieces),
-            hint="Give shorter windows (--windows) or fly longer; a record should hold two of its longest windows.",
+            hint="Give shorter windows (--settings windows=...), or fly longer: a record holds two of them.",
         )
     return matrices, notes
 

@@ -162,7 +162,9 @@ def respond(
             estimate = estimate_beside(own, (half, *chosen.lengths), overlap, limits, question, beside)
             blur_words = [f"{words}; one of {half:.3g} s, half the shortest record, was added."]
         else:
-            blur_words = [f"{words}: something of it may be left. Longer windows (--windows {half:.3g},...) help."]
+            blur_words = [
+                f"{words}: something of it may be left. Longer windows (--settings windows={half:.3g},...) help."
+            ]
     omega, matrices, notes, blurred, made, free, held = estimate
     if scraps:
         notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")

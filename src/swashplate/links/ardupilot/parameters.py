@@ -129,7 +129,7 @@ def _plate(plate: Plate | HelicopterMapping) -> Parameters:
     if plate.type not in TYPES:
         raise LinkError(
             f"a swashplate of type '{plate.type}' has no number in ArduPilot.",
-            channel="--write-parameters",
+            channel="--out",
             hint=f"Types with one: {', '.join(TYPES)}.",
         )
     (low, high), (least, most) = plate.collective_pulse, plate.collective_deg

@@ -86,7 +86,7 @@ def drawn_as(flight: Flight, model: Vehicle | None) -> Vehicle:
     raise FlightError(
         f"names no vehicle that is known, and its inputs fit none: {', '.join(flight.channels)}.",
         where=flight.provenance.source,
-        hint="Say what flies with --model.",
+        hint="Say what flies: swash live MODEL --replay LOG.",
     )
 
 
@@ -185,7 +185,7 @@ def _driven(flight: Flight, model: Vehicle, *, hold_missing: bool) -> tuple[Flig
             f"lacks {', '.join(missing)}: {model.card.where or model.card.title} is driven by them, and without them "
             "there is no prediction.",
             where=flight.provenance.source,
-            hint="Map its columns to these names (--mapping), give a model of its channels, leave --model out, "
+            hint="Map its columns to these names (--mapping), give a model of its channels, leave the model out, "
             f"or hold what is missing at the hover's with --hold-missing. It has {listed(flight.channels)}.",
         )
     hover = trim(model, voltage=nominal)

@@ -99,7 +99,9 @@ def plotted(reads: Sequence[Read], channels: Sequence[Sequence[str]], span: tupl
     words = {read.words for read in reads}
     # One command has one set of options: logs that were read differently, or lack a channel, have none.
     alike = len(words) == 1 and len({tuple(names) for names in channels}) == 1
-    shell = f"swash plot {' '.join(named)} --channels {every} --out flight.pdf {words.pop()}".strip() if alike else ""
+    shell = (
+        f"swash inspect {' '.join(named)} --channels {every} --out flight.pdf {words.pop()}".strip() if alike else ""
+    )
     return Code("Plot", shell, "\n".join(lines))
 
 
@@ -116,14 +118,15 @@ def spectra(read: Read, channel: str, start: float, stop: float, *, rotor: bool)
     lines.append(f"over_time = sp.spectrogram(flight, {part})")
     if rotor:
         lines.append(f"print(sp.harmonics(flight, {part}))")
-    shell = f"swash plot {read.named(start, stop)} --channels {channel} --spectrum --out spectrum.pdf {read.words}"
+    asked = f"--channels {channel} --figure spectrum --out spectrum.pdf"
+    shell = f"swash inspect {read.named(start, stop)} {asked} {read.words}"
     return Code(f"Spectrum of {channel}", shell.strip(), "\n".join(lines))
 
 
 def tracked(read: Read, channels: Sequence[str], *, whole: bool) -> Code:
-    """The channels of the track over time; where place and attitude are whole, `swash replay` draws it too."""
+    """The channels of the track over time; where place and attitude are whole, `swash live --replay` draws it too."""
     lines = [IMPORT, read.python(), f"figure = flight.plot(channels={list(channels)!r})", 'figure.savefig("track.pdf")']
-    shell = f"swash replay {read.named()} {read.words}".strip() if whole else ""
+    shell = f"swash live --replay {read.named()} {read.words}".strip() if whole else ""
     return Code("Track", shell, "\n".join(lines))
 
 
@@ -166,7 +169,7 @@ def identified(
         shell += [] if unseen else [told]
         asked = f"--input {moved} --outputs {answer} --form {form} --band {low:g}-{high:g}{' --gains' * wanted}"
         unseen_part = f"--hold-out {other.named(start, stop)} --out study{end} {other.words}".rstrip()
-        shell.append(f"swash fit-tf responses {asked} {unseen_part}")
+        shell.append(f"swash identify --responses responses {asked} {unseen_part}")
         called, study = "unseen" if unseen else "fitted", "study" if len(chosen) == 1 else f"study_{k + 1}"
         lines += [other.python("other"), *([] if unseen else [told])]
         lines += [

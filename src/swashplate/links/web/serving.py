@@ -34,13 +34,13 @@ def listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
     try:
         resolved = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except (OSError, UnicodeError):
-        raise SwashError(f"'{host}' is no address of this machine.", channel="--host") from None
+        raise SwashError(f"'{host}' is no address of this machine.", channel="host") from None
     address = ipaddress.ip_address(resolved[4][0])
     if not address.is_loopback and not allow_remote:
         raise SwashError(
             f"{address} can be reached from other machines.",
-            channel="--host",
-            hint="Whoever reaches the page can do all that it does; if that is meant, add --allow-remote.",
+            channel="host",
+            hint="Whoever reaches the page can do all that it does; if that is meant: --settings allow_remote=true.",
         )
     made = socket.socket(resolved[0], socket.SOCK_STREAM)
     try:

@@ -60,7 +60,7 @@ def parts_of(text: str) -> tuple[str, ...]:
             raise CardError(f"'{name}' is named twice.", where=text)
     reason = nonsense(given)
     if reason:
-        raise CardError(reason, where=text, hint=f"See `swash structures list`. {_listed()}")
+        raise CardError(reason, where=text, hint=f"See `swash vehicle structures`. {_listed()}")
     return in_order(given)
 
 
@@ -266,7 +266,7 @@ def _kinematic(terms: tuple[str, ...]) -> tuple[str, ...]:
 def _trust(names: Sequence[str]) -> str:
     holds = list(dict.fromkeys(PARTS[name].holds for name in names if name in PARTS and PARTS[name].holds))
     text = "; ".join(holds) or "about hover"
-    return f"{text[0].upper()}{text[1:]}. Remove what the responses do not determine (--reduce)."
+    return f"{text[0].upper()}{text[1:]}. Remove what the responses do not determine (--settings reduce=true)."
 
 
 def _parameters(model: dict[str, Any]) -> dict[str, Any]:

@@ -121,7 +121,7 @@ def structure(name_or_file: str | Path) -> StateSpaceModel:
             f"is neither a ready structure nor a file that can be read: {error.problem}",
             where=text,
             hint=f"{_alike(text)} Ready structures are {', '.join(structure_names())}; {PREFIX}body+flap+... composes "
-            "one (swash structures list).",
+            "one (swash vehicle structures).",
         ) from None
     return parse(content, path=text)
 

@@ -74,7 +74,7 @@ def stitched(card: Card) -> Vehicle:
             f"has {', '.join(options)}; expected {', '.join(_OPTIONS)}.",
             where=where,
             channel="options",
-            hint="`swash stitch` writes such a card.",
+            hint="`swash vehicle stitch` writes such a card.",
         )
     n, inner, inputs = options["points"], tuple(options["inner"]), tuple(options["inputs"])
     if isinstance(n, bool) or not isinstance(n, int) or n < 2:

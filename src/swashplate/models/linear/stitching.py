@@ -167,7 +167,7 @@ def _trimmed(
             f"says nothing of {', '.join(lost)}.",
             where=name,
             channel="trim",
-            hint="Add them to [trim], as `swash linearize --out` does, or give the flight with such means: --trim.",
+            hint="Add them to [trim], as `vehicle linearize --out` does, or give the flight with such means: --trim.",
         )
     if turning := [rate for rate in STILL if abs(trim.get(rate, 0.0)) > _NOTHING]:
         raise CardError("is not zero, expected a straight flight.", where=name, channel=f"trim.{turning[0]}")

@@ -64,7 +64,7 @@ def _sum(terms: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class WrittenStructure(Saved):
-    """What `swash structures show` prints.
+    """What `swash vehicle structures` prints.
 
     Attributes:
         model: the structure.

@@ -96,7 +96,7 @@ def test_a_campaign_on_kubernetes_outlives_killed_pods(tmp_path: Path) -> None:
         address = deployer.stdout.readline().strip()
         assert address.startswith("tcp://"), address
         threading.Thread(target=kill, daemon=True).start()
-        seconds = computed(campaign, tmp_path / "there", "--scheduler", address, "--insecure")
+        seconds = computed(campaign, tmp_path / "there", "--scheduler", address, "--settings", "insecure=true")
     finally:
         over.set()
         deployer.communicate("\n", timeout=60)

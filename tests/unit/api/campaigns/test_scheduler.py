@@ -36,7 +36,7 @@ def others(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def test_one_without_tls_is_refused_in_words_until_that_is_asked_for() -> None:
     with pytest.raises(CampaignError) as refused:
         DaskScheduler("tcp://host:8786").security()
-    for words in ("can run commands as its owner", "as you here", "--protocol tls", "--insecure"):
+    for words in ("can run commands as its owner", "as you here", "--protocol tls", "insecure=true"):
         assert words in str(refused.value)
     assert DaskScheduler("tcp://host:8786", insecure=True).security().require_encryption is False
     assert DaskScheduler("tcp://host:8786", insecure=True).place == ("host", 8786)
@@ -61,10 +61,10 @@ def test_files_that_are_missing_open_to_all_or_none_are_named(others: tuple[Path
         with pytest.raises(CampaignError, match=told):
             DaskScheduler("tls://host:8786", **given).security()  # type: ignore[arg-type]
 
-    for name, option in (("ca", "--tls-ca-file"), ("certificate", "--tls-cert"), ("key", "--tls-key")):
+    for name, option in (("ca", "tls_ca_file"), ("certificate", "tls_cert"), ("key", "tls_key")):
         refused(f"{option}: is missing, and Dask's configuration names none", **{name: None})
         refused(f"none.pem: {option}: cannot be read: No such file", **{name: tmp_path / "none.pem"})
-    refused("--tls-key: can be read by every user of this machine", key=certificate)
+    refused("tls_key: can be read by every user of this machine", key=certificate)
     (tmp_path / "text.pem").touch(0o600)
     refused("are no certificates, and no key that belongs", key=tmp_path / "text.pem")
     refused("are no certificates, and no key that belongs", ca=tmp_path / "text.pem")

@@ -434,7 +434,7 @@ def test_a_name_of_this_machine_serves_others_only_when_asked_to() -> None:
 
 
 def test_listening_beyond_this_machine_must_be_meant() -> None:
-    with pytest.raises(SwashError, match=r"can be reached from other machines.*--allow-remote"):
+    with pytest.raises(SwashError, match=r"can be reached from other machines.*allow_remote=true"):
         serving.listen("0.0.0.0", 0, allow_remote=False)
     made = serving.listen("0.0.0.0", 0, allow_remote=True)
     assert serving.address_of(made).startswith("http://127.0.0.1:")

@@ -1,0 +1,147 @@
+"""`swash export`: a model as C, an FMU, an S-function, or matrices; a controller as C."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swashplate.api.asking import OfVehicle, linear_model
+from swashplate.api.languages import Aircraft
+from swashplate.api.question import argument, option, setting
+from swashplate.api.saying import Say, silent
+from swashplate.errors import SwashError
+
+if TYPE_CHECKING:
+    from swashplate.export.formats import Export as Exported
+
+_ENDINGS = (".c", ".fmu", ".html", ".json", ".mat")
+
+
+class ExportModel(OfVehicle["Exported"]):
+    """Write a model, published or identified, in the format of another program, with the equations that fly here.
+
+    A controller's file (`swash control decouple --out`) is written as C. Formats c, fmu, simulink and web need the
+    extra 'model', web the extra 'compiler' too; fmu has compiled code where there is a C compiler. Examples:
+
+    swash export coax --format c --out firmware
+
+    swash export fit/model.toml --format fmu
+
+    swash export fit/model.toml --format web --out model.html
+
+    swash export raptor50 --format matlab --speed 10
+    """
+
+    model: Aircraft = argument(
+        metavar="MODEL",
+        help="A vehicle's name, a card or model file, a linear model's file (also .json or .mat of an export), a "
+        "controller's file.",
+        complete="vehicle",
+    )
+    form: str = option(
+        flag="--format",
+        metavar="NAME",
+        help="c: C99 step, rates, Jacobians. fmu: FMI 2.0 co-simulation. simulink: S-function. control: JSON for "
+        "python-control. matlab: .mat. ardupilot-statespace: JSON for SITL. "
+        "web: one HTML file in which the model flies, for any browser. Or another package's.",
+        kw_only=False,
+    )
+    out: Path = option(default=Path("."), metavar="DIR|FILE", help="Folder, made if missing; or one file's name.")
+    speed: float | None = option(
+        default=None, help="Speed ahead of the flight that it starts from; hover if not given.", unit="m/s"
+    )
+    precision: str = option(default="double", help="Number type of C.", choices=("double", "float"))
+    name: str | None = option(default=None, help="Prefix of files and C functions; by default the model's name.")
+    delays: bool | None = setting(default=None, help="whether the model's identified input delays are included")
+
+    def answer(self, say: Say = silent) -> Exported:
+        made = self.made()
+        object.__setattr__(self, "_written", self._save(made))
+        return made
+
+    def made(self) -> Exported:
+        """What is exported, before it is written."""
+        from swashplate.api.export import export_controller, export_model
+        from swashplate.documents import kind_of
+        from swashplate.export.formats import FORMATS
+
+        if self.form not in FORMATS:
+            hint = f"There are {', '.join(FORMATS)}."
+            raise SwashError(f"'{self.form}' is no format.", channel="--format", hint=hint)
+        one_file = self.out.suffix in _ENDINGS and not self.out.is_dir()
+        name = self.out.stem if one_file and self.name is None else self.name
+        only_vehicles = {"--speed": self.speed, "--set": self.changes, "delays": self.delays}
+        refused = [option for option, value in only_vehicles.items() if value is not None]
+        if isinstance(self.model, str | Path) and kind_of(self.model) == "controller":
+            where = str(self.model)
+            if self.form != "c":
+                raise SwashError(
+                    "is a controller: --format c writes its step.", where=where, channel=f"--format {self.form}"
+                )
+            if refused:
+                raise SwashError("is for vehicles, and this is a controller.", where=where, channel=", ".join(refused))
+            return export_controller(self.model, name=name, precision=self._precision())
+        exported, trim = self._model()
+        stem = Path(self.model).stem if isinstance(self.model, str | Path) else None
+        return export_model(
+            exported,
+            self.form,
+            name=name or stem,
+            trim=trim,
+            precision=self._precision(),
+            delays=self.delays,
+        )
+
+    def _precision(self) -> Any:
+        return "single" if self.precision == "float" else "double"
+
+    def _save(self, made: Exported) -> list[str]:
+        one_file = self.out.suffix in _ENDINGS and not self.out.is_dir()
+        return [
+            str(file) for file in (_as_file(made, self.out).save(self.out.parent) if one_file else made.save(self.out))
+        ]
+
+    def _model(self) -> tuple[Any, Any]:
+        """What is exported, and the trim where it starts (None: a linear model has no other)."""
+        given = self.model
+        if (isinstance(given, str | Path) and Path(given).suffix.lower() in (".json", ".mat")) or linear_model(
+            given
+        ) is not None:
+            from swashplate.api.export import opened
+
+            if self.speed is not None or self.changes:
+                raise SwashError(
+                    "is a linear model: it has no speed, card or options to change.",
+                    where=str(given),
+                    hint="Export it as it is.",
+                )
+            return opened(given), None
+        from swashplate.simulation.trim_curve import trim_curve
+
+        vehicle = self.flying(given)
+        return vehicle, trim_curve(vehicle, (self.speed or 0.0,)).trims[0]
+
+    def document(self, answer: Exported) -> Any:
+        return {"files": self._written, "notes": list(answer.notes)}
+
+    def text(self, answer: Exported, width: int) -> list[Any]:
+        return [f"Written: {', '.join(self._written)}"]
+
+    def remarks(self, answer: Exported) -> list[str]:
+        return [f"Note: {note}" for note in answer.notes]
+
+
+def _as_file(made: Exported, out: Path) -> Exported:
+    """The files with the name that one of them was given."""
+    alike = [file for file in made.files if Path(file).suffix == out.suffix]
+    if not alike:
+        raise SwashError(
+            f"ends in '{out.suffix}', and the format writes {', '.join(made.files)}.",
+            where=out,
+            channel="--out",
+            hint="Give a folder, or a name that ends so.",
+        )
+    if out.name in made.files:
+        return made
+    return replace(made, files={out.name if file == alike[0] else file: text for file, text in made.files.items()})
