@@ -90,7 +90,7 @@ def test_the_report_shows_every_procedure_with_its_figures() -> None:
     coax = sp.vehicle("coax")
     report = compose_bench(evaluate(virtual_bench(coax, planned(coax), seed=2), coax))
     titles = [section.title for section in report.sections]
-    assert len(titles) == 14  # the card, the twelve procedures of the plan, what it was made with
+    assert len(titles) == 15  # the card, the twelve procedures of the plan, what it was made with, the words
     assert report.picture is not None
     assert [key.words for key in report.picture.keys] == ["total", "flapping", "tilt of the thrust"]
     assert len(report.figures) > 18

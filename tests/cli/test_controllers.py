@@ -222,7 +222,7 @@ def test_a_controller_is_checked_and_the_report_written(held: Path, tmp_path: Pa
     own = [boundary["name"] for boundary in found["boundaries"] if boundary["checked"]]
     assert own == ["delay margin [ms]"]  # of the check itself; no standard's text was at hand
     page = whole(out / "report.html")
-    assert "Disturbance rejection" in page
+    assert "How well are disturbances rejected?" in page
     assert "Level 2" in page
     for options, level in ((("--scale", "1"), 1), (("--task", "tracking"), 3)):
         again = swash("control", "check", "coax", "--controller", held, *options, "--json")

@@ -110,7 +110,7 @@ def test_derivatives_by_contributor_in_both_units(tmp_path: Path) -> None:
     page = tmp_path / "derivatives.html"
     swash("vehicle", "derivatives", "raptor50", "--speed", "0-8/4", "--out", page)
     text = whole(page)
-    assert "Derivatives by contributor" in text
+    assert "Which part of the helicopter makes which derivative?" in text
     assert all(f"<b>{name} [" in text for name in metric)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from swashplate.bench.result import Bench, BenchCheck, BenchResult, Curve
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
+from swashplate.reporting.terms import first_screen
 from swashplate.reporting.theme import BLACK, GREEN, GREY, MODEL, PUBLISHED, axis, base_layout, packed, unit_words
 from swashplate.reporting.versions import card_hash, date, versions
 from swashplate.reporting.words import counted, listed, sigma_words, value_words
@@ -56,7 +57,7 @@ def compose_bench(bench: Bench) -> Report:
         ("Agreement", agreement, "caution" if apart else "plain"),
     )
     sections = (*card, *(_procedure(result, bench) for result in bench.details.results), _provenance(bench))
-    picture = next((b for r in bench.details.results if r.procedure == "swashplate" for b in _figures(r, "key-")), None)
+    picture, sections = first_screen(sections, summary, of="swashplate")
     return Report(
         title=f"{bench.model.card.vehicle} on the test bench" if bench.names else "On the test bench",
         banners=(),
@@ -127,14 +128,14 @@ def _procedure(result: BenchResult, bench: Bench) -> Section:
     if result.left_out:
         blocks.append(Points(result.left_out, title="Points left out"))
     blocks.append(Points(tuple(c.words for c in result.checks if c.good), title="Checked"))
-    return Section(result.procedure, result.title, tuple(blocks))
+    return Section(result.procedure, result.title, tuple(blocks), folded=True)
 
 
-def _figures(result: BenchResult, prefix: str = "") -> list[Figure]:
+def _figures(result: BenchResult) -> list[Figure]:
     """One figure for each title; curves of one title share it."""
     figures = []
     for number, (_, group) in enumerate(groupby(result.curves, key=lambda curve: curve.title)):
-        figures.append(_figure(f"{prefix}{result.procedure}-{number}", list(group)))
+        figures.append(_figure(f"{result.procedure}-{number}", list(group)))
     return figures
 
 
@@ -189,4 +190,4 @@ def _provenance(bench: Bench) -> Section:
     lines = [f"{name} {version}" for name, version in versions().items()]
     cards = {"published": bench.start.card, "measured": bench.model.card}
     lines += [f"{name} card SHA-256 {card_hash(card)}" for name, card in cards.items()]
-    return Section("made-with", "Made with", (Points(tuple(lines)),), folded=True)
+    return Section("made-with", "How was this made?", (Points(tuple(lines)),), folded=True)

@@ -22,9 +22,10 @@ from swashplate.flights.schema import channel
 from swashplate.identification.frequency.handling import delay_words
 from swashplate.reporting import figures_control as figures
 from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table, Text
+from swashplate.reporting.terms import first_screen
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import card_hash, date, versions
-from swashplate.reporting.words import counted, listed, value_words
+from swashplate.reporting.words import counted, listed, mode_words, value_words
 
 _TONES = {1: "good", 2: "caution", 3: "bad"}
 
@@ -40,20 +41,23 @@ def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:
         _boundaries(check),
         _provenance(check),
     ]
+    parts = [section for section in sections if section is not None]
     slowest = check.slowest
-    slowest_mode = f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s, at {check.rate:g} Hz"
+    slowest_mode = f"least stable {mode_words(slowest)}, at {check.rate:g} Hz"
+    lines = (
+        ("Modes", slowest_mode, "bad" if check.problems else "good"),
+        ("Margins", *_margins_line(check)),
+        ("Rejection", *_rejection_line(check)),
+        ("Handling", *_handling_line(check)),
+        ("Coupling", *_coupling_line(check)),
+    )
+    picture, folded = first_screen(parts, lines, of="steps")
     return Report(
         title=title or f"A controller on {check.vehicle.name}",
-        banners=tuple(("bad", f"PROBLEM: {slowest_mode}") for slowest_mode in check.problems),
-        summary=(
-            ("Modes", slowest_mode, "bad" if check.problems else "good"),
-            ("Margins", *_margins_line(check)),
-            ("Rejection", *_rejection_line(check)),
-            ("Handling", *_handling_line(check)),
-            ("Coupling", *_coupling_line(check)),
-        ),
-        picture=None,
-        sections=tuple(section for section in sections if section is not None),
+        banners=tuple(("bad", f"PROBLEM: {problem}") for problem in check.problems),
+        summary=lines,
+        picture=picture,
+        sections=folded,
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
@@ -170,7 +174,7 @@ def _loops(check: ControlCheck) -> Section:
     blocks += [Text(note, tone="caution") for note in check.notes]
     blocks += [figures.loops_figure(check)] if check.omega.size else []
     blocks.append(figures.modes_figure(check))
-    return Section("margins", "Margins", tuple(blocks))
+    return Section("margins", "How far are the loops from instability?", tuple(blocks), folded=True)
 
 
 def _rejection(check: ControlCheck) -> Section | None:
@@ -187,7 +191,9 @@ def _rejection(check: ControlCheck) -> Section | None:
         "Where the place is held, the attitude follows slow disturbances: its bandwidth begins above them."
     )
     table = Table("Disturbance rejection", columns, rows, note=note)
-    return Section("rejection", "Disturbance rejection", (table, figures.rejection_figure(check)))
+    return Section(
+        "rejection", "How well are disturbances rejected?", (table, figures.rejection_figure(check)), folded=True
+    )
 
 
 def _handling(check: ControlCheck) -> Section | None:
@@ -215,7 +221,7 @@ def _handling(check: ControlCheck) -> Section | None:
     if any(a.handling and np.isfinite(a.handling.bandwidth.value) for a in check.attitudes):
         blocks.append(figures.bandwidth_chart(check))
     blocks.append(figures.attitude_figure(check))
-    return Section("handling", "Handling qualities", tuple(blocks))
+    return Section("handling", "How does it follow a pilot?", tuple(blocks), folded=True)
 
 
 def _steps(check: ControlCheck) -> Section | None:
@@ -241,7 +247,12 @@ def _steps(check: ControlCheck) -> Section | None:
         note="On the nonlinear vehicle. ADS-33E-PRF takes the on-axis attitude at 4 s, here it is the largest so far.",
     )
     steps = Table("Steps", columns, tuple(rows), note=note)
-    return Section("steps", "Steps and cross-coupling", (steps, figures.steps_figure(check), couplings))
+    return Section(
+        "steps",
+        "What does a step do, also to the other axes?",
+        (steps, figures.steps_figure(check), couplings),
+        folded=True,
+    )
 
 
 def _gusts(check: ControlCheck) -> Section | None:
@@ -265,7 +276,7 @@ def _gusts(check: ControlCheck) -> Section | None:
         f"{along:.2g}, {across:.2g} and {down:.2g} m/s (along, across, down; no mean wind), the first 2 s left out."
     )
     table = Table("Root mean square of what it strays by", ("of", "RMS", "unit"), rows, note=note)
-    return Section("gusts", "In gusts", (table,))
+    return Section("gusts", "How far does it stray in gusts?", (table,), folded=True)
 
 
 def _boundaries(check: ControlCheck) -> Section:
@@ -292,11 +303,11 @@ def _boundaries(check: ControlCheck) -> Section:
         "checked: whether the number was compared with the standard's text. Where it says no, treat it as provisional."
     )
     table = Table("Boundaries that were used", columns, tuple(rows), note=note)
-    return Section("boundaries", "Where the boundaries come from", (Text(boundary_note), table), folded=True)
+    return Section("boundaries", "Where do the limits come from?", (Text(boundary_note), table), folded=True)
 
 
 def _provenance(check: ControlCheck) -> Section:
     lines = [f"{name} {version}" for name, version in versions().items()]
     lines.append(f"card of {check.vehicle.name}, SHA-256 {card_hash(check.vehicle.card)}")
     lines.append(f"{counted(len(check.steps), 'step')} flown; task of the boundaries: {check.task}")
-    return Section("made-with", "Made with", (Points(tuple(lines)),), folded=True)
+    return Section("made-with", "How was this made?", (Points(tuple(lines)),), folded=True)

@@ -9,6 +9,7 @@ from swashplate.control.lqg.analysis import Analysis
 from swashplate.control.lqg.controller import Lqg
 from swashplate.reporting.structure import Cell, Points, Report, Section, Table
 from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.reporting.words import mode_words
 
 
 def compose_design(
@@ -44,7 +45,7 @@ def compose_design(
             ("Told", f"{sensors}, {plan.rate:g} steps a second", "plain"),
             ("Commands are late by", late, "plain"),
             *((("Loops that are fast for that", fast, "caution"),) if fast else ()),
-            ("Modes", f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s", "plain"),
+            ("Modes", f"least stable {mode_words(slowest)}", "plain"),
             ("Delay margin", _milliseconds(least), "plain"),
         ),
         picture=None,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 from swashplate.errors import SwashError
@@ -14,8 +13,8 @@ from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.sections_search import search_section
 from swashplate.reporting.sections_verification import verification_section
-from swashplate.reporting.structure import Figure, Report
-from swashplate.reporting.terms import with_terms
+from swashplate.reporting.structure import Report
+from swashplate.reporting.terms import first_screen
 from swashplate.reporting.versions import date, versions
 from swashplate.reporting.words import listed
 
@@ -47,15 +46,14 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
         sections_responses.handling_section(m),
         sections_responses.made_section(),
     ]
-    sections, lines = [part for part in parts if part is not None], _summary(m)
-    picture = next((b for section in sections if section.folded for b in section.blocks if isinstance(b, Figure)), None)
-    explained = with_terms(sections, lines)
+    parts_there, lines = [part for part in parts if part is not None], _summary(m)
+    picture, sections = first_screen(parts_there, lines)
     return Report(
         title=title or _title(m),
         banners=_banners(m),
         summary=lines,
         picture=picture,
-        sections=tuple(replace(one, blocks=tuple(b for b in one.blocks if b is not picture)) for one in explained),
+        sections=sections,
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 

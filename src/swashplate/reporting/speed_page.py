@@ -69,7 +69,9 @@ def compose_speeds(over_speed: TrimCurve | Derivatives, *, title: str | None = N
         figures: tuple[Block, ...] = tuple(
             by_contributor(Derivatives(vehicle, tuple(trims), tuple(tables), imperial), row) for row in ROWS
         )
-        sections.append(Section("derivatives", "Derivatives by contributor", figures))
+        sections.append(
+            Section("derivatives", "Which part of the helicopter makes which derivative?", figures, folded=True)
+        )
     if remarks:
         sections.append(Section("doubts", "Where the equations do not hold", (Points(tuple(remarks)),)))
     first, last = trims[0].speed, trims[-1].speed

@@ -202,10 +202,10 @@ def _time(runs: Mapping[str, StepRun]) -> Section:
         alt=f"{', '.join(present)} against time, with and without the decoupling.",
         keys=tuple(keys),
     )
-    return Section("time", "Heading, height and inputs", (figure,))
+    return Section("time", "What do heading, height and inputs do?", (figure,), folded=True)
 
 
 def _provenance(vehicle: Vehicle) -> Section:
     lines = [f"{name} {version}" for name, version in versions().items()]
     lines.append(f"card of {vehicle.name}, SHA-256 {card_hash(vehicle.card)}")
-    return Section("made-with", "Made with", (Points(tuple(lines)),), folded=True)
+    return Section("made-with", "How was this made?", (Points(tuple(lines)),), folded=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from swashplate.reporting.structure import Cell, Figure, Section, Table, Text
 
@@ -91,3 +92,22 @@ def with_terms(sections: Sequence[Section], lines: Sequence[tuple[str, str, str]
     rows = tuple((Cell(term), Cell(text)) for term, text in terms_in(texts).items())
     table = Table("Words of this page", ("word", "meaning"), rows)
     return (*sections, Section("words", "What do the words mean?", (table,), folded=True)) if rows else tuple(sections)
+
+
+def first_screen(
+    sections: Sequence[Section], lines: Sequence[tuple[str, str, str]] = (), *, of: str = ""
+) -> tuple[Figure | None, tuple[Section, ...]]:
+    """The picture of a page's first screen, and the sections without it; the last one says what the words mean.
+
+    The picture is the first figure that would be folded.
+
+    Args:
+        sections, lines: of the page.
+        of: identifier of the section whose figure is preferred.
+    """
+    folded = sorted((one for one in sections if one.folded), key=lambda one: one.identifier != of)
+    picture = next((block for one in folded for block in one.blocks if isinstance(block, Figure)), None)
+    rest = (
+        replace(one, blocks=tuple(b for b in one.blocks if b is not picture)) for one in with_terms(sections, lines)
+    )
+    return picture, tuple(rest)

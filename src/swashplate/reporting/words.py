@@ -29,6 +29,12 @@ def sigma_words(sigma: float | None) -> str:
     return "–" if sigma is None or not math.isfinite(sigma) else _short_exponent(f"{sigma:.2g}")
 
 
+def mode_words(eigenvalue: complex) -> str:
+    """An eigenvalue as "-0.05 ± 4.2j 1/s"; rounding's own imaginary part is none."""
+    oscillates = abs(eigenvalue.imag) > 1e-6 * abs(eigenvalue)
+    return f"{eigenvalue.real:+.3g}{f' ± {abs(eigenvalue.imag):.3g}j' if oscillates else ''} 1/s"
+
+
 def _short_exponent(text: str) -> str:
     """Exponents without their padding: 2.3e-05 becomes 2.3e-5; large round numbers without an exponent."""
     if "e" not in text:

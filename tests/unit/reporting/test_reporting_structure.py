@@ -29,7 +29,15 @@ from swashplate.reporting.terminal_tables import fit_table
 from swashplate.reporting.terms import TERMS
 from swashplate.reporting.theme import packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash
-from swashplate.reporting.words import noise_told, plain_words, sigma_words, span_words, step_words, value_words
+from swashplate.reporting.words import (
+    mode_words,
+    noise_told,
+    plain_words,
+    sigma_words,
+    span_words,
+    step_words,
+    value_words,
+)
 from swashplate.validation.prediction import HORIZONS
 from swashplate.validation.validation import PREDICTORS, AxisVerdict
 from swashplate.validation.verdict import JUDGED_AT
@@ -105,6 +113,11 @@ def test_long_rows_are_packed_without_loss_to_seven_digits() -> None:
 )
 def test_values_show_the_digits_that_sigma_leaves(value: float | None, sigma: float | None, words: str) -> None:
     assert value_words(value, sigma) == words
+
+
+def test_a_mode_oscillates_only_where_it_does() -> None:
+    assert mode_words(complex(-0.0485, 5e-9)) == "-0.0485 1/s"
+    assert mode_words(complex(0.25, -9.99)) == "+0.25 ± 9.99j 1/s"
 
 
 def test_sigma_has_two_digits() -> None:
