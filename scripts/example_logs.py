@@ -99,7 +99,7 @@ def _units(content: bytes, kinds: Sequence[dataflash.MessageKind], number: int) 
 
 
 # ---- the flight without a sweep --------------------------------------------------------------------------------------
-LOUD = 4.8  # the gain of the pitch loop there, against its own
+LOUD = 5.2  # the gain of the pitch loop there, against its own
 SECONDS, STEP, EVERY, BEGIN = 70.0, 1.0 / 400.0, 4, 60.0
 OSCILLATES, SHAKES = (40.0, 47.0), (58.0, 64.0)
 """s from the beginning: the pitch loop's gain is too high, and a blade is out of track."""
@@ -133,7 +133,7 @@ def flown(rng: np.random.Generator) -> tuple[Array, dict[str, Array]]:
         k, rows = _GAINS[axis], np.zeros((time.size, 5))
         p = angle = gust = command = integral = before = smooth = wanted = slope = 0.0
         waiting, stick = [0.0] * late, 0.0
-        moves = np.repeat(rng.uniform(-0.35, 0.35, 80) * (rng.random(80) < 0.55), round(1.0 / STEP))
+        moves = np.repeat(rng.uniform(-0.28, 0.28, 80) * (rng.random(80) < 0.40), round(1.0 / STEP))
         for i, t in enumerate(time.tolist()):
             stick += STEP * (moves[i] - stick) / 0.15
             gust += -STEP * gust / 0.8 + np.sqrt(STEP) * 1.2 * rng.standard_normal()

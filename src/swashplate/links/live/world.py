@@ -103,14 +103,14 @@ class World:
 
     # ---- what the pilot does -----------------------------------------------------------------------------------
     def reset(self) -> None:
-        """Back to the hover; switches stay, what was being recorded is kept up to here."""
+        """Back to the hover in still air; switches stay, what was being recorded is kept up to here."""
         self.ticks, self.trouble = 0, ""
+        self.setting.wind, self.setting.gusts = (0.0, 0.0, 0.0), 0.0
         self._maneuver = None
         self._crafts = {"own": self._fresh()}
         if self.setting.ghost:
             self._crafts["ghost"] = self._fresh()
         self._turbulence: Turbulence | None = None
-        self.set_gusts(self.setting.gusts)
         self._target = np.array(self.trim.state[[0, 1, 2, 8]])
         self._begin_fan()
 

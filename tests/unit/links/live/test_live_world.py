@@ -13,7 +13,7 @@ import pytest
 import scipy.linalg
 
 import swashplate as sp
-from flown_by_hand import U, X, Y, Z, flown_rows, fly, fresh, holds_what_is_held, moves_its_way, recorded
+from flown_by_hand import U, V, X, Y, Z, flown_rows, fly, fresh, holds_what_is_held, moves_its_way, recorded
 from swashplate.control.laws.linear_decoupling import static_decoupling
 from swashplate.control.lqg.design import design
 from swashplate.errors import ControllerError, FlightError
@@ -169,6 +169,17 @@ def test_modes_change_in_flight_without_a_jump(coax: World) -> None:
     coax.set_mode("position")
     there = coax.moment().crafts["own"][0][:2].copy()
     assert np.hypot(*(fly(coax, 15.0)[:2] - there)) < 0.3
+
+
+def test_a_reset_is_in_still_air(coax: World) -> None:
+    fresh(coax, "attitude")
+    coax.setting.wind = (3.0, -1.0, 0.0)
+    coax.set_gusts(1.0)
+    fly(coax, 0.5)
+    coax.reset()
+    assert (coax.setting.wind, coax.setting.gusts) == ((0.0, 0.0, 0.0), 0.0)
+    flown = fly(coax, 2.0)
+    assert np.hypot(flown[U], flown[V]) < 0.02
 
 
 def test_the_ground_ends_a_flight_and_reset_begins_another(coax: World) -> None:
