@@ -77,7 +77,7 @@ def cut(content: bytes, chosen: Cut) -> bytes:
             taken.append((at, whole))
     head = []
     for kind in kinds:
-        if kind.name in used and kind.at:
+        if kind.name in used and kind.at.size:
             head += [content[at : at + 89] for at in _described(content, kind.number)]
             head += _units(content, kinds, kind.number)
     return b"".join(head) + b"".join(whole for _, whole in sorted(taken))
@@ -95,7 +95,7 @@ def _units(content: bytes, kinds: Sequence[dataflash.MessageKind], number: int) 
     if kind is None:
         return []
     size = kind.dtype.itemsize + 3
-    return [content[at : at + size] for at in kind.at if content[at + 11] == number][:1]
+    return [content[at : at + size] for at in kind.at.tolist() if content[at + 11] == number][:1]
 
 
 # ---- the flight without a sweep --------------------------------------------------------------------------------------

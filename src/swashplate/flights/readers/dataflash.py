@@ -11,7 +11,7 @@ the GPL, on which swashplate does not depend.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 HEAD = b"\xa3\x95"
 FMT = 128
 _FMT_LENGTH = 89
+_CHUNK = 1 << 24  # bytes that are looked through for heads at a time
 _FMT_FIELDS = np.dtype([("type", "u1"), ("length", "u1"), ("name", "S4"), ("format", "S16"), ("columns", "S64")])
 
 # Format letter -> (NumPy type, factor): C types, and integers that stand for hundredths or 1e-7 degrees.
@@ -64,6 +65,8 @@ class MessageTable:
 
     def rows(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> MessageTable:
         """The messages that are chosen, by mask or index."""
+        if isinstance(self.columns, _Columns):
+            return MessageTable(self.columns.rows(chosen), self.place[chosen])
         return MessageTable({name: values[chosen] for name, values in self.columns.items()}, self.place[chosen])
 
 
@@ -100,7 +103,7 @@ class MessageKind:
     dtype: np.dtype[np.void]
     factors: Mapping[str, float]
     letters: Mapping[str, str]
-    at: list[int] = field(default_factory=list)
+    at: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 def is_dataflash(content: bytes) -> bool:
@@ -126,23 +129,94 @@ def _described(content: bytes, at: int) -> tuple[int, int, MessageKind | None]:
     return kind, length, MessageKind(kind, name, dtype, factors, dict(zip(columns, letters, strict=True)))
 
 
-class _Scan:
-    """One pass over the bytes: where each message stands, and the bytes that belong to none."""
+class _Chain:
+    """Heads all at once, each joined to the one at which its message ends.
+
+    Attributes:
+        kinds, lengths: types as they are described, where every one is described before it is used; else neither, and
+            the chain joins nothing.
+    """
 
     def __init__(self, content: bytes) -> None:
         self.kinds: dict[int, MessageKind] = {}
         self.lengths = [0] * 256
         self.lengths[FMT] = _FMT_LENGTH
+        self.heads = _heads(content)
+        self.numbers = np.frombuffer(content, np.uint8)[self.heads + 2]
+        begins: dict[int, int] = {}
+        told_twice = False
+        for at in self.heads[self.numbers == FMT].tolist():
+            if not content.startswith(HEAD, at + _FMT_LENGTH):
+                continue  # torn
+            kind, length, described = _described(content, at)
+            if kind == FMT or length < 3 or (kind in self.kinds and described is None):
+                continue
+            told_twice |= kind in begins and self.lengths[kind] != length
+            begins.setdefault(kind, at)
+            self.lengths[kind] = length
+            if described is not None:
+                self.kinds.setdefault(kind, described)
+        self._join()
+        used = {kind: self.heads[(self.numbers == kind) & self._joined][:1] for kind in begins}
+        if told_twice or any(used[kind].size and used[kind][0] < begin for kind, begin in begins.items()):
+            self.kinds, self.lengths = {}, [0 if kind != FMT else _FMT_LENGTH for kind in range(256)]
+            self._joined[:] = False
+
+    def _join(self) -> None:
+        after = self.heads + np.array(self.lengths)[self.numbers]
+        self._following = np.searchsorted(self.heads, after)
+        inside = (self._following < self.heads.size) & (after > self.heads)
+        self._joined = np.zeros(self.heads.size, dtype=np.bool_)
+        self._joined[inside] = self.heads[self._following[inside]] == after[inside]
+        self._breaks = np.flatnonzero(~self._joined | (self._following != np.arange(1, self.heads.size + 1)))
+
+    def run(self, at: int) -> tuple[list[tuple[int, int]], int]:
+        """Rows of heads (from, to) that follow each other from a byte on, and the byte behind them."""
+        index = int(np.searchsorted(self.heads, at))
+        if index >= self.heads.size or self.heads[index] != at or not self._joined[index]:
+            return [], at
+        rows = []
+        while True:  # from one break to the next, over what only looks like a head
+            stop = int(self._breaks[np.searchsorted(self._breaks, index)])
+            if not self._joined[stop]:
+                rows.append((index, stop))
+                return rows, int(self.heads[stop])
+            rows.append((index, stop + 1))
+            index = int(self._following[stop])
+
+
+class _Scan:
+    """One pass over the bytes: where each message stands, and the bytes that belong to none.
+
+    As far as each message ends where another one begins they are followed all at once, elsewhere one at a time.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        chain = _Chain(content)
+        self.kinds, self.lengths = chain.kinds, chain.lengths
         self.lost: list[tuple[int, int]] = []
         self.unfinished = 0
-        self._run(content)
+        places, rows = self._walk(content, chain)
+        chosen = np.concatenate([np.arange(a, b) for a, b in rows]) if rows else np.zeros(0, dtype=np.int64)
+        heads, numbers = chain.heads[chosen], chain.numbers[chosen]
+        order = np.argsort(numbers, kind="stable")
+        edges = np.searchsorted(numbers[order], np.arange(257))
+        for number, described in self.kinds.items():
+            joined = heads[order[edges[number] : edges[number + 1]]]
+            single = np.array(places[number], dtype=np.int64)
+            described.at = np.sort(np.concatenate([joined, single])) if single.size else joined
 
-    def _run(self, content: bytes) -> None:
+    def _walk(self, content: bytes, chain: _Chain) -> tuple[list[list[int]], list[tuple[int, int]]]:
+        """Places of single messages by type, and rows of the chain."""
         size, at, lengths = len(content), 0, self.lengths
         erased = min(len(content.rstrip(b"\xff")), len(content.rstrip(b"\0")))  # flash memory comes in blocks
         places: list[list[int]] = [[] for _ in range(256)]
+        rows: list[tuple[int, int]] = []
         headed = content.startswith(HEAD)
         while at < size:
+            if headed and chain.kinds:
+                more, at = chain.run(at)
+                rows += more
             kind = content[at + 2] if headed and at + 2 < size else -1
             length = lengths[kind] if kind >= 0 else 0
             after = at + length
@@ -161,8 +235,7 @@ class _Scan:
             following = size if following < 0 else following
             self._skip(content, at, following)
             at, headed = following, True
-        for number, described in self.kinds.items():
-            described.at = places[number]
+        return places, rows
 
     def _learn(self, content: bytes, at: int) -> None:
         kind, length, described = _described(content, at)
@@ -182,20 +255,65 @@ class _Scan:
             self.lost.append((start, stop))
 
 
+def _heads(content: bytes) -> NDArray[np.int64]:
+    """Where the two bytes of a head stand, with a byte behind them."""
+    cells, found = np.frombuffer(content, np.uint8), []
+    for begin in range(0, len(content), _CHUNK):
+        part = cells[begin : begin + _CHUNK + 1]
+        found.append(np.flatnonzero((part[:-1] == HEAD[0]) & (part[1:] == HEAD[1])) + begin)
+    heads = np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
+    return np.asarray(heads[heads + 2 < len(content)], dtype=np.int64)
+
+
 def kinds(content: bytes) -> list[MessageKind]:
     """Every message type that the bytes describe, with the places of its messages."""
     return list(_Scan(content).kinds.values())
 
 
+class _Columns(Mapping[str, NDArray[np.generic]]):
+    """The fields of messages: the first that is asked for is taken alone out of the bytes, then all at once.
+
+    Of most kinds only the stamps are ever looked at.
+    """
+
+    def __init__(self, content: bytes, kind: MessageKind, at: NDArray[np.int64]) -> None:
+        self._content, self._kind, self._at = content, kind, at
+        self._taken: dict[str, NDArray[np.generic]] = {}
+        self._records: NDArray[np.void] | None = None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._kind.factors)
+
+    def __len__(self) -> int:
+        return len(self._kind.factors)
+
+    def __getitem__(self, name: str) -> NDArray[np.generic]:
+        if name not in self._taken:
+            dtype, offset, *_ = dict(self._kind.dtype.fields or {})[name]
+            if self._taken and self._records is None:
+                self._records = self._bytes(0, self._kind.dtype.itemsize).view(self._kind.dtype)[:, 0]
+            if self._records is None:
+                cells = self._bytes(offset, dtype.itemsize).view(dtype.base)
+                values = cells.reshape(len(self._at), *dtype.shape)
+            else:
+                values = self._records[name]
+            factor = self._kind.factors[name]
+            self._taken[name] = values if factor == 1.0 else values * factor
+        return self._taken[name]
+
+    def _bytes(self, offset: int, size: int) -> NDArray[np.uint8]:
+        """So many bytes of each payload, shape (n, size)."""
+        cells = np.frombuffer(self._content, np.uint8)
+        return np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(cells, size)[self._at + 3 + offset])
+
+    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> _Columns:
+        """Of some of the messages."""
+        return _Columns(self._content, self._kind, self._at[chosen])
+
+
 def gathered(content: bytes, kind: MessageKind) -> MessageTable:
     """The messages of a type as columns."""
-    size = kind.dtype.itemsize
-    payload = b"".join([content[at + 3 : at + 3 + size] for at in kind.at])
-    records = np.frombuffer(payload, kind.dtype) if size else np.zeros(len(kind.at), kind.dtype)
-    columns = {
-        name: records[name] if factor == 1.0 else records[name] * factor for name, factor in kind.factors.items()
-    }
-    return MessageTable(columns, np.asarray(kind.at, dtype=np.int64))
+    return MessageTable(_Columns(content, kind, kind.at), kind.at)
 
 
 def messages(content: bytes) -> Messages:
@@ -203,7 +321,7 @@ def messages(content: bytes) -> Messages:
     scan = _Scan(content)
     tables: dict[str, MessageTable] = {}
     for kind in scan.kinds.values():
-        if kind.at and kind.name not in tables:
+        if kind.at.size and kind.name not in tables:
             tables[kind.name] = gathered(content, kind)
     notes, damage = [], []
     if scan.unfinished:

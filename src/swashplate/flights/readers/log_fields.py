@@ -107,7 +107,7 @@ class _Part:
 
 class _Binary(LogFields):
     def __init__(self, path: Path, content: bytes) -> None:
-        kinds = {kind.name: kind for kind in reversed(dataflash.kinds(content)) if kind.at}
+        kinds = {kind.name: kind for kind in reversed(dataflash.kinds(content)) if kind.at.size}
         self._path, self._state = path, _state(path)
         self._parts: dict[str, _Part] = {}
         bytes_ = np.frombuffer(content, np.uint8)
@@ -116,7 +116,7 @@ class _Binary(LogFields):
         for name, kind in kinds.items():
             if name in _DESCRIBE:
                 continue
-            at = np.asarray(kind.at, dtype=np.int64)
+            at = kind.at
             time = _stamped(bytes_, kind, at, clock)
             if time is None:
                 continue
@@ -183,7 +183,7 @@ def _clock(content: NDArray[np.uint8], kinds: Mapping[str, MessageKind]) -> tupl
     kind = kinds.get("TIME")
     if kind is None or "StartTime" not in kind.factors:
         return np.zeros(0, np.int64), np.zeros(0)
-    at = np.asarray(kind.at, dtype=np.int64)
+    at = kind.at
     return at, _column(content, kind, at, "StartTime") * 1e-6
 
 
