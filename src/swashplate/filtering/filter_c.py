@@ -6,7 +6,9 @@ that it found; slopes go along the same run again, some directions at a time.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from swashplate.engine.c_expression import Statements, printed, statements
 from swashplate.engine.c_loops import looped
 from swashplate.engine.c_split import ROOTS, split
 from swashplate.engine.c_tangents import VECTORS, Tangents
+from swashplate.engine.equations import Equations
 from swashplate.engine.roots import require_casadi
 from swashplate.engine.template import filled
 from swashplate.engine.trace import traced_rates
@@ -23,26 +26,64 @@ from swashplate.filtering.following import AWAY, SHARES, STILL
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.physics.backend import CasadiBackend
 
+Following = Callable[[Statements, Sequence[int]], str]
+
 _FOUND = ("nu", "corrected", "acting", "rest")
+_READ = ("s", "y", "g", "w", "p", "k")
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What a filter makes of a sample, as a graph.
+
+    Attributes:
+        correct: CasADi function of (predicted, reading, given, what drives, numbers, rates) to (innovation, corrected,
+            what acts, what of the state goes on by itself).
+        pushed: places of the states whose rates are pushed by the first of what acts.
+        windy: the seventh and eighth of what acts are wind.
+        rated: rates are measured.
+        linear: what drives goes straight from sample to sample; otherwise it is held.
+    """
+
+    correct: Any
+    pushed: Sequence[int]
+    windy: bool = False
+    rated: bool = False
+    linear: bool = False
 
 
 def filter_source(model: StochasticModel) -> str:
-    """C of `run_along`, `run_moved`, `run_steps`, `run_steps_moved` and `rates_and_slopes`.
+    """C of a vehicle in disturbed air, as `sample_source`, with a gain that follows where there is wind."""
+    casadi, correct = require_casadi(), correction(model)
+    vehicle = model.vehicle
+    sizes = (len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2, len(vehicle.state_names))
+    given = [casadi.SX.sym(name, correct.size1_in(i)) for i, name in enumerate("syg")]
+    beside = [casadi.SX.sym(name, size) for name, size in zip("wpk", sizes, strict=True)]
+    whole = casadi.Function("f", [*given, *beside], correct(*given), {"cse": True})
+    sample = Sample(whole, model.disturbed, windy=model.windy)
+    return sample_source(model.equations, sample, partial(_following, model) if model.windy else None)
+
+
+def sample_source(equations: Equations, sample: Sample, following: Following | None = None) -> str:
+    """C of `run_along`, `run_moved`, `run_steps`, `run_steps_moved` and `rates_and_slopes` (`templates/filter.c`).
+
+    Args:
+        equations: that are stepped. sample: what is made of a reading.
+        following: prints a gain that follows, from the rates without what the card alone decides, and their roots.
 
     Raises:
         ExportError: for equations that CasADi cannot trace or that are not printed as C.
         MissingLibraryError: without CasADi.
     """
-    vehicle = model.vehicle
+    vehicle, correct = equations.vehicle, sample.correct
     n, m = len(vehicle.state_names), len(vehicle.input_names)
-    correct = correction(model)
-    corrected = statements(correct, precision="double", inputs=["s", "y", "g"])
-    of_sample = Tangents({"s": ("ds", None), "g": ("dg", None)})
+    corrected = statements(correct, precision="double", inputs=_READ)
+    of_sample = Tangents({name: (f"d{name}", None) for name in ("s", "g", "p", "k")})
     correcting = [*of_sample.body(corrected.body), *of_sample.stores(corrected, dict(enumerate(_FOUND)))]
-    rates = traced_rates(model.equations)
+    rates = traced_rates(equations)
     whole = statements(rates.function, precision="double", inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
     of_card, rest = split(whole, moving=("x[", "w[", *ROOTS), fixed="cp")
-    following = _following(model, rest, rates.steps) if model.windy else ""
+    follow = following(rest, rates.steps) if following else ""
     of_inputs, rest = split(rest)
     driven = frozenset(range(m + 3))  # not the voltage
     arrays: dict[str, tuple[str, frozenset[int] | None]] = {"p": ("dp", None)}
@@ -62,14 +103,17 @@ def filter_source(model: StochasticModel) -> str:
         "M": str(m),
         "P": str(len(vehicle.parameter_names) + 2),
         "G": str(correct.size1_in(2)),
-        "Y": str(model.n_outputs),
+        "Y": str(correct.size1_in(1)),
         "S": str(correct.size1_in(0)),
-        "A": str(model.n_gusts),
-        "WINDY": str(int(model.windy)),
+        "A": str(correct.size1_out(2)),
+        "D": str(len(sample.pushed)),
+        "WINDY": str(int(sample.windy)),
+        "RATED": str(int(sample.rated)),
+        "LINEAR": str(int(sample.linear)),
         "R": str(max(1, len(rates.steps))),
         "CP": str(max(1, len(of_card.outputs))),
         "C": str(max(1, len(of_inputs.outputs))),
-        "PUSHED": ", ".join(map(str, model.disturbed)),
+        "PUSHED": ", ".join(map(str, sample.pushed)),
         "CORRECT": printed(corrected, "double", "double", _FOUND),
         "CORRECT_MOVED": _indented(correcting),
         "OF_CARD": printed(of_card, "double", "double", ["cp"]),
@@ -78,7 +122,7 @@ def filter_source(model: StochasticModel) -> str:
         "OF_INPUTS_MOVED": _indented(input_lines),
         "MOVING": _plain(rest, rates.steps),
         "MOVING_MOVED": _indented([*lines, *moving.stores(stored, {0: "k"})]),
-        "FOLLOWING": following,
+        "FOLLOWING": follow,
     }
     return filled("filter.c", blanks)
 

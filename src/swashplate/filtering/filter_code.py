@@ -11,11 +11,10 @@ from swashplate.arrays import Array
 
 
 class RecordSeries(NamedTuple):
-    """Of a record by sample: readings (n, outputs), commands as they arrive (n, inputs) and voltage (n,)."""
+    """Of a record by sample: readings (n, outputs), and inputs as they arrive, wind and voltage (n, inputs + 4)."""
 
     readings: Array
-    commands: Array
-    voltage: Array
+    driving: Array
 
 
 class Fixed(NamedTuple):
@@ -29,6 +28,21 @@ class Fixed(NamedTuple):
     start: Array
     given: Array
     numbers: Array
+
+
+class Along(NamedTuple):
+    """Directions in which a run moves, which come first in every part.
+
+    Attributes:
+        fixed: of what it has beside its series.
+        arriving: the first of the directions that move commands. commands: how they do (directions, n, inputs).
+        marks: samples, ascending, whose states' slopes are wanted.
+    """
+
+    fixed: Fixed
+    arriving: int
+    commands: Array
+    marks: NDArray[np.intp]
 
 
 class Pushed(NamedTuple):
@@ -79,20 +93,8 @@ class FilterCode(Protocol):
         """Innovations (n, outputs), states after each reading (n, joined), and what `moved` asks for."""
         ...
 
-    def moved(
-        self,
-        dt: float,
-        fixed: Fixed,
-        series: RecordSeries,
-        went: Array,
-        directions: Fixed,
-        late: tuple[int, Array],
-        marks: NDArray[np.intp],
-    ) -> tuple[Array, Array]:
-        """Slopes of innovations (count, n, outputs), and of the states after some readings (count, marks, joined).
-
-        `late` tells the first of the directions that move commands, and how they do (directions, n, inputs).
-        """
+    def moved(self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along) -> tuple[Array, Array]:
+        """Slopes of innovations (count, n, outputs), and of the states after some readings (count, marks, joined)."""
         ...
 
     def step(self, dt: float, x: Array, pushed: Pushed, numbers: Array) -> Array:
@@ -115,6 +117,13 @@ class FilterCode(Protocol):
         ...
 
     def follow(self, dt: float, begin: Following, series: RecordSeries) -> Followed:
-        """Filters whose gain follows, for models with a wind: readings that are no number tell nothing; commands by
-        row (n, rows, inputs)."""
+        """Filters whose gain follows, for models with a wind: readings that are no number tell nothing; what
+        drives is told by row (n, rows, inputs + 4)."""
         ...
+
+
+def driving_rows(commands: Array, voltage: Array) -> Array:
+    """What drives in calm air: commands (n, ..., inputs) and the voltage (n,) side by side (n, ..., inputs + 4)."""
+    front = commands.shape[:-1]
+    volts = np.broadcast_to(voltage.reshape(-1, *(1,) * (len(front) - 1)), front)
+    return np.concatenate([commands, np.zeros((*front, 3)), volts[..., None]], axis=-1)

@@ -8,13 +8,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_c import filter_source
-from swashplate.filtering.filter_code import FilterCode, Fixed, Followed, Following, Pushed, RecordSeries
+from swashplate.filtering.filter_code import Along, FilterCode, Fixed, Followed, Following, Pushed, RecordSeries
 from swashplate.filtering.filter_virtual import VirtualFilter
 
 _OPTIONS = ("-O2", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
@@ -32,36 +31,35 @@ _KINDS = {
     "i": np.ctypeslib.ndpointer(ctypes.c_long, flags="C_CONTIGUOUS"),
 }
 _ARGUMENTS = {
-    "run_along": "ld" + 9 * "*",
-    "run_moved": "ld" + 7 * "*" + "ll" + 3 * "*" + "ll" + 2 * "*" + "li*",
+    "run_along": "ld" + 8 * "*",
+    "run_moved": "ld" + 6 * "*" + "ll" + 3 * "*" + "ll" + 2 * "*" + "li*",
     "run_steps": "ldl" + 4 * "*",
     "run_steps_moved": "lld" + 8 * "*",
     "run_rates": "l" + 4 * "*",
     "rates_and_slopes": "l" + 6 * "*",
 }
-_FOLLOWING = {"run_following": "lld" + 15 * "*"}
+_FOLLOWING = {"run_following": "lld" + 14 * "*"}
 
 
 class FilterLibrary:
-    """The functions of one model's C.
+    """The functions of one filter's C.
 
     Args:
-        model: whose filter.
+        source: the C. outputs: how many there are. windy: whether its gain can follow.
 
     Raises:
-        ExportError: for equations that cannot be printed as C, and without a compiler.
-        MissingLibraryError: without CasADi.
+        ExportError: without a compiler, or where it refuses.
     """
 
     compiled_by = "C"
 
-    def __init__(self, model: StochasticModel) -> None:
-        self._c = loaded(filter_source(model), options=(*_OPTIONS, *_QUIET))
-        for name, kinds in (_ARGUMENTS | (_FOLLOWING if model.windy else {})).items():
+    def __init__(self, source: str, outputs: int, *, windy: bool = False) -> None:
+        self._c = loaded(source, options=(*_OPTIONS, *_QUIET))
+        for name, kinds in (_ARGUMENTS | (_FOLLOWING if windy else {})).items():
             function = getattr(self._c, name)
             function.argtypes, function.restype = [_KINDS[kind] for kind in kinds], None
         self._directions, self._roots = int(self._c.directions()), int(self._c.roots())
-        self._outputs = model.n_outputs
+        self._outputs = outputs
 
     def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
         n = len(series.readings)
@@ -69,23 +67,14 @@ class FilterLibrary:
         self._c.run_along(n, dt, *map(flat, fixed), *map(flat, series), *told)
         return told
 
-    def moved(
-        self,
-        dt: float,
-        fixed: Fixed,
-        series: RecordSeries,
-        went: Array,
-        directions: Fixed,
-        late: tuple[int, Array],
-        marks: NDArray[np.intp],
-    ) -> tuple[Array, Array]:
-        n, count, (arriving, commands) = len(series.readings), len(directions.start), late
-        slopes, states = np.empty((count, n, self._outputs)), np.empty((count, len(marks), fixed.start.size))
+    def moved(self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along) -> tuple[Array, Array]:
+        n, count = len(series.readings), len(along.fixed.start)
+        slopes, states = np.empty((count, n, self._outputs)), np.empty((count, len(along.marks), fixed.start.size))
         here = *map(flat, fixed), *map(flat, series), went
-        moving, pushed = tuple(map(flat, directions)), flat(commands)
-        at = np.ascontiguousarray(marks, np.dtype("l"))
+        moving, pushed = tuple(map(flat, along.fixed)), flat(along.commands)
+        at = np.ascontiguousarray(along.marks, np.dtype("l"))
         for first in range(0, count, self._directions):
-            where = first, count, *moving, arriving, len(pushed), pushed, slopes, len(at), at, states
+            where = first, count, *moving, along.arriving, len(pushed), pushed, slopes, len(at), at, states
             self._c.run_moved(n, dt, *here, *where)
         return slopes, states
 
@@ -106,7 +95,7 @@ class FilterLibrary:
     def follow(self, dt: float, begin: Following, series: RecordSeries) -> Followed:
         rows, n, y, joined = len(begin.states), len(series.readings), self._outputs, begin.states.shape[1]
         told = Followed(np.empty((rows, n, y)), np.empty((rows, n, y, y)), np.empty((rows, n, joined)))
-        here = flat(series.readings), flat(series.commands.swapaxes(0, 1)), flat(series.voltage)
+        here = flat(series.readings), flat(series.driving.swapaxes(0, 1))
         self._c.run_following(rows, n, dt, *map(flat, begin), *here, *told)
         return told
 
@@ -136,4 +125,6 @@ def filter_code(model: StochasticModel) -> FilterCode:
         ExportError: for equations that CasADi cannot trace or that are not printed as C, or a compiler that refuses.
         MissingLibraryError: without CasADi.
     """
-    return FilterLibrary(model) if can_compile() else VirtualFilter(model)
+    if can_compile():
+        return FilterLibrary(filter_source(model), model.n_outputs, windy=model.windy)
+    return VirtualFilter(model)

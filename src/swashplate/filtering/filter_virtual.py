@@ -10,7 +10,6 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.engine.on_arrays import OnArrays
@@ -18,7 +17,7 @@ from swashplate.engine.roots import require_casadi
 from swashplate.engine.trace import unrolled_rates
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel
 from swashplate.filtering.filter_c import correction
-from swashplate.filtering.filter_code import Fixed, Followed, Following, Pushed, RecordSeries
+from swashplate.filtering.filter_code import Along, Fixed, Followed, Following, Pushed, RecordSeries
 from swashplate.filtering.following import followed
 
 _FRACTIONS, _WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
@@ -48,41 +47,32 @@ class VirtualFilter:
     # ---- along a record ----------------------------------------------------------------------------------------
     def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
         casadi, n = require_casadi(), len(series.readings)
-        rows = (*(np.atleast_2d(part.T) for part in series), np.tile(fixed.given[:, None], n))
+        rows = (*(part.T for part in series), np.tile(fixed.given[:, None], n))
         told = self._sample.mapaccum(n)(fixed.start, *rows, np.tile(fixed.numbers[:, None], n))
         following, innovations, corrected = (np.asarray(casadi.DM(part).full()).T for part in told)
         return innovations, corrected, np.concatenate([fixed.start[None], following[:-1]])
 
     @cached_property
     def _sample(self) -> Any:
-        """(predicted state, reading, commands, voltage, given, numbers) to the next predicted state, the innovation and
+        """(predicted state, reading, what drives, given, numbers) to the next predicted state, the innovation and
         the corrected state."""
         casadi, model, dt = require_casadi(), self._model, self._model.dt
         correct, rates = correction(model), unrolled_rates(model.equations)
         s, y, g = (casadi.SX.sym(name, correct.size1_in(i)) for i, name in enumerate("syg"))
-        u, volts, p = casadi.SX.sym("u", self._m), casadi.SX.sym("v"), casadi.SX.sym("p", rates.size1_in(2))
+        row, p = casadi.SX.sym("w", rates.size1_in(1)), casadi.SX.sym("p", rates.size1_in(2))
         nu, corrected, acting, rest = correct(s, y, g)
         wind = acting[N_DISTURBANCES:] if model.windy else casadi.SX.zeros(2)
-        w = casadi.vertcat(u, wind, 0.0, volts)
+        w = row + casadi.vertcat(casadi.SX.zeros(self._m), wind, 0.0, 0.0)
         push = casadi.mtimes(casadi.DM(self._pushed), acting[:N_DISTURBANCES])
         x = total = corrected[: self._n]
         k = casadi.SX.zeros(self._n)
         for fraction, weight in zip(_FRACTIONS, _WEIGHTS, strict=True):
             k = rates(x + fraction * dt * k, w, p) + push
             total = total + weight * dt * k
-        return casadi.Function("sample", [s, y, u, volts, g, p], [casadi.vertcat(total, rest), nu, corrected])
+        return casadi.Function("sample", [s, y, row, g, p], [casadi.vertcat(total, rest), nu, corrected])
 
-    def moved(
-        self,
-        dt: float,
-        fixed: Fixed,
-        series: RecordSeries,
-        went: Array,
-        directions: Fixed,
-        late: tuple[int, Array],
-        marks: NDArray[np.intp],
-    ) -> tuple[Array, Array]:
-        model, (arriving, commands) = self._model, late
+    def moved(self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along) -> tuple[Array, Array]:
+        model, directions, arriving, commands, marks = self._model, *along
         n, count, y, joined = len(went), len(directions.start), model.n_outputs, fixed.start.size
         slopes, states = np.empty((count, n, y)), np.empty((count, len(marks), joined))
         ends = np.cumsum([y, joined, model.n_gusts]).tolist()
@@ -92,7 +82,8 @@ class VirtualFilter:
             by_state, by_given, (corrected, acting) = self._corrected(
                 went[here], series.readings[here], fixed, directions
             )
-            w = np.column_stack([series.commands[here], self._air(acting), series.voltage[here]])
+            w = series.driving[here].copy()
+            w[:, self._m : self._m + model.n_gusts - N_DISTURBANCES] += acting[:, N_DISTURBANCES:]
             pushed = Pushed(w, acting[:, :N_DISTURBANCES])
             planes, further = self._planes(dt, corrected[:, : self._n], pushed, fixed.numbers, directions.numbers)
             for k, i in enumerate(range(here.start, here.stop)):
@@ -106,11 +97,6 @@ class VirtualFilter:
                 at = np.concatenate([d_corrected[: self._n], d_w, d_acting[:N_DISTURBANCES]])
                 ds = np.concatenate([planes[k] @ at + further[k], d_rest])
         return slopes, states
-
-    def _air(self, acting: Array) -> Array:
-        """The wind of disturbances that act, (rows, 3)."""
-        wind = acting[:, N_DISTURBANCES:]
-        return np.pad(wind, ((0, 0), (0, 3 - wind.shape[1])))
 
     def _corrected(
         self, states: Array, readings: Array, fixed: Fixed, directions: Fixed

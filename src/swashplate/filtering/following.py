@@ -84,16 +84,16 @@ class FollowingRows:
         self.covariance = P - K @ seen
         return nu, S
 
-    def predicted(self, u: Array, volts: float) -> None:
-        """One sample later, averaged over what is not known of the air speed (u: by row)."""
+    def predicted(self, w: Array) -> None:
+        """One sample later, averaged over what is not known of the air speed (w: what drives, by row)."""
         model, n, g, d, P = self._model, self._n, self._model.n_gusts, N_DISTURBANCES, self.covariance
-        air, m, numbers, given = self._air(), u.shape[1], self._given.numbers, self._given
-        whole = np.concatenate([np.broadcast_to(air.speeds, (len(u), 2, n)), air.wind], axis=2)
+        air, m, numbers, given = self._air(), w.shape[1] - 4, self._given.numbers, self._given
+        whole = np.concatenate([np.broadcast_to(air.speeds, (len(w), 2, n)), air.wind], axis=2)
         spread = np.sqrt(np.maximum(np.einsum("ris,rst,rit->ri", whole, P, whole, optimize=True), STILL))
         acting = self.state.gust + np.pad(self.state.drift, ((0, 0), (0, g - d)))
-        driving = np.zeros((len(u), m + 4))
-        driving[:, :m], driving[:, m : m + g - d], driving[:, m + 3] = u, acting[:, d:], volts
-        away = np.repeat(driving[:, None], 2 * len(_AWAY), axis=1).reshape(len(u), len(_AWAY), 2, m + 4)
+        driving = w.copy()
+        driving[:, m : m + g - d] += acting[:, d:]
+        away = np.repeat(driving[:, None], 2 * len(_AWAY), axis=1).reshape(len(w), len(_AWAY), 2, m + 4)
         away[..., m : m + 2] -= _AWAY[:, None, None] * (spread[:, :, None] * air.turn)[:, None]
         front = away.shape[:3]
         there = self._code.rates(
@@ -106,7 +106,7 @@ class FollowingRows:
         apart = np.einsum("k,rkin->rn", _SHARES, there - here[:, None, None])
         by_air = np.einsum("k,rkin->rni", _SHARES * _AWAY, there) / spread[:, None]
         by_gust = np.concatenate(
-            [np.broadcast_to(self._pushed, (len(u), n, d)), by_driving[:, :, m : m + g - d]], axis=2
+            [np.broadcast_to(self._pushed, (len(w), n, d)), by_driving[:, :, m : m + g - d]], axis=2
         )
         more = by_air + by_gust[:, :, d : d + 2] @ np.swapaxes(air.turn, 1, 2)
         by_x, by_gust = by_x + more @ air.speeds, by_gust + more @ air.wind[:, :, :g]
@@ -114,7 +114,7 @@ class FollowingRows:
         by_gust = model.dt * held @ by_gust
         after = self._code.step(model.dt, self.state.x, Pushed(driving, acting[:, :d]), numbers)
         # Disturbances and the line go on by themselves: F is full in the states' rows alone.
-        rows = np.concatenate([by_x, by_gust, by_gust[:, :, :d], np.zeros((len(u), n, model.n_line))], axis=2)
+        rows = np.concatenate([by_x, by_gust, by_gust[:, :, :d], np.zeros((len(w), n, model.n_line))], axis=2)
         led, kept = rows @ P, self._lasting
         moved = np.empty_like(P)
         moved[:, :n, :n] = led @ np.swapaxes(rows, 1, 2)
@@ -155,10 +155,10 @@ class FollowingRows:
 def followed(model: StochasticModel, code: FilterCode, begin: Following, series: RecordSeries) -> Followed:
     """The rows along a record."""
     beside, told = FollowingRows(model, code, begin), []
-    for y, u, volts in zip(*series, strict=True):
+    for y, w in zip(*series, strict=True):
         nu, S = beside.corrected(y)
         told.append((nu, S, np.concatenate([part for part in beside.state if not isinstance(part, tuple)], axis=1)))
-        beside.predicted(u, float(volts))
+        beside.predicted(w)
     return Followed(*(np.stack(part, axis=1) for part in zip(*told, strict=True)))
 
 

@@ -1,13 +1,12 @@
 """A filter of constant gain around any vehicle's equations, along a record, and its exact slopes.
 
-CasADi traces the equations once. C printed from the graph runs the filter (`engine/templates/record.c`), differentiated
-in print; without a compiler CasADi's virtual machine runs the same sample.
+CasADi traces the equations once. C printed from the graph runs the filter (`filter_c`), differentiated in print;
+without a compiler CasADi's virtual machine runs the same sample.
 """
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -15,22 +14,16 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.compiled import NATIVE, can_compile, loaded
-from swashplate.engine.c_expression import printed, statements
-from swashplate.engine.c_loops import looped
-from swashplate.engine.c_split import ROOTS
-from swashplate.engine.c_tangents import VECTORS, Tangents
-from swashplate.engine.equations import Equations
+from swashplate.compiled import can_compile
+from swashplate.engine.equations import CONSTANTS, Equations
 from swashplate.engine.roots import require_casadi
-from swashplate.engine.template import filled
-from swashplate.engine.trace import traced_force, traced_rates, unrolled_rates
+from swashplate.engine.trace import traced_force, unrolled_rates
+from swashplate.filtering.filter_c import Sample, sample_source
+from swashplate.filtering.filter_code import Along, Fixed, RecordSeries
+from swashplate.filtering.filter_library import FilterLibrary
 
 FORCES = ("ax", "ay", "az")
 """Channels of the specific force, in the order in which a vehicle gives it."""
-
-_OPTIONS = ("-O2", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-w")
-_TABLE = np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS")
-_ARGUMENTS = (ctypes.c_long, ctypes.c_double, *4 * (_TABLE,), ctypes.c_long, ctypes.c_long, *6 * (_TABLE,))
 
 
 @dataclass(frozen=True)
@@ -76,13 +69,17 @@ class VehicleFilter:
         """
         if self._library is None:
             return self._run_virtually(start, numbers, rows, readings)
-        count, own = len(start) - 1, [np.ascontiguousarray(part) for part in (start, numbers, rows, readings)]
-        sizes = [(len(rows), width) for width in (readings.shape[1], start.shape[1])]
-        tables = [np.empty((*front, *size)) for front in ((), (count,)) for size in sizes]
-        for first in range(0, max(1, count), self._library.directions()):
-            given = own[0][0], own[1][0], own[2], own[3], first, count, own[0][1:], own[1][1:]
-            self._library.run(len(rows), self.dt, *given, *tables)
-        return Ran(*tables)
+        fixed, moved = (Fixed(*part) for part in self._parts(start, numbers))
+        series, marks, inputs = RecordSeries(readings, rows), np.arange(len(rows)), rows.shape[1] - 4
+        errors, states, went = self._library.along(self.dt, fixed, series)
+        along = Along(moved, 0, np.empty((0, len(rows), inputs)), marks)
+        return Ran(errors, states, *self._library.moved(self.dt, fixed, series, went, along))
+
+    def _parts(self, start: Array, numbers: Array) -> Iterator[tuple[Array, Array, Array]]:
+        """Where it begins, what is given and the equations' numbers: themselves, and how they move."""
+        own = len(self.equations.vehicle.parameter_names) + len(CONSTANTS)
+        for of in (0, slice(1, None)):
+            yield start[of], numbers[of, own:], numbers[of, :own]
 
     def _run_virtually(self, start: Array, numbers: Array, rows: Array, readings: Array) -> Ran:
         along, count = _sample(self.equations, self._seen, self.dt).mapaccum(len(rows)), len(start) - 1
@@ -112,54 +109,19 @@ class VehicleFilter:
 
 
 @lru_cache(maxsize=16)
-def _library(equations: Equations, seen: tuple[int, ...]) -> Any:
+def _library(equations: Equations, seen: tuple[int, ...]) -> FilterLibrary:
     """The filter in C, compiled."""
-    library = loaded(filter_source(equations, seen), options=_OPTIONS)
-    library.run.argtypes, library.run.restype = _ARGUMENTS, None
-    return library
-
-
-def filter_source(equations: Equations, seen: Sequence[int]) -> str:
-    """C of `run` for a vehicle's equations (`templates/record.c`).
-
-    Args:
-        equations: of which vehicle.
-        seen: places of the outputs among states, rates and force.
-
-    Raises:
-        ExportError: for equations that CasADi cannot trace or that are not printed as C.
-        MissingLibraryError: without CasADi.
-    """
-    vehicle, rates = equations.vehicle, traced_rates(equations)
+    casadi, vehicle, m = require_casadi(), equations.vehicle, len(seen)
     n = len(vehicle.state_names)
-    code = statements(rates.function, precision="double", inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
-    moving, feeling = (Tangents({"x": ("dx", None), "p": ("dp", None)}) for _ in range(2))
-    if rates.steps:
-        plain = looped(code, rates.steps, real="double", precision="double", outputs=["k"])
-        lines, stored = moving.rooted(code, len(rates.steps))
-    else:
-        plain, lines, stored = printed(code, "double", "double", ["k"]), moving.body(code.body), code
-    felt: list[str] = []
-    if max(seen) >= 2 * n:
-        force = statements(traced_force(equations), precision="double", inputs=["x", "w", "p"])
-        felt = [*feeling.body(force.body), *feeling.stores(force, {0: "f"})]
-    return filled(
-        "record.c",
-        {
-            "VECTORS": VECTORS,
-            "STATES": n,
-            "DRIVING": len(vehicle.input_names) + 4,
-            "NUMBERS": len(vehicle.parameter_names) + 2,
-            "OUTPUTS": len(seen),
-            "ROOTS": max(1, len(rates.steps)),
-            "ROOTED": int(bool(rates.steps)),
-            "RATED": int(any(n <= place < 2 * n for place in seen)),
-            "SEEN": ", ".join(map(str, seen)),
-            "MOVING": plain,
-            "MOVING_MOVED": "\n".join([*lines, *moving.stores(stored, {0: "k"}), ""]),
-            "FORCE_MOVED": "\n".join([*felt, ""]),
-        },
-    )
+    sizes = (n, m, n + m + n * m, len(vehicle.input_names) + 4, len(vehicle.parameter_names) + len(CONSTANTS), n)
+    s, y, g, w, p, k = (casadi.SX.sym(name, size) for name, size in zip("sygwpk", sizes, strict=True))
+    shift, bias, gain = casadi.vertsplit(g, [0, n, n + m, n + m + n * m])
+    force = traced_force(equations)(s, w, p) if max(seen) >= 2 * n else casadi.SX.zeros(3)
+    error = y - casadi.vertcat(s, k + shift, force)[list(seen)] - bias
+    results = [error, s + casadi.reshape(gain, m, n).T @ error, shift, casadi.SX(0, 1)]
+    correct = casadi.Function("f", [s, y, g, w, p, k], [casadi.densify(part) for part in results], {"cse": True})
+    rated = any(n <= place < 2 * n for place in seen)
+    return FilterLibrary(sample_source(equations, Sample(correct, range(n), rated=rated, linear=True)), m)
 
 
 def _told(equations: Equations, seen: tuple[int, ...], x: Any, w: Any, p: Any, shift: Any) -> Any:

@@ -13,7 +13,7 @@ from swashplate.arrays import Array, lengthened
 from swashplate.filtering.arriving_commands import commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel, stochastic_model
-from swashplate.filtering.filter_code import RecordSeries
+from swashplate.filtering.filter_code import RecordSeries, driving_rows
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import gain_at, steady_gain
 from swashplate.identification.core.records import Record
@@ -149,7 +149,7 @@ def observed(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisan
     starting = reaching[: starting_samples(record.dt)].mean(axis=0)
     numbers = FilterNumbers(*(np.array(row, dtype=np.float64) for row in (vehicle.values(), noise, nuisance, starting)))
     begin = begun(model, numbers, seen_at_start(vehicle, record))
-    series = RecordSeries(record.outputs, reaching[:n], record.voltage)
+    series = RecordSeries(record.outputs, driving_rows(reaching[:n], record.voltage))
     innovations, filtered, _ = record_filter(model).along(begin, numbers, series)
     return Observed(model, numbers, filtered, innovations, begin.gain.covariance, reaching, voltage)
 

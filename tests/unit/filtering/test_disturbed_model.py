@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import DISTURBED, Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel, stochastic_model
-from swashplate.filtering.filter_code import RecordSeries
+from swashplate.filtering.filter_code import RecordSeries, driving_rows
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import steady_gain
 from swashplate.identification.core.records import POSE
@@ -173,7 +173,7 @@ def _filtered(y: Array, u: Array, nuisance: Nuisance, heading: float) -> tuple[A
     rows = FilterNumbers(*(part[None] for part in numbers))
     K, S, _ = steady_gain(*(part[0] for part in joined_at(model, rows, STILL)))
     begin = Begun(model.gain_of(K, S), x + heading * (np.arange(x.size) == COAX.index("psi")))
-    run = record_filter(model).along(begin, numbers, RecordSeries(y, u, np.full(len(y), VOLTAGE)))
+    run = record_filter(model).along(begin, numbers, RecordSeries(y, driving_rows(u, np.full(len(y), VOLTAGE))))
     return run.innovations, run.states
 
 

@@ -2,17 +2,21 @@
 #include <string.h>
 
 @VECTORS@
-enum { N = @N@, M = @M@, W = M + 4, P = @P@, G = @G@, Y = @Y@, S = @S@, A = @A@, R = @R@, CP = @CP@, C = @C@ };
-static const int pushed[6] = {@PUSHED@};
+enum { N = @N@, M = @M@, W = M + 4, P = @P@, G = @G@, Y = @Y@, S = @S@, A = @A@, D = @D@, R = @R@, CP = @CP@, C = @C@ };
+static const int pushed[D] = {@PUSHED@};
 static const double fractions[4] = {0, 0.5, 0.5, 1}, weights[4] = {1. / 6, 1. / 3, 1. / 3, 1. / 6};
 
-static void correct(const double *s, const double *y, const double *g, double *nu, double *corrected,
-                    double *acting, double *rest) {
+/* k: the rates at the predicted state, where they are measured. */
+static void correct(const double *s, const double *y, const double *g, const double *w, const double *p, const double *k,
+                    double *nu, double *corrected, double *acting, double *rest) {
+  (void)w, (void)p, (void)k, (void)rest;
 @CORRECT@}
 
-static void correct_moved(const double *s, const double *y, const double *g, double *nu, double *corrected,
-                          double *acting, double *rest, const vec *ds, const vec *dg, vec *dnu, vec *dcorrected,
-                          vec *dacting, vec *drest) {
+static void correct_moved(const double *s, const double *y, const double *g, const double *w, const double *p,
+                          const double *k, double *nu, double *corrected, double *acting, double *rest, const vec *ds,
+                          const vec *dg, const vec *dp, const vec *dk, vec *dnu, vec *dcorrected, vec *dacting,
+                          vec *drest) {
+  (void)w, (void)p, (void)k, (void)rest, (void)dp, (void)dk, (void)drest;
 @CORRECT_MOVED@}
 
 static void of_card(const double *p, double *cp) {
@@ -43,38 +47,43 @@ static void moving_moved(const double *x, const double *w, const double *p, cons
   (void)x, (void)w, (void)p, (void)cp, (void)c, (void)root, (void)dx, (void)dw, (void)dp, (void)dcp, (void)dc;
 @MOVING_MOVED@}
 
-static void driving(const double *u, const double *acting, double volts, double *w) {
-  memcpy(w, u, M * sizeof *u);
-  w[M] = @WINDY@ ? acting[6] : 0;
-  w[M + 1] = @WINDY@ ? acting[7] : 0;
-  w[M + 2] = 0;
-  w[M + 3] = volts;
+static void driving(const double *row, const double *acting, double *w) {
+  memcpy(w, row, W * sizeof *w);
+  if (@WINDY@) w[M] += acting[6], w[M + 1] += acting[7];
+}
+
+/* What drives at a stage: held, or straight from w to `then`. */
+static void at_stage(const double *w, const double *then, int j, double *v) {
+  for (int i = 0; i < W; ++i) v[i] = @LINEAR@ ? w[i] + fractions[j] * (then[i] - w[i]) : w[i];
 }
 
 /* root: of each of the four stages. */
-static void step(double *x, const double *w, const double *push, const double *p, const double *cp, double dt,
-                 double (*root)[R]) {
-  double at[N], k[N] = {0}, sum[N] = {0}, c[C];
-  of_inputs(w, p, cp, c);
+static void step(double *x, const double *w, const double *then, const double *push, const double *p, const double *cp,
+                 double dt, double (*root)[R]) {
+  double at[N], k[N] = {0}, sum[N] = {0}, c[C], v[W];
+  at_stage(w, then, 0, v), of_inputs(v, p, cp, c);
   for (int j = 0; j < 4; ++j) {
+    if (@LINEAR@ && j) at_stage(w, then, j, v), of_inputs(v, p, cp, c);
     for (int i = 0; i < N; ++i) at[i] = x[i] + fractions[j] * dt * k[i];
     if (j) memcpy(root[j], root[j - 1], sizeof root[j]);
-    moving(at, w, p, cp, c, root[j], j, k);
-    for (int i = 0; i < 6; ++i) k[pushed[i]] += push[i];
+    moving(at, v, p, cp, c, root[j], j, k);
+    for (int i = 0; i < D; ++i) k[pushed[i]] += push[i];
     for (int i = 0; i < N; ++i) sum[i] += weights[j] * dt * k[i];
   }
   for (int i = 0; i < N; ++i) x[i] += sum[i];
 }
 
-static void step_moved(double *x, const double *w, const double *push, const double *p, const double *cp, double dt,
-                       double (*root)[R], vec *dx, const vec *dw, const vec *dpush, const vec *dp, const vec *dcp) {
-  double at[N], k[N] = {0}, sum[N] = {0}, c[C];
+static void step_moved(double *x, const double *w, const double *then, const double *push, const double *p,
+                       const double *cp, double dt, double (*root)[R], vec *dx, const vec *dw, const vec *dpush,
+                       const vec *dp, const vec *dcp) {
+  double at[N], k[N] = {0}, sum[N] = {0}, c[C], v[W];
   vec dat[N], dk[N] = {0}, dsum[N] = {0}, dc[C];
-  of_inputs_moved(w, p, cp, c, dw, dp, dcp, dc);
+  at_stage(w, then, 0, v), of_inputs_moved(v, p, cp, c, dw, dp, dcp, dc);
   for (int j = 0; j < 4; ++j) {
+    if (@LINEAR@ && j) at_stage(w, then, j, v), of_inputs_moved(v, p, cp, c, dw, dp, dcp, dc);
     for (int i = 0; i < N; ++i) at[i] = x[i] + fractions[j] * dt * k[i], dat[i] = dx[i] + fractions[j] * dt * dk[i];
-    moving_moved(at, w, p, cp, c, root[j], k, dat, dw, dp, dcp, dc, dk);
-    for (int i = 0; i < 6; ++i) k[pushed[i]] += push[i], dk[pushed[i]] += dpush[i];
+    moving_moved(at, v, p, cp, c, root[j], k, dat, dw, dp, dcp, dc, dk);
+    for (int i = 0; i < D; ++i) k[pushed[i]] += push[i], dk[pushed[i]] += dpush[i];
     for (int i = 0; i < N; ++i) sum[i] += weights[j] * dt * k[i], dsum[i] += weights[j] * dt * dk[i];
   }
   for (int i = 0; i < N; ++i) x[i] += sum[i], dx[i] += dsum[i];
@@ -93,11 +102,11 @@ static void gathered_row(vec *to, const double *from, long size, long rows, long
 }
 
 void run_along(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
-               const double *commands, const double *voltage, double *innovations, double *states, double *roots);
+               const double *rows, double *innovations, double *states, double *roots);
 void run_moved(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
-               const double *commands, const double *voltage, const double *roots, long first, long count,
-               const double *d_start, const double *d_g, const double *d_p, long arriving, long late,
-               const double *d_commands, double *out, long marks, const long *at, double *d_states);
+               const double *rows, const double *roots, long first, long count, const double *d_start,
+               const double *d_g, const double *d_p, long arriving, long late, const double *d_commands, double *out,
+               long marks, const long *at, double *d_states);
 void run_steps(long rows, double dt, long each, double *x, const double *w, const double *push, const double *p);
 void run_steps_moved(long rows, long count, double dt, double *x, const double *w, const double *push, const double *p,
                      double *dx, const double *d_w, const double *d_push, const double *d_p);
@@ -109,28 +118,30 @@ int roots(void);
 
 /* Innovations (n, Y) and corrected states (n, S); roots (n, 4, R) for `run_moved`. */
 void run_along(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
-               const double *commands, const double *voltage, double *innovations, double *states, double *roots) {
-  double s[S], acting[A], rest[S - N + 1], w[W], cp[CP];
+               const double *rows, double *innovations, double *states, double *roots) {
+  double s[S], acting[A], rest[S - N + 1], w[W], then[W], cp[CP], c[C], k[N] = {0}, root[R];
   memcpy(s, start, sizeof s);
   of_card(p, cp);
   for (long i = 0; i < n; ++i) {
-    correct(s, readings + i * Y, g, innovations + i * Y, states + i * S, acting, rest);
+    const double *row = rows + i * W, *next = i + 1 < n ? row + W : row;
+    if (@RATED@) of_inputs(row, p, cp, c), moving(s, row, p, cp, c, root, 0, k);
+    correct(s, readings + i * Y, g, row, p, k, innovations + i * Y, states + i * S, acting, rest);
     memcpy(s, states + i * S, N * sizeof *s);
     memcpy(s + N, rest, (S - N) * sizeof *s);
-    driving(commands + i * M, acting, voltage[i], w);
-    step(s, w, acting, p, cp, dt, (double (*)[R])(roots + i * 4 * R));
+    driving(row, acting, w), driving(next, acting, then);
+    step(s, w, then, acting, p, cp, dt, (double (*)[R])(roots + i * 4 * R));
   }
 }
 
 /* Slopes of the innovations (count, n, Y) along V directions from `first` on; commands of directions `arriving` and the
    `late` - 1 after it move (late, n, M). Slopes of the corrected states at the samples `at` (count, marks, S). */
 void run_moved(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
-               const double *commands, const double *voltage, const double *roots, long first, long count,
-               const double *d_start, const double *d_g, const double *d_p, long arriving, long late,
-               const double *d_commands, double *out, long marks, const long *at, double *d_states) {
+               const double *rows, const double *roots, long first, long count, const double *d_start,
+               const double *d_g, const double *d_p, long arriving, long late, const double *d_commands, double *out,
+               long marks, const long *at, double *d_states) {
   long mark = 0;
-  double s[S], corrected[S], acting[A], rest[S - N + 1], w[W], cp[CP], nu[Y];
-  vec ds[S], dcorrected[S], dacting[A], drest[S - N + 1], dw[W], dcp[CP], dnu[Y], dg[G], dp[P];
+  double s[S], corrected[S], acting[A], rest[S - N + 1], w[W], then[W], cp[CP], nu[Y], c[C], k[N] = {0}, root[R];
+  vec ds[S], dcorrected[S], dacting[A], drest[S - N + 1], dw[W], dcp[CP], dnu[Y], dg[G], dp[P], dc[C], dk[N];
   memset(dw, 0, sizeof dw);
   memcpy(s, start, sizeof s);
   gathered(ds, d_start, S, first, count);
@@ -138,7 +149,14 @@ void run_moved(long n, double dt, const double *start, const double *g, const do
   gathered(dp, d_p, P, first, count);
   of_card_moved(p, cp, dp, dcp);
   for (long i = 0; i < n; ++i) {
-    correct_moved(s, readings + i * Y, g, nu, corrected, acting, rest, ds, dg, dnu, dcorrected, dacting, drest);
+    const double *row = rows + i * W, *next = i + 1 < n ? row + W : row;
+    if (@RATED@) {
+      memset(dw, 0, sizeof dw);
+      of_inputs(row, p, cp, c), moving(s, row, p, cp, c, root, 0, k);
+      of_inputs_moved(row, p, cp, c, dw, dp, dcp, dc), moving_moved(s, row, p, cp, c, root, k, ds, dw, dp, dcp, dc, dk);
+    }
+    correct_moved(s, readings + i * Y, g, row, p, k, nu, corrected, acting, rest, ds, dg, dp, dk, dnu, dcorrected, dacting,
+                  drest);
     for (int l = 0; l < V && first + l < count; ++l)
       for (int o = 0; o < Y; ++o) out[((first + l) * n + i) * Y + o] = dnu[o][l];
     for (; mark < marks && at[mark] == i; ++mark)
@@ -146,43 +164,43 @@ void run_moved(long n, double dt, const double *start, const double *g, const do
         for (int j = 0; j < S; ++j) d_states[((first + l) * marks + mark) * S + j] = dcorrected[j][l];
     memcpy(s, corrected, N * sizeof *s), memcpy(ds, dcorrected, N * sizeof *ds);
     memcpy(s + N, rest, (S - N) * sizeof *s), memcpy(ds + N, drest, (S - N) * sizeof *ds);
-    driving(commands + i * M, acting, voltage[i], w);
+    driving(row, acting, w), driving(next, acting, then);
     for (int l = 0; l < V; ++l) {
       const long place = first + l - arriving;
       for (int j = 0; j < M; ++j) dw[j][l] = place >= 0 && place < late ? d_commands[(place * n + i) * M + j] : 0;
     }
-    for (int j = 6; j < A; ++j) dw[M + j - 6] = dacting[j];
-    step_moved(s, w, acting, p, cp, dt, (double (*)[R])(roots + i * 4 * R), ds, dw, dacting, dp, dcp);
+    for (int j = 6; @WINDY@ && j < A; ++j) dw[M + j - 6] = dacting[j];
+    step_moved(s, w, then, acting, p, cp, dt, (double (*)[R])(roots + i * 4 * R), ds, dw, dacting, dp, dcp);
   }
 }
 
-/* States (rows, N) one sample later, under commands and air (rows, W) and push (rows, 6); numbers of all, or of
+/* States (rows, N) one sample later, under commands and air (rows, W) and push (rows, D); numbers of all, or of
    `each`. */
 void run_steps(long rows, double dt, long each, double *x, const double *w, const double *push, const double *p) {
   double cp[CP], root[4][R];
   for (long i = 0; i < rows; ++i) {
     if (!i || each) of_card(p + i * each * P, cp);
-    step(x + i * N, w + i * W, push + i * 6, p + i * each * P, cp, dt, root);
+    step(x + i * N, w + i * W, w + i * W, push + i * D, p + i * each * P, cp, dt, root);
   }
 }
 
 /* The same, with slopes of states (count, rows, N) along directions of commands and air (count, rows, W), of the push
-   (count, rows, 6) and of the numbers (count, P), which are those of all. */
+   (count, rows, D) and of the numbers (count, P), which are those of all. */
 void run_steps_moved(long rows, long count, double dt, double *x, const double *w, const double *push, const double *p,
                      double *dx, const double *d_w, const double *d_push, const double *d_p) {
   double at[N], cp[CP], root[4][R];
-  vec v[N], vw[W], vpush[6], vp[P], vcp[CP];
+  vec v[N], vw[W], vpush[D], vp[P], vcp[CP];
   for (long first = 0; first < count; first += V) {
     gathered(vp, d_p, P, first, count);
     of_card_moved(p, cp, vp, vcp);
     for (long i = 0; i < rows; ++i) {
       memcpy(at, x + i * N, sizeof at);
-      step(at, w + i * W, push + i * 6, p, cp, dt, root);
+      step(at, w + i * W, w + i * W, push + i * D, p, cp, dt, root);
       memcpy(at, x + i * N, sizeof at);
       gathered_row(v, dx, N, rows, i, first, count);
       gathered_row(vw, d_w, W, rows, i, first, count);
-      gathered_row(vpush, d_push, 6, rows, i, first, count);
-      step_moved(at, w + i * W, push + i * 6, p, cp, dt, root, v, vw, vpush, vp, vcp);
+      gathered_row(vpush, d_push, D, rows, i, first, count);
+      step_moved(at, w + i * W, w + i * W, push + i * D, p, cp, dt, root, v, vw, vpush, vp, vcp);
       for (int l = 0; l < V && first + l < count; ++l)
         for (int j = 0; j < N; ++j) dx[((first + l) * rows + i) * N + j] = v[j][l];
     }

@@ -96,14 +96,14 @@ static double variance(vec P[S][SV], const int *at, const double *a, int count) 
 }
 
 /* One sample later, averaged over what is not known of the air speed. fade (A), turn (K, K), white (6), added (L). */
-static void predicted(double *s, vec P[S][SV], const double *u, double volts, double dt, const double *fade,
-                      const double *turn, const double *white, const double *added, const double *p, const double *cp) {
+static void predicted(double *s, vec P[S][SV], const double *drives, double dt, const double *fade, const double *turn,
+                      const double *white, const double *added, const double *p, const double *cp) {
   const double co = cos(s[H]), si = sin(s[H]), north[2] = {co, -si}, east[2] = {si, co};
   double acting[A], w[W], here[N], there[N], apart[N] = {0}, by_x[N * N], by_wind[N * 2], more[N][2], root[4][R], ca[CA];
   vec a[N][NV], h[N][NV], f[N][NV], f_turned[N][NV], g_turned[A][NV], both[A][SV], led[N][SV], scale[SV];
   double g[N][A];
   for (int j = 0; j < A; ++j) acting[j] = s[N + j] + (j < 6 ? s[N + A + j] : 0);
-  driving(u, acting, volts, w);
+  driving(drives, acting, w);
   slopes_at(s, w, p, cp, M, 2, here, by_x, by_wind);
   in_still_air(s, w, p, cp, ca);
   memset(more, 0, sizeof more);
@@ -202,7 +202,7 @@ static void predicted(double *s, vec P[S][SV], const double *u, double volts, do
       const double one = P[i][j / V][j % V], other = P[j][i / V][i % V], even = 0.5 * (one + other);
       P[i][j / V][j % V] = P[j][i / V][i % V] = i >= N && j < N ? other : even;
     }
-  step(s, w, acting, p, cp, dt, root);
+  step(s, w, w, acting, p, cp, dt, root);
   for (int i = 0; i < N; ++i) s[i] += dt * apart[i];
   for (int j = 0; j < A; ++j) s[N + j] *= fade[j];
   double line[K + 1];
@@ -215,14 +215,14 @@ static void predicted(double *s, vec P[S][SV], const double *u, double volts, do
 
 void run_following(long rows, long n, double dt, const double *starts, const double *covariances, const double *nuisance,
                    const double *fade, const double *turn, const double *white, const double *added,
-                   const double *sensors, const double *p, const double *readings, const double *commands,
-                   const double *voltage, double *innovations, double *spreads, double *states);
+                   const double *sensors, const double *p, const double *readings, const double *drives,
+                   double *innovations, double *spreads, double *states);
 
 /* Rows of filters of one record: innovations (rows, n, Y), their covariances (rows, n, Y, Y), corrected states. */
 void run_following(long rows, long n, double dt, const double *starts, const double *covariances, const double *nuisance,
                    const double *fade, const double *turn, const double *white, const double *added,
-                   const double *sensors, const double *p, const double *readings, const double *commands,
-                   const double *voltage, double *innovations, double *spreads, double *states) {
+                   const double *sensors, const double *p, const double *readings, const double *drives,
+                   double *innovations, double *spreads, double *states) {
   for (long r = 0; r < rows; ++r) {
     double s[S], cp[CP];
     vec covariance[S][SV];
@@ -236,7 +236,7 @@ void run_following(long rows, long n, double dt, const double *starts, const dou
       corrected(s, covariance, readings + t * Y, nuisance + r * Q, sensors + r * Y, innovations + at * Y,
                 spreads + at * Y * Y);
       memcpy(states + at * S, s, sizeof s);
-      predicted(s, covariance, commands + at * M, voltage[t], dt, fade + r * A, turn + r * K * K, white + r * 6,
+      predicted(s, covariance, drives + at * W, dt, fade + r * A, turn + r * K * K, white + r * 6,
                 added + r * L, p + r * P, cp);
     }
   }

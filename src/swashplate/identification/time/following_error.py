@@ -20,7 +20,7 @@ from swashplate.errors import IdentificationError
 from swashplate.filtering.block_matrices import diagonal
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import StochasticModel
-from swashplate.filtering.filter_code import Followed, Following, RecordSeries
+from swashplate.filtering.filter_code import Followed, Following, RecordSeries, driving_rows
 from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import steady_gain
@@ -172,7 +172,9 @@ class FollowingError(FilterError):
             numbers = FilterNumbers(*map(np.stack, zip(*(numbers for _, numbers in placed), strict=True)))
             begin = following_from(self.model, numbers, run.seen, spread)
             followed.append(
-                filter_code(self.model).follow(self.model.dt, begin, RecordSeries(readings, commands, run.voltage))
+                filter_code(self.model).follow(
+                    self.model.dt, begin, RecordSeries(readings, driving_rows(commands, run.voltage))
+                )
             )
         return followed
 

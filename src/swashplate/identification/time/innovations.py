@@ -12,7 +12,7 @@ from swashplate.arrays import IMAGINARY, Array
 from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel
-from swashplate.filtering.filter_code import RecordSeries
+from swashplate.filtering.filter_code import RecordSeries, driving_rows
 from swashplate.filtering.following import COMPLEX_ARRAYS
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
@@ -148,7 +148,7 @@ class RecordRun:
         return np.moveaxis(seen, 0, -1)
 
     def _series(self, commands: Array) -> RecordSeries:
-        return RecordSeries(self.readings, commands, self.voltage)
+        return RecordSeries(self.readings, driving_rows(commands, self.voltage))
 
     @property
     def _filter(self) -> RecordFilter:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import IMAGINARY, Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
-from swashplate.filtering.filter_code import Fixed, Pushed, RecordSeries
+from swashplate.filtering.filter_code import Along, Fixed, Pushed, RecordSeries
 from swashplate.filtering.filter_library import filter_code
 from swashplate.identification.time.beginning import (
     Begun,
@@ -90,10 +90,8 @@ class RecordFilter:
             self._given_moved(moves.begin.gain, numbers, to),
             numbers_moved(self.model.vehicle, to.parameters),
         )
-        late = moves.arriving, moves.commands
-        at = np.asarray(marks, dtype=np.intp)
-        here = self._fixed(begin, numbers), series, run.went
-        slopes, states = self._code.moved(self.model.dt, *here, directions, late, at)
+        along = Along(directions, moves.arriving, moves.commands, np.asarray(marks, dtype=np.intp))
+        slopes, states = self._code.moved(self.model.dt, self._fixed(begin, numbers), series, run.went, along)
         return slopes, self._state(states)
 
     def ahead_of(
@@ -152,12 +150,13 @@ class RecordFilter:
         d_told = numbers_moved(self.model.vehicle, moves.numbers.parameters)
         fade, d_fade = self._fading(numbers.noise, moves.numbers.noise)
         arriving, late, count = moves.arriving, moves.commands, len(d_told)
-        d_commands = np.zeros((count, len(starts), series.commands.shape[1]))
+        commands, voltage = series.driving[:, :-4], series.driving[:, -1]
+        d_commands = np.zeros((count, len(starts), commands.shape[1]))
         still, reached, moved = np.zeros((count, len(starts))), [], []
         for k in range(steps[-1]):
             here = starts + k
             d_commands[arriving : arriving + len(late)] = late[:, here]
-            pushed = _pushed(gust, drift, series.commands[here], series.voltage[here])
+            pushed = _pushed(gust, drift, commands[here], voltage[here])
             along = dx, _pushed(d_gust, d_drift, d_commands, still), d_told
             x, dx = self._code.step_moved(self.model.dt, x, pushed, told, along)
             d_gust, gust = fade * d_gust + d_fade[:, None] * gust, fade * gust

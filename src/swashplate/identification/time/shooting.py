@@ -15,7 +15,7 @@ from swashplate.arrays import Array
 from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, StochasticModel
-from swashplate.filtering.filter_code import RecordSeries
+from swashplate.filtering.filter_code import RecordSeries, driving_rows
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.beginning import (
@@ -143,7 +143,7 @@ class Shooting:
         numbers = FilterNumbers(parameters, self._noise, nuisance, reaching[window.first])
         begin = Begun(self._no_gain(), starting_row(model, numbers, window.seen) + own[:n])
         nothing = np.zeros((self._plan.length, model.n_outputs))
-        run = self._filter.along(begin, numbers, RecordSeries(nothing, reaching[here], window.voltage))
+        run = self._filter.along(begin, numbers, RecordSeries(nothing, driving_rows(reaching[here], window.voltage)))
         outputs = np.asarray(model.measure(run.states.x.T, Nuisance(*nuisance), _XP)).T
         return FlownWindow(numbers, reaching[here], late[here], begin, run, outputs)
 
@@ -166,7 +166,7 @@ class Shooting:
         )
         begins[k + m + d :] = np.diag(scale[k + m + d :])
         late = by_command * scale[k : k + m + d, None, None]
-        series = RecordSeries(flown.outputs, flown.commands, window.voltage)
+        series = RecordSeries(flown.outputs, driving_rows(flown.commands, window.voltage))
         moves = Moves(Begun(self._no_gain(count), begins), directions, k, late)
         slopes = -self._filter.moved(flown.begin, numbers, series, flown.run, moves)[0]
         heading = flown.run.states.x[:, model.vehicle.index("psi")]

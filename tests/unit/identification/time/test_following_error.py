@@ -16,7 +16,7 @@ from swashplate.compiled import can_compile
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
-from swashplate.filtering.filter_code import Followed, RecordSeries
+from swashplate.filtering.filter_code import Followed, RecordSeries, driving_rows
 from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.filter_virtual import VirtualFilter
 from swashplate.filtering.following import AWAY, SHARES, FollowingRows
@@ -60,14 +60,14 @@ def test_a_step_carries_the_covariance_by_the_slopes_of_the_equations() -> None:
     model, run = likelihood.model, likelihood._runs[0]
     n, d, k = np.cumsum([len(model.vehicle.state_names), model.n_gusts, N_DISTURBANCES])
     joined = int(k) + model.n_line
-    u, volts = run.inputs[100], float(run.voltage[100])
+    drives = driving_rows(run.inputs[100:101], run.voltage[100:101])[0]
     whole = np.concatenate([_beside().state.x[0], 0.3 * rng.standard_normal(joined - n)])
 
     def after(states: np.ndarray, P: np.ndarray) -> FollowingRows:
         beside = _beside(len(states))
         beside.state = FilterState(*np.split(states, [n, d, k], axis=1))
         beside.covariance = np.broadcast_to(P, (len(states), joined, joined))
-        beside.predicted(np.broadcast_to(u, (len(states), len(u))), volts)
+        beside.predicted(np.broadcast_to(drives, (len(states), len(drives))))
         return beside
 
     nothing, root, step = np.zeros((joined, joined)), 1e-6 * rng.standard_normal((joined, joined)), 1e-5
@@ -85,7 +85,7 @@ def test_a_calm_step_is_that_of_the_equations() -> None:
     run = likelihood._runs[0]
     beside.covariance = 0.0 * beside.covariance
     before = beside.state
-    beside.predicted(run.inputs[100][None], float(run.voltage[100]))
+    beside.predicted(driving_rows(run.inputs[100:101], run.voltage[100:101]))
     numbers = likelihood.numbers(likelihood.row.starts())[0].parameters
     told = numbers_and_constants(likelihood.table.vehicle, numbers)
     step = record_filter(likelihood.model).step
@@ -220,7 +220,7 @@ def test_in_c_it_is_the_same() -> None:
     given = likelihood.table.card_row, np.array(likelihood.noise)
     placed = [run.placed(*given, one * likelihood.row.scale) for one in (row, row + 0.01)]
     numbers = FilterNumbers(*map(np.stack, zip(*(each for _, each in placed), strict=True)))
-    series = RecordSeries(readings, np.stack([commands for commands, _ in placed], axis=1), run.voltage)
+    series = RecordSeries(readings, driving_rows(np.stack([u for u, _ in placed], axis=1), run.voltage))
     begin = following_from(likelihood.model, numbers, run.seen, likelihood._spread[0])
     codes = filter_code(likelihood.model), VirtualFilter(likelihood.model)
     assert [code.compiled_by for code in codes] == ["C", "NumPy"]
