@@ -20,7 +20,7 @@ from typing import Any
 
 from docs_running import Command, Fence, run_command, run_page
 from own_package import EXAMPLES
-from real_results import results_text, trusted_text
+from real_results import flights_claims_text, results_text, trusted_text
 
 from swashplate.atomic import write_bytes, write_text
 
@@ -194,6 +194,7 @@ GENERATED: Mapping[str, Callable[[], str]] = {
     "decisions": decisions_text,
     "results": results_text,
     "trusted": trusted_text,
+    "flights_claims": flights_claims_text,
     **{name: partial(package_text, name) for name in PACKAGES},
 }
 

@@ -54,6 +54,20 @@ def results_text() -> str:
     return "\n".join(rows)
 
 
+CLAIMS = {10: ("roll", "pitch", "horizontal"), 11: ("yaw", "heave")}
+"""Axes on which docs/papers/coax.md judges the paper's Figs 8 and 9."""
+
+
+def flights_claims_text() -> str:
+    """Whether the real flights bear out what the CoaX's paper says of its Figs 8 and 9, by the axes' verdicts."""
+    judged = [v for verdicts in directions(PAGE.read_text(encoding="utf-8")).values() for v in verdicts]
+    lines = []
+    for number, axes in CLAIMS.items():
+        good = [v.level in ("good", "usable") for v in judged if v.axis in axes]
+        lines.append(f"claim {number}: {'holds' if all(good) else 'holds in part' if any(good) else 'does not hold'}")
+    return "```text\n" + "\n".join(lines) + "\n```"
+
+
 def _numbers(verdict: AxisVerdict) -> str:
     match = _NUMBERS.match(verdict.words)
     if match is None:
