@@ -16,7 +16,11 @@ from pathlib import Path
 import pytest
 
 from swashplate import progress_lines
+from swashplate.control.controller_file import save_controller
+from swashplate.control.laws.autopilot import autopilot
 from swashplate.links.web import libraries
+from swashplate.models.catalogue import vehicle
+from swashplate.simulation.trim import trim
 
 SWASH = "import sys\nfrom swashplate.__main__ import main\nif __name__ == '__main__':\n    sys.exit(main())\n"
 """As pip writes `swash`: Python then puts the script's folder on its path, and not the one it works in."""
@@ -29,7 +33,7 @@ count = 2
 batch = 1
 vehicle = "coax"
 maneuver = "hover:0.2s"
-design = {rate = 100, gain = "steady"}
+controller = "place.toml"
 varies = {numbers = {mass = "5%"}}
 """
 
@@ -44,6 +48,13 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "swash").write_text(SWASH)
     return place
+
+
+def write_campaign(folder: Path) -> None:
+    """A campaign's file and the controller that it names."""
+    coax = vehicle("coax")
+    save_controller(autopilot(coax, trim(coax)), folder / "place.toml")
+    (folder / "c.toml").write_text(CAMPAIGN)
 
 
 def marks(folder: Path) -> list[str]:
@@ -76,7 +87,7 @@ def test_what_is_planted_is_run_where_python_looks_there(folder: Path) -> None:
 
 
 def test_reading_and_campaigns_import_nothing_from_the_folder(folder: Path) -> None:
-    (folder / "c.toml").write_text(CAMPAIGN)
+    write_campaign(folder)
     ran(folder, "simulate", "--vehicle", "coax", "--maneuver", "hover:1s", "-o", "a.nc")  # compiles
     assert "coax, simulated" in ran(folder, "inspect", "a.nc")  # the process of HDF5
     assert "2 of 2 tasks done" in ran(folder, "campaign", "run", "c.toml", "-o", "out", "--workers", "1")
