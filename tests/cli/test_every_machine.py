@@ -49,7 +49,7 @@ def test_identify(machine: tuple[dict[str, str], Path]) -> None:
 
 
 def test_control_gains(machine: tuple[dict[str, str], Path]) -> None:
-    assert "ATC_RAT_RLL_P" in swash(machine, "control", "gains", "coax", "--no-fly")
+    assert "ATC_RAT_RLL_P" in swash(machine, "control", "gains", "coax", "--settings", "fly=false")
 
 
 def test_export(machine: tuple[dict[str, str], Path]) -> None:

@@ -80,12 +80,8 @@ def test_without_a_compiler_the_fmu_has_its_sources_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
-<<<<<<< HEAD
-    outcome = swash("export", "coax", "--format", "fmu", "--out", tmp_path, "--set", "bar=false")
-=======
     monkeypatch.setattr(compiler, "ziglang", lambda: None)
-    outcome = swash("export", "coax", "--format", "fmu", "--out", tmp_path, "--option", "bar=false")
->>>>>>> 60b5b694 (Tests of processes, FMUs and decisions follow what left)
+    outcome = swash("export", "coax", "--format", "fmu", "--out", tmp_path, "--set", "bar=false")
     assert outcome.code == 0
     assert "no C compiler" in outcome.err or fmu.fmu_platform() is None
     assert (tmp_path / "coax.fmu").stat().st_size > 10_000

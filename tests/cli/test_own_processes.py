@@ -50,11 +50,11 @@ def folder(tmp_path: Path) -> Path:
     return place
 
 
-def write_campaign(folder: Path) -> None:
+def write_campaign(folder: Path, text: str = CAMPAIGN) -> None:
     """A campaign's file and the controller that it names."""
     coax = vehicle("coax")
     save_controller(autopilot(coax, trim(coax)), folder / "place.toml")
-    (folder / "c.toml").write_text(CAMPAIGN)
+    (folder / "c.toml").write_text(text)
 
 
 def marks(folder: Path) -> list[str]:
@@ -196,7 +196,7 @@ def doors(process: int) -> set[tuple[str, str]]:
 
 
 def test_a_campaign_opens_no_door(folder: Path) -> None:
-    (folder / "c.toml").write_text(CAMPAIGN.replace("count = 2", "count = 100").replace("0.2s", "2s"))
+    write_campaign(folder, CAMPAIGN.replace("count = 2", "count = 100").replace("0.2s", "2s"))
     process = subprocess.Popen(
         command(folder, "campaign", "run", "c.toml", "-o", "out", "--workers", "2"), cwd=folder,
         env=environment(**{progress_lines.SWITCH: "lines"}), stderr=subprocess.PIPE, text=True,

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swashplate.api.asking import OfVehicle, linear_model
+from swashplate.api.asking import OfVehicle, drawn, linear_model
 from swashplate.api.languages import Aircraft
 from swashplate.api.question import argument, option, setting
 from swashplate.api.saying import Say, silent
@@ -43,8 +43,8 @@ class ExportModel(OfVehicle["Exported"]):
         flag="--format",
         metavar="NAME",
         help="c: C99 step, rates, Jacobians. fmu: FMI 2.0 co-simulation. simulink: S-function. control: JSON for "
-        "python-control. matlab: .mat. ardupilot-statespace: JSON for SITL. "
-        "web: one HTML file in which the model flies, for any browser. Or another package's.",
+        "python-control. matlab: .mat. web: one HTML file in which the model flies, for any browser. Or another "
+        "package's.",
         kw_only=False,
     )
     out: Path = option(default=Path("."), metavar="DIR|FILE", help="Folder, made if missing; or one file's name.")
@@ -54,6 +54,11 @@ class ExportModel(OfVehicle["Exported"]):
     precision: str = option(default="double", help="Number type of C.", choices=("double", "float"))
     name: str | None = option(default=None, help="Prefix of files and C functions; by default the model's name.")
     delays: bool | None = setting(default=None, help="whether the model's identified input delays are included")
+    controller: Path | None = setting(default=None, help="with web: a controller's file, which flies the model")
+    posterior: Aircraft | None = setting(
+        default=None, metavar="FILE", help="with web: a fit.json of this model: models drawn from it fly beside it"
+    )
+    draws: int = setting(default=5, help="with posterior: how many", least=2, most=20)
 
     def answer(self, say: Say = silent) -> Exported:
         made = self.made()
@@ -91,6 +96,8 @@ class ExportModel(OfVehicle["Exported"]):
             trim=trim,
             precision=self._precision(),
             delays=self.delays,
+            controller=self.controller,
+            draws=() if self.posterior is None else drawn(exported, self.posterior, count=self.draws),
         )
 
     def _precision(self) -> Any:
