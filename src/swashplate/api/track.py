@@ -18,7 +18,6 @@ from swashplate.engine.c_text import Precision
 from swashplate.errors import ExportError, FlightError, IdentificationError
 from swashplate.export.formats import Export
 from swashplate.export.regression_c import RegressionCode, regression_code
-from swashplate.export.slow_parameters_c import SlowCode, slow_parameters_code
 from swashplate.filtering.sensor_suite import KINDS, suite
 from swashplate.flights.channel_names import with_names
 from swashplate.flights.flight import Flight
@@ -91,25 +90,19 @@ class Tracking(ReportFolder):
         write_text(folder / "track.json", as_json(self.to_document()))
 
     def code(self, *, precision: Precision = "double") -> Export:
-        """The estimators as C, a file pair each; `.save(folder)` writes it, its notes say what it costs.
+        """The equations' estimators as C, a file pair each; `.save(folder)` writes it, its notes say what it costs.
 
         Raises:
-            ExportError: for parameters of a vehicle in single precision.
-            MissingLibraryError: for those, where CasADi is not installed.
+            ExportError: for parameters of a vehicle, whose filter has no C.
         """
         texts: dict[str, str] = {}
         notes = []
         for plan in (one.plan for one in self.followed):
-            if isinstance(plan, RegressionPlan):
-                made = regression_code(plan, name=f"track_{plan.equation.left}", precision=precision)
-                texts |= made.files()
-                notes.append(_cost(made, 1.0 / plan.dt))
-                continue
-            if precision != "double":
-                raise ExportError("the filter of a vehicle's parameters is double.", channel="precision")
-            code = slow_parameters_code(plan, name="track_parameters")
-            texts[f"{code.name}.c"] = code.source
-            notes.append(_cost_of_filter(code, plan.observer.rate))
+            if not isinstance(plan, RegressionPlan):
+                raise ExportError("the filter of a vehicle's parameters has no C.", channel="--c")
+            made = regression_code(plan, name=f"track_{plan.equation.left}", precision=precision)
+            texts |= made.files()
+            notes.append(_cost(made, 1.0 / plan.dt))
         return Export({name: text.encode() for name, text in texts.items()}, tuple(notes))
 
     def __repr__(self) -> str:
@@ -158,14 +151,6 @@ def _cost(code: RegressionCode, rate: float) -> str:
         f"{code.name}: {code.memory_bytes + code.work_bytes} bytes of memory, {code.table_bytes} of tables; "
         f"{code.step_operations} operations a step, {code.estimate_operations} an estimate: about {share:.1f} % of "
         f"{_MEGAHERTZ:g} MHz at {rate:g} steps and {rate / every:g} estimates a second, if an operation takes 5 cycles."
-    )
-
-
-def _cost_of_filter(code: SlowCode, rate: float) -> str:
-    share = 100.0 * code.load(rate=rate, megahertz=_MEGAHERTZ)
-    return (
-        f"{code.name}: {code.memory_bytes + code.work_bytes} bytes of memory; {code.operations} operations a step: "
-        f"about {share:.0f} % of {_MEGAHERTZ:g} MHz at {rate:g} steps a second, if an operation takes 5 cycles."
     )
 
 

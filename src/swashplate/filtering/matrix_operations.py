@@ -1,7 +1,6 @@
 """The matrix operations of the observer as CasADi expressions: columns (n, 1) and matrices.
 
-`@`, `.T`, `*`, `+` and slices are CasADi's own; the rest is here, and the covariance's algebra, which C of an observer
-may replace by loops (`export.slow_parameters_c`).
+`@`, `.T`, `*`, `+` and slices are CasADi's own; the rest is here, and the covariance's algebra.
 """
 
 from __future__ import annotations

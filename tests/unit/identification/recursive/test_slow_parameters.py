@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.compiler import compiler, shared_library
 from swashplate.errors import FlightError, IdentificationError
 from swashplate.filtering.sensor_suite import suite
 from swashplate.flights.flight import Flight
@@ -106,36 +103,6 @@ def test_gaps_clocks_and_inputs_that_are_none_freeze_them() -> None:
     assert found.missing == 2  # both sensors
     assert found.estimate().values[0] == pytest.approx(before.values[0], rel=1e-6)
     assert found.estimate().sigmas[0] > before.sigmas[0]
-
-
-@pytest.mark.skipif(compiler() is None, reason="no C compiler")
-def test_their_c_is_their_python(tmp_path: Path) -> None:
-    pytest.importorskip("casadi", reason="the extra 'model' is not installed")
-    from swashplate.export.slow_parameters_c import slow_parameters_code
-
-    plan = slow_plan(sp.vehicle("coax"), ("mass",), sensors=SENSORS, rate=100.0, wander=0.02)
-    code = slow_parameters_code(plan)
-    size = "int size(void);\nint size(void) { return (int)sizeof(slow_memory_t); }\n"
-    (tmp_path / "slow.c").write_text(code.source + size)
-    options = ["-O0", "-pedantic", "-ffp-contract=off", "-Wno-unused-parameter", "-Wno-unused-function"]
-    library = ctypes.CDLL(str(shared_library([tmp_path / "slow.c"], tmp_path / "slow.so", options=options)))
-    assert library.size() == code.memory_bytes
-    assert "malloc" not in code.source
-    N, found, flight = len(plan.observer.names), SlowParameters(plan), falling(1.2)
-    memory = (ctypes.c_double * (N + N * N)).in_dll(library, "slow_memory")
-    library.slow_begin()
-    inputs = flight.array((*plan.observer.equations.vehicle.input_names, "voltage"))
-    for k, (u, y) in enumerate(zip(inputs, flight.array(CHANNELS), strict=True)):
-        u[0] = np.nan if k == 60 else u[0]
-        y[1] = np.nan if k == 40 else y[1]
-        elapsed = {80: 0.5, 120: -1.0, 140: float("nan")}.get(k, 0.01)
-        its = library.slow_step(ctypes.c_double(elapsed), (ctypes.c_double * 5)(*u), (ctypes.c_double * 9)(*y))
-        assert bool(its) == found.step(elapsed, u, y)
-    mean, P = np.array(memory[:N]), np.array(memory[N:]).reshape(N, N)
-    estimate = found.estimate()
-    assert mean[plan.places] == pytest.approx(estimate.values, rel=1e-12)
-    assert estimate.covariance is not None
-    assert P[plan.places, plan.places] == pytest.approx(estimate.covariance, rel=1e-12)
 
 
 def test_what_cannot_be_a_slow_parameter_is_refused() -> None:
