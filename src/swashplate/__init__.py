@@ -58,7 +58,6 @@ if TYPE_CHECKING:
     from swashplate.control.analysis.stability import loop_margins, loop_modes
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
-    from swashplate.control.laws.hover_trim import hover_trim
     from swashplate.control.laws.linear_decoupling import coupling, dynamic_decoupling, static_decoupling
     from swashplate.control.laws.state_hold import state_hold
     from swashplate.errors import SwashError
@@ -163,7 +162,6 @@ __all__ = [
     "handling_qualities",
     "harmonics",
     "hover_hold",
-    "hover_trim",
     "identify",
     "identify_and_validate",
     "in_form",

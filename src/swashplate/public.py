@@ -102,7 +102,6 @@ _VERBS: Mapping[str, str] = {
     "fit_time": "swashplate.api.fit_time:fit_time",
     "fly_maneuver": "swashplate.api.fly_maneuver:fly_maneuver",
     "hover_hold": "swashplate.control.laws.hold:hover_hold",
-    "hover_trim": "swashplate.control.laws.hover_trim:hover_trim",
     "identify": "swashplate.identification.identify:identify",
     "identify_and_validate": "swashplate.api.identification:identify_and_validate",
     "in_form": "swashplate.simulation.reduction:in_form",

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from swashplate.api.designed_maneuver import LEAD, DesignedManeuver
-from swashplate.api.maneuver_aims import aim_of
 from swashplate.api.saying import Say, silent
 from swashplate.api.told_by_maneuvers import DesignDraws, offer_of
 from swashplate.arrays import Array
@@ -34,8 +33,6 @@ _PEAK = 1.7
 """Peak over root mean square that phases of least peak are counted on to reach; what they reach is flown."""
 _VAGUE = 50.0
 """Percent of a value that a bound may have where a maneuver is called feasible."""
-_NOTHING = 0.9
-"""Share of what was not known before, above which a maneuver tells nothing of its aim."""
 _STEPS = (0.25, 0.5, 1.0, 2.0)
 
 
@@ -46,8 +43,7 @@ def design_maneuver(
     limits: Mapping[str, float] | None = None,
     band: tuple[float, float] = (0.3, 8.0),
     axes: Sequence[str] | None = None,
-    aim: str | None = None,
-    criterion: str | None = None,
+    criterion: str = "D",
     robust: str = "average",
     spread: float = 0.3,
     draws: int = 5,
@@ -70,11 +66,7 @@ def design_maneuver(
             (`DEFAULT_AMPLITUDE`). An amplitude above the largest of these enlarges all in proportion.
         band: lowest and highest frequency [Hz].
         axes: that may be moved; all that the vehicle has where None.
-        aim: what the flight is to make certain instead of the unknowns themselves: "q/pitch@0.5-3" (how a state
-            answers an axis or an input at a frequency or in a band [Hz]) or "margin" (the disc margin of all loops of
-            `controller`); see `maneuver_aims`.
-        criterion: "D" (least volume of the error ellipsoid) or "A" (least sum of squared relative errors); "D" where
-            None, and with an aim "A" of its numbers.
+        criterion: "D" (least volume of the error ellipsoid) or "A" (least sum of squared relative errors).
         robust: "average" over draws of the prior, or for the "worst" of them.
         spread: the unknowns are drawn within this share about the model's; 0 trusts the model.
         draws: how many, the model itself among them.
@@ -86,15 +78,12 @@ def design_maneuver(
         say: told what is being done.
 
     Raises:
-        ManeuverError: where nothing feasible tells all that is unknown, or the aim, with what stands in the way.
+        ManeuverError: where nothing feasible tells all that is unknown, with what stands in the way.
         IdentificationError: an unknown parameter, or a vehicle whose pose is not tracked.
     """
     unknown = tuple(dict.fromkeys(unknown))
     kept = _checked_limits(limits or {})
-    chosen = criterion or ("D" if aim is None else "A")
-    _checked(chosen, robust, spread, draws, band, rate)
-    if aim is not None and (chosen != "A" or not spread > 0.0):
-        raise ManeuverError("is for the criterion A, and for unknowns with a spread above zero.", channel="aim")
+    _checked(criterion, robust, spread, draws, band, rate)
     moved = _axes_of(vehicle, axes)
     seconds, (expected, source) = kept["seconds"], _expected_noise(vehicle, noise)
     if "battery" in kept and seconds + 2.0 * LEAD > kept["battery"]:
@@ -117,9 +106,8 @@ def design_maneuver(
     models = _draws(vehicle, unknown, spread, draws, seed)
     values = np.array([abs(vehicle.numbers[n].value) or 1.0 for n in unknown])
     known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
-    wanted = None if aim is None else aim_of(aim, models, unknown, controller or usual_hold)
     seen = [sensed(one, unknown) for one in models]
-    told = DesignDraws(models, seen, unknown, expected, rate, controller or usual_hold, wanted, values, known)
+    told = DesignDraws(models, seen, unknown, expected, rate, controller or usual_hold, values)
     say("probing the closed loop")
     numbers = np.concatenate(lines)
     owner = np.repeat(np.arange(len(moved)), [own.size for own in lines])
@@ -130,8 +118,7 @@ def design_maneuver(
     )
     allowed = np.array([(peak[axis] / _PEAK) ** 2 for axis in moved])
     say("choosing powers")
-    weights = None if wanted is None else np.einsum("dkp,dkq->dpq", wanted.slopes, wanted.slopes)
-    power = best_powers(per_power, owner, allowed, known, criterion=chosen, worst=robust == "worst", wanted=weights)
+    power = best_powers(per_power, owner, allowed, known, criterion=criterion, worst=robust == "worst")
     powers = {a: dict(zip(lines[i].tolist(), power[owner == i], strict=True)) for i, a in enumerate(moved)}
     design = composed(powers, duration=seconds, peak=peak)
     table = {axis: (lines[i] / seconds, [r[owner == i] for r in responses]) for i, axis in enumerate(moved)}
@@ -160,38 +147,24 @@ def design_maneuver(
     for share in _STEPS:
         total = [share * told.information(d, first.pieces, table) for d in range(len(models))]
         buys.append((share * first.seconds, told.bounds(total)))
-    before = {} if wanted is None else told.aimed([np.zeros_like(known)] * len(models))
-    units = {} if wanted is None else dict(zip(wanted.names, map(float, wanted.units), strict=True))
     made = DesignedManeuver(
         vehicle,
         unknown,
         tuple(offers),
         tuple(buys),
         kept,
-        chosen,
+        criterion,
         robust,
         len(models),
         spread,
         rate,
         noise=source,
-        aim=aim or "",
-        units=units,
-        before=before,
     )
     _refuse_vague(made, values)
     return made
 
 
 def _refuse_vague(made: DesignedManeuver, values: Array) -> None:
-    if made.aim:
-        if all(made.best.bounds[name] > _NOTHING * made.before[name] for name in made.before):
-            raise ManeuverError(
-                f"no maneuver within the limits tells more of it than a spread of {made.spread:g} does.",
-                where=made.vehicle.name,
-                channel=f"aim {made.aim}",
-                hint="Fly longer, within wider limits, or move other axes.",
-            )
-        return
     percent = {n: 100.0 * made.best.bounds[n] / v for n, v in zip(made.unknown, values, strict=True)}
     vague = {n: p for n, p in percent.items() if not p <= _VAGUE}
     if not vague:

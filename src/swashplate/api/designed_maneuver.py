@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ class Offer:
         kind: "multisine" (designed), "sweep" or "3211".
         pieces: maneuvers, flown one after the other.
         seconds: of excitation.
-        bounds: standard deviation of each unknown and of each number of the aim, in its unit, the worst of the draws.
+        bounds: standard deviation of each unknown, in its unit, the worst of the draws.
         peaks: largest attitude [deg], rate [deg/s] and distance [m] in the draws.
     """
 
@@ -62,8 +62,6 @@ class DesignedManeuver(Shown):
         limits: that were kept. criterion, robust, draws, spread: see `design_maneuver`.
         rate: of the series [Hz].
         noise: whose noise of air and sensors the bounds are for, in words.
-        aim: what it is for instead of the unknowns; "" for none.
-        units: of each number of the aim, what a relative error of one is. before: what is not known without a flight.
     """
 
     vehicle: Vehicle
@@ -77,9 +75,6 @@ class DesignedManeuver(Shown):
     spread: float
     rate: float
     noise: str = "usual indoors"
-    aim: str = ""
-    units: Mapping[str, float] = field(default_factory=dict)
-    before: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Offer:
@@ -87,8 +82,6 @@ class DesignedManeuver(Shown):
         values = [abs(self.vehicle.numbers[n].value) or 1.0 for n in self.unknown]
 
         def size(offer: Offer) -> float:
-            if self.units:
-                return float(sum((offer.bounds[name] / unit) ** 2 for name, unit in self.units.items()))
             relative = np.array([offer.bounds[n] for n in self.unknown]) / values
             return float(np.sum(np.log(relative)) if self.criterion == "D" else np.sum(relative**2))
 
@@ -96,13 +89,11 @@ class DesignedManeuver(Shown):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """What bounds are told of, with units: the unknowns in percent, or the aim's numbers."""
-        return tuple(self.units) or tuple(f"{name} %" for name in self.unknown)
+        """What bounds are told of: the unknowns in percent."""
+        return tuple(f"{name} %" for name in self.unknown)
 
     def cells(self, bounds: Mapping[str, float]) -> list[str]:
         """Bounds by `columns`."""
-        if self.units:
-            return [f"{bounds[name]:.3g}" for name in self.units]
         return [f"{100.0 * bounds[n] / (abs(self.vehicle.numbers[n].value) or np.nan):.3g}" for n in self.unknown]
 
     def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -117,8 +108,7 @@ class DesignedManeuver(Shown):
             )
             for o in self.offers
         ]
-        none = [("nothing", "0", *self.cells(self.before), "", "", "")] if self.before else []
-        return head, [*none, *rows]
+        return head, rows
 
     def seconds_rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Heading and cells: what each length of the designed maneuver buys."""
@@ -128,11 +118,10 @@ class DesignedManeuver(Shown):
     def card(self) -> str:
         """The flight card, to print: what to fly, in which order, when to stop."""
         best, limits = self.best, self.limits
-        names, unit = (tuple(self.units), "") if self.units else (self.unknown, " %")
-        bounds = [f"{name} {cell}{unit}" for name, cell in zip(names, self.cells(best.bounds), strict=True)]
+        bounds = [f"{name} {cell} %" for name, cell in zip(self.unknown, self.cells(best.bounds), strict=True)]
         lines = [
             f"FLIGHT CARD   {self.vehicle.card.title}",
-            f"To find      {self.aim or ', '.join(self.unknown)}",
+            f"To find      {', '.join(self.unknown)}",
             "",
             "Before",
             f"  [ ] log at {self.rate:g} Hz or faster: commands, pose, battery voltage"
@@ -201,8 +190,6 @@ class DesignedManeuver(Shown):
             ],
             "buys": [{"seconds": t, "bounds": dict(bounds)} for t, bounds in self.buys],
             "limits": dict(self.limits),
-            "aim": self.aim,
-            "before": dict(self.before),
             "criterion": self.criterion,
             "noise": self.noise,
             "robust": self.robust,
@@ -228,7 +215,7 @@ class DesignedManeuver(Shown):
         )
         return "\n".join(
             [
-                f"For {self.aim or ', '.join(self.unknown)} of {self.vehicle.name}: {self.best.kind} ({told}).",
+                f"For {', '.join(self.unknown)} of {self.vehicle.name}: {self.best.kind} ({told}).",
                 text_table(*self.rows()),
                 "",
                 "What each second buys: the same maneuver shorter or longer, bounds with the root of the seconds",

@@ -54,5 +54,5 @@ def maneuver_script(made: DesignedManeuver) -> str:
         turn = np.exp(-2j * np.pi * np.outer(numbers, np.arange(count)) / count)
         phasors = 2.0 / count * turn @ row
         lines[axis] = tuple((n, float(np.abs(v)), float(np.angle(v))) for n, v in zip(numbers, phasors, strict=True))
-    told = f"{made.vehicle.name}: {made.aim or ', '.join(made.unknown)}, {piece.duration:g} s"
+    told = f"{made.vehicle.name}: {', '.join(made.unknown)}, {piece.duration:g} s"
     return ardupilot_script(lines, duration=piece.duration, limits=made.limits, title=told)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.api.designed_maneuver import LEAD, Offer, sample_times
-from swashplate.api.maneuver_aims import ManeuverAim
 from swashplate.arrays import Array, Complex
 from swashplate.errors import ManeuverError, SwashError
 from swashplate.filtering.disturbances import Noise
@@ -37,9 +36,7 @@ class DesignDraws:
     noise: Noise
     rate: float
     controller: Callable[[Vehicle, Trim], Controller]
-    wanted: ManeuverAim | None
     values: Array
-    known: Array
 
     @property
     def scale(self) -> Array:
@@ -47,19 +44,9 @@ class DesignDraws:
         return np.outer(*[np.append(self.values, DELAY_SIGMA)] * 2)
 
     def bounds(self, information: Sequence[Array]) -> dict[str, float]:
-        """Standard deviations of the unknowns and of the aim's numbers, the worst of the draws."""
+        """Standard deviations of the unknowns, the worst of the draws."""
         worst = np.max([bounds_from(one) for one in information], axis=0)
-        return dict(zip(self.unknown, map(float, worst), strict=True)) | self.aimed(information)
-
-    def aimed(self, information: Sequence[Array]) -> dict[str, float]:
-        """Standard deviations of the aim's numbers in their units, with what is known before."""
-        if self.wanted is None:
-            return {}
-        every = []
-        for slopes, one in zip(self.wanted.slopes, information, strict=True):
-            covariance = np.linalg.inv(self.known + self.scale * one)[:-1, :-1]
-            every.append(self.wanted.units * np.sqrt(np.einsum("kp,pq,kq->k", slopes, covariance, slopes)))
-        return dict(zip(self.wanted.names, map(float, np.max(every, axis=0)), strict=True))
+        return dict(zip(self.unknown, map(float, worst), strict=True))
 
     def lines(self, draw: int, frequency: Array, inputs: Complex) -> Array:
         return line_information(self.sensed[draw], frequency, inputs, self.noise, rate=self.rate)

@@ -139,8 +139,6 @@ def test_its_files_are_the_series_and_the_card(tmp_path: Path) -> None:
         (UNKNOWN, {"axes": ("roll", "loop")}, "loop: is no axis of 'coax'"),
         (UNKNOWN, {"criterion": "E"}, "is 'E', expected D or A"),
         (UNKNOWN, {"band": (8.0, 0.5)}, "expected it to rise"),
-        (UNKNOWN, {"aim": "q/pitch@2", "criterion": "D"}, "aim: is for the criterion A"),
-        (UNKNOWN, {"aim": "q/pitch@2", "spread": 0.0}, "aim: is for the criterion A, and for unknowns with a spread"),
     ],
 )
 def test_what_makes_no_sense_is_refused(unknown: Any, asked: dict[str, Any], words: str) -> None:
@@ -183,20 +181,3 @@ def test_a_composed_multisine_has_its_lines_its_peak_and_no_jump() -> None:
     np.testing.assert_allclose(made.scaled(0.5).signals(time)["roll"], 0.5 * signal, atol=1e-15)
     one = composed({"yaw": {4: 1.0}}, duration=2.0, peak={"yaw": 0.1}).signals(time[:2000])["yaw"]
     assert np.abs(one).max() == pytest.approx(0.1, rel=1e-3)
-
-
-def test_a_design_for_a_response_makes_it_surer_than_one_for_the_parameters() -> None:
-    asked: dict[str, Any] = {"limits": LIMITS, "axes": ("roll", "pitch"), "band": (0.5, 8.0), "draws": 1}
-    made = sp.design_maneuver(sp.vehicle("coax"), UNKNOWN, aim="q/pitch@1.5", **asked)
-    gain, phase = made.units
-    assert (gain, phase) == ("q/pitch 1.5 Hz dB", "q/pitch 1.5 Hz deg")
-    (multisine, *rivals) = made.offers
-    assert made.best is multisine
-    for name in made.units:
-        assert multisine.bounds[name] < made.before[name]
-        assert all(multisine.bounds[name] < rival.bounds[name] for rival in rivals)
-    # The unknowns themselves are known less well than by the design for them.
-    volume = [np.prod([one.bounds[name] for name in UNKNOWN]) for one in (multisine, designed().best)]
-    assert volume[0] > volume[1]
-    assert "q/pitch@1.5" in repr(made)
-    assert made.to_document()["aim"] == "q/pitch@1.5"

@@ -79,7 +79,6 @@ WITHOUT = {
     "Decoupling": "a law; `decouple_axes` shows what it is worth",
     "Export": "files",
     "Hold": "a law; `check_controller` shows what it is worth",
-    "HoverTrim": "a law; `check_controller` shows what it is worth",
     "Line": "one line of words",
     "Linked": "counts in words",
     "Maneuver": "words; `plan_maneuver` shows it",

@@ -84,15 +84,8 @@ class DesignManeuver(VerbQuestion["DesignedManeuver"]):
     )
     band: Band = option(default=(0.3, 8.0), help="Frequencies [Hz].")
     axes: Names | None = option(default=None, help="Of roll, pitch, yaw, heave, by commas; all that the vehicle has.")
-    aim: str | None = option(
-        default=None,
-        help="Determine this instead of the parameters themselves: q/pitch@0.5-3 (response of a state to an axis, in "
-        "Hz), or margin (disc margin of --controller).",
-    )
     controller: Path | None = option(default=None, help="Controller that flies (.toml); else a hold of hover.")
-    criterion: str | None = setting(
-        default=None, help="D (minimum volume of the errors, default) or A (minimum sum of squares)"
-    )
+    criterion: str = setting(default="D", help="D (minimum volume of the errors) or A (minimum sum of squares)")
     robust: str = setting(
         default="average", help="optimise for the average over draws of the prior, or for the worst of them"
     )
@@ -114,7 +107,6 @@ class DesignManeuver(VerbQuestion["DesignedManeuver"]):
             limits=dict(self.limits or {}),
             band=self.band,
             axes=None if self.axes is None else strings(self.axes),
-            aim=self.aim,
             controller=flies,
             criterion=self.criterion,
             robust=self.robust,

@@ -22,7 +22,6 @@ def best_powers(
     *,
     criterion: str,
     worst: bool,
-    wanted: Array | None = None,
 ) -> Array:
     """Mean squares of the lines, (lines,).
 
@@ -32,7 +31,6 @@ def best_powers(
         known: information beforehand (q, q), scaled.
         criterion: "D" (least volume) or "A" (least sum of variances) of all but the last number, which is a nuisance.
         worst: True for the best in the worst draw, False on average.
-        wanted: for "A", weights of the covariance in each draw (draws, q - 1, q - 1); the sum of variances where None.
     """
     axes = len(allowed)
     count = np.bincount(owner, minlength=axes)
@@ -40,15 +38,14 @@ def best_powers(
     weights = np.full(len(information), 1.0 / len(information))
     for _ in range(ROUNDS):
         gains, values = [], []
-        for draw, lines in enumerate(information):
+        for lines in information:
             total = known + np.einsum("l,lij->ij", power, lines)
             inverse = np.linalg.pinv(total, hermitian=True)
             kept = inverse[:-1, :-1]
             # By the inverse's block: the parameters alone, the nuisance marginalised.
             if criterion == "A":
-                weight = np.eye(len(kept)) if wanted is None else wanted[draw]
-                total_variance = np.trace(weight @ kept)
-                middle = inverse[:, :-1] @ weight @ inverse[:-1, :] / total_variance
+                total_variance = np.trace(kept)
+                middle = inverse[:, :-1] @ inverse[:-1, :] / total_variance
                 values.append(-np.log(total_variance))
             else:
                 middle = inverse[:, :-1] @ np.linalg.pinv(kept, hermitian=True) @ inverse[:-1, :]

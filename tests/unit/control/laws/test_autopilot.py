@@ -17,8 +17,7 @@ from swashplate.control.laws.height_yaw import (
     motors_for,
     thrust_and_torque,
 )
-from swashplate.control.laws.hover_trim import hover_trim
-from swashplate.errors import ControllerError, FlightError, SwashError
+from swashplate.errors import ControllerError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
@@ -162,28 +161,6 @@ def test_place_heading_height_and_speed_are_held(coax: Vehicle, hover: Trim) -> 
     flight = simulate_closed_loop(coax, fast, duration=30.0, reference={"ahead": 1.0, "right": -0.5}, rate=RATE)
     np.testing.assert_allclose(flight.between(25.0, 30.0).values("u"), 1.0, atol=0.02)
     np.testing.assert_allclose(flight.between(25.0, 30.0).values("v"), -0.5, atol=0.02)
-
-
-def test_the_machine_finds_the_trim_of_a_bent_swashplate(coax: Vehicle, hover: Trim) -> None:
-    """Servos off by an amount that no card knows, and 20 g of payload: the hover tells both."""
-    loaded = coax.with_values({"mass": 0.322})
-    bent = {"servo_roll": 0.08, "servo_pitch": -0.05}
-    controller = autopilot(coax, hover)
-    flown = simulate_closed_loop(loaded, controller, duration=30.0, excitation=bent, rate=RATE)
-    # A flight's inputs are what the servos got; the commands as sent are without the bend.
-    data = flown
-    for name, offset in bent.items():
-        data = data.with_channel(name, data.values(name) - offset, like=name)
-    found = hover_trim(coax, data)
-    assert found.commands["servo_roll"] == pytest.approx(-0.08, abs=1e-4)
-    assert found.commands["servo_pitch"] == pytest.approx(0.05, abs=1e-4)
-    assert found.mass == pytest.approx(0.322, abs=1e-4)
-    assert found.lag == pytest.approx(0.001282 * trim(loaded).states()["omega_lower"] - 0.0094, abs=1e-4)
-    again = simulate_closed_loop(loaded, found.applied(controller), duration=5.0, excitation=bent, rate=RATE)
-    assert np.max(np.abs(again.values("y"))) < 0.01  # untrimmed it drifts by 0.3 m first
-    moving = simulate_closed_loop(coax, controller, duration=1.0, reference={"x": 5.0}, rate=RATE)
-    with pytest.raises(FlightError, match=r"u: is .* m/s in the last 1 s"):
-        hover_trim(coax, moving, window=1.0)
 
 
 def test_a_soft_start_raises_the_motors_slowly_and_winds_nothing_up(coax: Vehicle, hover: Trim) -> None:
