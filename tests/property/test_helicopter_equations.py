@@ -33,7 +33,7 @@ EVERYTHING = {
 }
 FORMS = [
     {},
-    {"inflow": "pitt-peters-static", "phase_lag": True, "in_plane": "thrust-tilt"},
+    {"inflow": "pitt-peters", "phase_lag": True, "in_plane": "thrust-tilt"},
     {"inflow": "uniform", "rotor_speed": "governed", "yaw_at_blades": True, "precession_torque": True},
     EVERYTHING,
 ]

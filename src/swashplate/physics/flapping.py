@@ -105,8 +105,6 @@ def plane_rates(
     *,
     wake_distortion: Scalar,
     phase_lag: tuple[Scalar, Scalar] | None,
-    deficiency: tuple[Scalar, Scalar, Scalar] | None,
-    slopes: tuple[Scalar, Scalar, Scalar, Scalar] | None = None,
 ) -> tuple[Scalar, Scalar]:
     """(p, q): rates of the tip-path plane in space over the rotor speed.
 
@@ -124,9 +122,6 @@ def plane_rates(
         wake_distortion: K_R; the wake bends with the disc's turning and puts K_R (q cos + p sin) onto the inflow
             (Keller 1996; Arnold, Keller, Curtiss and Reichert 1998), as far as it keeps up (`wake_follows`).
         phase_lag: (cos, sin) of the angle by which the air's moments come late (Mansur and Tischler 1998), or None.
-        deficiency: matrix (cc, cs, ss) on the aerodynamic moments by a static inflow gradient, or None.
-        slopes: of the moments' cosine part by q and p, and of the sine part, where they are not a straight lift line's
-            1/4, 0, 0, 1/4; without `deficiency`.
     """
     m, inertia = held.damping - wake_distortion, 16.0 / held.lock
     stiffness = 8.0 * held.excess / held.lock
@@ -135,12 +130,6 @@ def plane_rates(
     c = 4.0 * moments.cos + (1.0 - held.damping) * q_shaft
     s = 4.0 * moments.sin + (1.0 - held.damping) * p_shaft
     w_cq, w_cp, w_sq, w_sp = m, 0.0, 0.0, m
-    if slopes is not None:
-        w_cq, w_cp, w_sq, w_sp = (4.0 * m * slope for slope in slopes)
-    if deficiency is not None:
-        cc, cs, ss = deficiency
-        c, s = cc * c + cs * s, cs * c + ss * s
-        w_cq, w_cp, w_sq, w_sp = cc * m, cs * m, cs * m, ss * m
     if phase_lag is not None:
         cosine, sine = phase_lag
         c, s = cosine * c - sine * s, sine * c + cosine * s

@@ -74,36 +74,7 @@ def glauert_gradient(lam0: Scalar, skew: tuple[Scalar, Scalar]) -> Inflow:
     return Inflow(lam0, lam0 * skew[0], -lam0 * skew[1])
 
 
-def _gradient_gain(skew: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar, Scalar]:
-    """Pitt and Peters' 2 (1 -+ X^2) along and across the flight, as a matrix (cc, cs, ss) in shaft axes."""
-    c, s = skew[0], -skew[1]
-    return 2.0 * (1.0 - c * c + s * s), -4.0 * c * s, 2.0 * (1.0 + c * c - s * s)
-
-
 _COUPLING = 15.0 * math.pi / 64.0
-
-
-def pitt_peters_static(
-    lam0: Scalar, CT: Scalar, skew: tuple[Scalar, Scalar], flow: Scalar, solidity: Scalar, lift_slope: Scalar
-) -> tuple[Inflow, tuple[Scalar, Scalar, Scalar]]:
-    """Gradient by the thrust, and the matrix with which the gradient by the disc's own moments weakens these.
-
-    Steady Pitt and Peters (1981) about a given mean inflow. A moment 4 M_c of the blades makes a gradient that takes
-    part of it back: M = (1 + (a sigma / 16 V) G)^-1 M0, in hover the known reduced Lock number gamma / (1 + a sigma /
-    (16 lam0)).
-
-    Returns:
-        The inflow without the moments' part, and (cc, cs, ss) for `flapping.plane_rates`.
-    """
-    cc, cs, ss = _gradient_gain(skew)
-    k = lift_slope * solidity / (16.0 * flow)
-    cc, cs, ss = 1.0 + k * cc, k * cs, 1.0 + k * ss
-    determinant = cc * ss - cs * cs
-    by_thrust = _COUPLING * CT / flow
-    return (
-        Inflow(lam0, by_thrust * skew[0], -by_thrust * skew[1]),
-        (ss / determinant, -cs / determinant, cc / determinant),
-    )
 
 
 def gradient_flow(lam0: Scalar, mu_z: Scalar, mu2: Scalar, v: Scalar) -> Scalar:

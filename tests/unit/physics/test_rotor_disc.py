@@ -67,7 +67,7 @@ def steady(d: Disc, **kept: object) -> Disc:
 
     def rates(a1: float, b1: float) -> np.ndarray:
         there = d._replace(a1=a1, b1=b1, p=0.0, q=0.0)
-        arguments = {"wake_distortion": 0.0, "phase_lag": None, "deficiency": None, **kept}
+        arguments = {"wake_distortion": 0.0, "phase_lag": None, **kept}
         return np.array(flapping.plane_rates(Flapping(a1, b1), blade_element.flap_moments(there), HINGE, **arguments))
 
     at_rest = rates(0.0, 0.0)
@@ -136,7 +136,7 @@ def test_quasi_steady_flapping_is_the_textbooks() -> None:
     a1 = (8 / 3 * mu * 0.12 + 2 * mu * -0.05 + 2 * mu * (-0.01 - 0.03) - (1 + 1.5 * mu**2) * 0.03) / (1 - mu**2 / 2)
     b1 = (4 / 3 * mu * a0 + lag + (1 + mu**2 / 2) * 0.02) / (1 + mu**2 / 2)
     moments = blade_element.flap_moments(d._replace(a1=a1, b1=b1))
-    rates = flapping.plane_rates(Flapping(a1, b1), moments, free, wake_distortion=0.0, phase_lag=None, deficiency=None)
+    rates = flapping.plane_rates(Flapping(a1, b1), moments, free, wake_distortion=0.0, phase_lag=None)
     np.testing.assert_allclose(rates, 0.0, atol=1e-15)
 
 
@@ -149,7 +149,7 @@ def test_off_axis_flapping_reverses_at_a_wake_distortion_of_one() -> None:
         a1 = -16.0 / free.lock * q
         d = Disc(*(0.0,) * 3, 0.03, *(0.0,) * 4, 0.1, *(0.0,) * 4, a1, b1)
         p_plane, q_plane = flapping.plane_rates(
-            Flapping(a1, b1), blade_element.flap_moments(d), free, wake_distortion=k_r, phase_lag=None, deficiency=None
+            Flapping(a1, b1), blade_element.flap_moments(d), free, wake_distortion=k_r, phase_lag=None
         )
         assert (p_plane, q_plane) == pytest.approx((0.0, q), abs=1e-15)
 
@@ -210,7 +210,7 @@ def test_flapping_about_an_offset_hinge_balances_every_element(e: float, heavier
 
     def rates(a1: float, b1: float) -> np.ndarray:
         d = Disc(*(0.0,) * 11, B1, 0.0, held.damping * a1, held.damping * b1)
-        given = {"wake_distortion": 0.0, "phase_lag": None, "deficiency": None}
+        given = {"wake_distortion": 0.0, "phase_lag": None}
         return np.array(flapping.plane_rates(Flapping(a1, b1), blade_element.flap_moments(d), held, shaft, **given))
 
     at_rest = rates(0.0, 0.0)
@@ -231,7 +231,7 @@ def test_stiff_blades_move_their_disc_in_the_regressing_mode(frequency: float) -
 
         def rates(a1: float, b1: float) -> np.ndarray:
             moments = blade_element.flap_moments(level._replace(a1=a1, b1=b1))
-            given = {"wake_distortion": 0.0, "phase_lag": None, "deficiency": None}
+            given = {"wake_distortion": 0.0, "phase_lag": None}
             p, q = flapping.plane_rates(Flapping(a1, b1), moments, own, shaft, **given)
             return np.array([q - shaft[1], p - shaft[0]])  # of a1 and b1 against the shaft
 
@@ -263,7 +263,7 @@ def test_an_aerodynamic_phase_lag_is_a_wake_distortion() -> None:
 
         def rates(a1: float, b1: float) -> np.ndarray:
             d = Disc(*(0.0,) * 3, 0.03, *(0.0,) * 4, 0.1, *(0.0,) * 4, a1, b1)
-            given = {"wake_distortion": 0.0, "phase_lag": None, "deficiency": None, **arguments}
+            given = {"wake_distortion": 0.0, "phase_lag": None, **arguments}
             return np.array(flapping.plane_rates(Flapping(a1, b1), blade_element.flap_moments(d), free, **given))
 
         at_rest = rates(0.0, 0.0)
@@ -272,16 +272,6 @@ def test_an_aerodynamic_phase_lag_is_a_wake_distortion() -> None:
 
     lagging, bending = held_disc(phase_lag=(math.cos(lag), math.sin(lag))), held_disc(wake_distortion=k_r)
     assert lagging == pytest.approx(bending, rel=0.02)
-
-
-def test_static_pitt_peters_in_hover_is_the_reduced_lock_number() -> None:
-    """Flap damping falls by 1 + a sigma / (16 lam0) (Johnson 1980; Padfield 2007, eq. 3.145)."""
-    lam0 = 0.03
-    v, _, _ = inflow.mass_flow(lam0, 0.0, 0.0, XP)
-    flow = inflow.gradient_flow(lam0, 0.0, 0.0, v)
-    _, (cc, cs, ss) = inflow.pitt_peters_static(lam0, 2 * lam0 * v, (0.0, 0.0), flow, SOLIDITY, SLOPE)
-    reduced = 1.0 / (1.0 + SLOPE * SOLIDITY / (16.0 * lam0))
-    assert (cc, cs, ss) == pytest.approx((reduced, 0.0, reduced), rel=1e-9)
 
 
 def test_dynamic_inflow_settles_at_momentum_theory_and_the_static_gradient() -> None:
@@ -314,7 +304,7 @@ def test_regressing_flap_mode_against_the_second_order_equation() -> None:
     def rates(a1: float, b1: float) -> np.ndarray:
         d = Disc(*(0.0,) * 3, 0.03, *(0.0,) * 4, 0.1, *(0.0,) * 4, a1, b1)
         p, q = flapping.plane_rates(
-            Flapping(a1, b1), blade_element.flap_moments(d), held, wake_distortion=0.0, phase_lag=None, deficiency=None
+            Flapping(a1, b1), blade_element.flap_moments(d), held, wake_distortion=0.0, phase_lag=None
         )
         return np.array([q, p])
 

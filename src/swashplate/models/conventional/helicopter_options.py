@@ -14,7 +14,7 @@ class HelicopterOptions(NamedTuple):
 
     Attributes:
         rotation: "ccw" or "cw", the main rotor's sense seen from above.
-        inflow: "glauert" (momentum theory and Glauert's gradient), "uniform" (no gradient), "pitt-peters-static", or
+        inflow: "glauert" (momentum theory and Glauert's gradient), "uniform" (no gradient), or
             "pitt-peters" (three inflow states).
         coning: blades cone by themselves; False holds them at the precone (teetering hubs).
         bar: Bell-Hiller stabilizer bar.
@@ -82,7 +82,7 @@ class HelicopterOptions(NamedTuple):
 
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "rotation": ("ccw", "cw"),
-    "inflow": ("glauert", "uniform", "pitt-peters-static", "pitt-peters"),
+    "inflow": ("glauert", "uniform", "pitt-peters"),
     "rotor_speed": ("fixed", "governed", "throttle"),
     "in_plane": ("blade-element", "thrust-tilt"),
     "ground_effect": GROUND_EFFECTS,

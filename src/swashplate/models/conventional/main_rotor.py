@@ -103,8 +103,7 @@ def main_rotor(
         flaps = par.rotor_delta3
         seen = seen._replace(A1=A1 + flaps * own.a1, B1=B1 + flaps * own.b1)
 
-    # Inflow: mean, gradient, and what a static gradient takes from the flap moments.
-    deficiency = None
+    # Inflow: mean and gradient.
     if induced is None:
         free = blade_element.thrust_coefficient(seen, solidity, slope, blade)
         loss = 0.5 * slope * solidity * blade.m1
@@ -124,10 +123,6 @@ def main_rotor(
     gradient_through = inflow.gradient_flow(flow.lam0, mu_z, mu2, through)
     if options.inflow == "glauert":
         flow = inflow.glauert_gradient(flow.lam0, skew)
-    elif options.inflow == "pitt-peters-static":
-        flow, deficiency = inflow.pitt_peters_static(
-            flow.lam0, 2.0 * flow.lam0 * through, skew, gradient_through, solidity, flap_slope
-        )
     momentum = flow
     if options.ground_effect != "none":
         near = _near_ground(height, mu2, flow.lam0, par, options, xp)
@@ -149,18 +144,11 @@ def main_rotor(
         (p / omega, q / omega),
         wake_distortion=kept,
         phase_lag=lag,
-        deficiency=deficiency,
     )
     disc_rates = Flapping(omega * plane_q - q, sense * (omega * plane_p - p))
 
     # Loads with everything that the blades now see.
     lam_c, lam_s = flow.lam_c + kept * plane_q, flow.lam_s + kept * plane_p
-    if deficiency is not None:
-        cc, cs, ss = deficiency
-        turned = held.damping - kept
-        c = 4.0 * still.cos + turned * plane_q + (1.0 - held.damping) * q / omega
-        s = 4.0 * still.sin + turned * plane_p + (1.0 - held.damping) * p / omega
-        lam_c, lam_s = lam_c + c - (cc * c + cs * s), lam_s + s - (cs * c + ss * s)
     moving = seen._replace(p=plane_p, q=plane_q, lam_c=lam_c, lam_s=lam_s)
     inflow_rates = None
     CT = blade_element.thrust_coefficient(moving, solidity, slope, blade)
