@@ -99,7 +99,7 @@ class DesignedManeuver(Shown):
     def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Heading and cells: what each way to fly would tell, bounds in percent."""
         head = ("fly", "seconds", *self.columns, "attitude deg", "rate deg/s", "place m")
-        rows = [
+        rows: list[tuple[str, ...]] = [
             (
                 o.kind,
                 f"{o.seconds:g}",
