@@ -191,8 +191,7 @@ def test_a_strangers_table_is_mapped_in_a_dialog(browser: Any, address: str, tmp
     assert visit.page.locator(f"{row} polyline").get_attribute("points") != before, "the curve turns with its sign"
     visit.page.click("#map-apply")
     visit.until("!document.getElementById('columns').open")
-    drawn(visit)
-    assert visit.of("swash.state.ready()[0].groups.map((g) => g.title)") == ["Rates", "Commands"]
+    visit.until("swash.state.ready()[0].groups.map((g) => g.title).join() === 'Rates,Commands'")
     visit.drop(tmp_path / "flug.csv")
     drawn(visit, logs=2)
     assert not visit.of("document.getElementById('columns').open"), "the next one opens by itself"
