@@ -47,7 +47,7 @@ CUTS = {
     "helicopter_sweeps.bin": Cut(
         "raptor50_three_sweeps.BIN", 178.0, 271.0, {"RATE": ALL, "SIDD": ALL, "ANG": 20.0}
     ),
-    "coax_flight.bin": Cut("coax_roll_yaw_sweeps.BIN", 67.5, 112.0, {"RATE": 60.0, "SIDD": 60.0}),
+    "coax_flight.bin": Cut("coax_roll_yaw_sweeps.BIN", 117.4, 161.0, {"RATE": 60.0, "SIDD": 60.0}),
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from swashplate.flights.example_logs import EXAMPLES, FOLDER, example
 SWEEPS = {
     "helicopter_sweeps.bin": ["roll mixer", "pitch mixer"],
     "ordinary_flight.bin": [],
-    "coax_flight.bin": ["roll mixer"],
+    "coax_flight.bin": ["yaw mixer"],
 }
 
 
