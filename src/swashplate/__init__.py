@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from swashplate.flights.maneuvers.planned import plan_maneuver
     from swashplate.flights.maneuvers.series import parse as maneuver
     from swashplate.flights.readers.read import read
+    from swashplate.flights.review.review import review
     from swashplate.flights.rotor_speed import rotor_speed
     from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
     from swashplate.identification.core.result import Result
@@ -198,6 +199,7 @@ __all__ = [
     "residuals",
     "respond",
     "resume_campaign",
+    "review",
     "rotor_speed",
     "show_replay",
     "show_structure",

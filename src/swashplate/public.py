@@ -67,6 +67,7 @@ _VERBS: Mapping[str, str] = {
     "respond": "swashplate.identification.responses.respond:respond",
     "spectrogram": "swashplate.flights.spectrum:spectrogram",
     "spectrum": "swashplate.flights.spectrum:spectrum",
+    "review": "swashplate.flights.review.review:review",
     "rotor_speed": "swashplate.flights.rotor_speed:rotor_speed",
     "stepwise": "swashplate.identification.time.equation_error:stepwise",
     "show_structure": "swashplate.api.structures:show_structure",

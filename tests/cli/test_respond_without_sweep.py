@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from commands import swash
@@ -18,6 +19,15 @@ def test_it_is_said_with_what_to_fly_and_kept_with_the_responses(shared_data: Pa
     assert outcome.code == 2
     assert "'mixer_roll' is a controller's answer: the log holds the set-points of its loop" in outcome.err
     assert "Fly a sweep, or move the sticks and name the set-point with --references." in outcome.err
+    assert "What loiter.bin tells without a sweep" in outcome.out
+    assert "no step response: the motion comes before its target" in outcome.out
+    assert "SID_AXIS 10" in outcome.out
+    unnamed = swash("respond", log)
+    assert unnamed.code == 2
+    assert "No sweep was found" in unnamed.err
+    assert "`swash inspect` tells what the flight shows without one" in unnamed.err
+    looked = swash("inspect", log, "--json")
+    assert json.loads(looked.out)["review"]["next"][0]["parameters"]["SID_AXIS"] == 10.0
     kept = sp.FrequencyResponse.load(tmp_path / "out" / "responses.nc").settings["excitation"]
     assert kept["mixer_roll"]["kind"] == "controller"
     assert "neither a sweep nor a stick nor a set-point" in kept["mixer_roll"]["words"]

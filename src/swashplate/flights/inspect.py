@@ -7,10 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from numpy.typing import NDArray
 
-from swashplate.arrays import Array
 from swashplate.flights.consistency import consistency
 from swashplate.flights.epoch import note
 from swashplate.flights.flight import Flight
@@ -18,6 +15,7 @@ from swashplate.flights.input_signs import input_signs, sign_problem, sign_words
 from swashplate.flights.jumps import OUTLIER, attitudes, jumps
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
 from swashplate.flights.schema import channel, is_known
+from swashplate.flights.time_base import StreamSummary, time_base
 from swashplate.shown import Shown
 from swashplate.text_table import TextTable, screen_width
 
@@ -25,42 +23,11 @@ if TYPE_CHECKING:
     from rich.console import Group
 
 _LARGEST = 1e30  # in the channel's unit: no sensor reaches it, and its square is still a number
-_GAP = 3.0  # usual steps; a step longer than this has lost at least two samples
-_TURN = 31  # steps whose median is the usual one there: half as many slow ones in a row are another rate, no gaps
-_JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
-_ALIKE, _SEVERAL = 0.2, 4  # long steps in a row that differ by less of themselves: another rate, and no gaps
-_SWITCHING = 0.5  # s between a change of mode and the message that this mode alone writes
-_MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
 _COMMANDS = {"motor_lower": (0, 1), "motor_upper": (0, 1), "servo_roll": (-1, 1), "servo_pitch": (-1, 1)}
 """Ranges of commands."""
 _STILL = ("rcin_", "rcout_", "omega_", "pid_", "sid_", "voltage", "current", "airspeed", "wind_")
 """Channels that may stand still all flight: switches and unused outputs, governed rotors, terms of gains that are zero,
 sensors that are not there. Set-points may too."""
-
-
-@dataclass(frozen=True)
-class StreamSummary:
-    """Time base of a stream.
-
-    Attributes:
-        rate: sample rate [Hz] from the median step; NaN for a single sample.
-        jitter: scatter of the steps that are no gaps: 1.4826 times the median absolute deviation [s].
-        gaps: steps longer than three usual ones there; longest_gap: the longest of them [s] (0 where there is none).
-        rates: the slowest and the fastest usual rate [Hz]: autopilots log some messages slowly outside tests. Both are
-            `rate` where no step is three times another one.
-        pause: the longest step from one change of mode to another [s], 0 for none: some modes alone write the stream.
-    """
-
-    name: str
-    n: int
-    start: float
-    stop: float
-    rate: float
-    jitter: float
-    gaps: int
-    longest_gap: float
-    rates: tuple[float, float]
-    pause: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -191,71 +158,6 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _summarise_stream(name: str, data: xr.Dataset, switched: Array) -> StreamSummary:
-    """A stream's time base; `switched`: when the mode changed [s]."""
-    time = np.asarray(data["time"].values, dtype=np.float64)
-    if time.size < 2:
-        edge = float(time[0]) if time.size else float("nan")
-        nothing = float("nan")
-        return StreamSummary(name, time.size, edge, edge, nothing, nothing, 0, 0.0, (nothing, nothing))
-    steps = np.diff(time)
-    median = float(np.median(steps))
-    rates, usual = (1.0 / median, 1.0 / median), np.full(steps.shape, median)
-    if float(steps.max()) > _GAP * float(steps.min()):
-        from scipy.ndimage import median_filter  # a quarter of a second that an even log need not wait
-
-        by_turns = median_filter(steps, size=_TURN, mode="mirror")
-        rates = (1.0 / float(by_turns.max()), 1.0 / float(by_turns.min()))
-        if rates[1] > _GAP * rates[0]:
-            usual = by_turns
-    long = steps > _GAP * usual
-    long[long] = ~_steady(np.flatnonzero(long), steps[long])
-    pauses = long & _beside(time[:-1], switched) & _beside(time[1:], switched)
-    long &= ~pauses
-    return StreamSummary(
-        name,
-        time.size,
-        float(time[0]),
-        float(time[-1]),
-        rate=1.0 / median,
-        jitter=_MAD_TO_SIGMA * float(np.median(np.abs(steps - usual)[~long])),
-        gaps=int(long.sum()),
-        longest_gap=float(steps[long].max()) if long.any() else 0.0,
-        rates=rates,
-        pause=float(steps[pauses].max()) if pauses.any() else 0.0,
-    )
-
-
-def _steady(place: NDArray[np.intp], steps: Array) -> NDArray[np.bool_]:
-    """Which of the long steps are even, one behind the other: a stretch at a slower rate, in which nothing is lost.
-
-    The step that leads into such a stretch or out of it belongs to it, where it is no longer than its own.
-    """
-    follows = np.diff(place, prepend=-2) == 1
-    starts = np.flatnonzero(~follows | (np.abs(np.diff(steps, prepend=0.0)) > _ALIKE * steps))
-    lengths = np.diff(starts, append=place.size)
-    even = np.repeat(lengths >= _SEVERAL, lengths)
-    seam = follows[1:] & (steps[1:] < (1.0 + _ALIKE) * steps[:-1]) & even[:-1]
-    lead = follows[1:] & (steps[:-1] < (1.0 + _ALIKE) * steps[1:]) & even[1:]
-    even[1:] |= seam
-    even[:-1] |= lead
-    return even
-
-
-def _beside(time: Array, switched: Array) -> NDArray[np.bool_]:
-    """Which stamps lie beside a change of mode."""
-    if not switched.size:
-        return np.zeros(time.shape, dtype=np.bool_)
-    near = np.searchsorted(switched, time)
-    return (
-        np.minimum(
-            np.abs(time - switched[np.minimum(near, switched.size - 1)]),
-            np.abs(time - switched[np.maximum(near - 1, 0)]),
-        )
-        <= _SWITCHING
-    )
-
-
 def _without_impossible(flight: Flight) -> tuple[Flight, dict[str, int]]:
     """The flight with NaN for numbers beyond what anything measures, and how many those are by channel."""
     counts: dict[str, int] = {}
@@ -295,31 +197,6 @@ def _summarise_channel(flight: Flight, name: str, *, outliers: int, impossible: 
     )
 
 
-def _stream_problems(stream: StreamSummary) -> list[str]:
-    problems = []
-    if stream.gaps:
-        problems.append(
-            f"{stream.name}: {stream.gaps} gap{'s' * (stream.gaps != 1)} in the time stamps, the longest "
-            f"{1e3 * stream.longest_gap:.0f} ms (usual step {1e3 / stream.rate:.1f} ms)"
-        )
-    if stream.jitter * stream.rate > _JITTER:
-        problems.append(
-            f"{stream.name}: time stamps jitter by {1e3 * stream.jitter:.2f} ms; bring them to one rate before a fit"
-        )
-    return problems
-
-
-def _stream_notes(stream: StreamSummary) -> list[str]:
-    slow, fast = stream.rates
-    told = []
-    if fast > _GAP * slow:
-        rates = f"recorded at {slow:.3g} Hz and at {fast:.3g} Hz by turns"
-        told.append(f"{stream.name}: {rates}; take a piece of one rate for a fit")
-    if stream.pause:
-        told.append(f"{stream.name}: written in some modes only; it pauses for up to {stream.pause:.3g} s in others")
-    return told
-
-
 def _channel_problems(summary: ChannelSummary) -> list[str]:
     problems = []
     if summary.missing:
@@ -350,7 +227,7 @@ def _shared_problems(channels: Sequence[ChannelSummary], jumps: Mapping[str, int
 def _looked(flight: Flight) -> tuple[tuple[StreamSummary, ...], tuple[ChannelSummary, ...]]:
     """Every stream and every channel of a flight without impossible numbers, which are counted."""
     switched = np.sort([event.time for event in flight.provenance.events if event.kind == "mode"])
-    streams = tuple(_summarise_stream(name, data, switched) for name, data in flight.streams.items())
+    streams = tuple(time_base(name, data, switched) for name, data in flight.streams.items())
     flight, impossible = _without_impossible(flight)
     outliers = jumps(flight)
     labels = {channel: name for name, group in attitudes(flight).items() for channel in group}
@@ -366,7 +243,7 @@ def _looked(flight: Flight) -> tuple[tuple[StreamSummary, ...], tuple[ChannelSum
 def _told(flight: Flight, streams: Sequence[StreamSummary], channels: Sequence[ChannelSummary]) -> list[str]:
     labels = {channel: name for name, group in attitudes(flight).items() for channel in group}
     outliers = {labels.get(summary.name, summary.name): summary.outliers for summary in channels if summary.outliers}
-    told = [text for stream in streams for text in _stream_problems(stream)]
+    told = [text for stream in streams for text in stream.problems]
     told += [text for summary in channels for text in _channel_problems(summary)]
     return told + _shared_problems(channels, outliers)
 
@@ -399,7 +276,7 @@ def inspect(flight: Flight) -> Inspection:
         notes=(
             *flight.provenance.notes,
             *([note(flight.epoch)] if flight.epoch else ()),
-            *(text for stream in streams for text in _stream_notes(stream)),
+            *(text for stream in streams for text in stream.notes),
         ),
         problems=(*damage, *contradictions, *turned, *_told(flight, streams, channels)),
         sweeps=swept,

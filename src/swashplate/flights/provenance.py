@@ -25,7 +25,7 @@ class Event:
 
     Attributes:
         time: [s], on the flight's clock.
-        kind: "message", "mode", "parameter", "sweep", "armed", "disarmed", "dropout".
+        kind: "message", "mode", "parameter", "sweep", "armed", "disarmed", "dropout", "error".
         text: in words.
         details: its numbers (JSON types only).
     """

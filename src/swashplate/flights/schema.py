@@ -140,6 +140,7 @@ VARIANTS = {
     "imu2": "from the second inertial sensor",
     "imu3": "from the third inertial sensor",
     "sid": "from the system-identification message",
+    "raw": "from the first inertial sensor, before its filters",
 }
 _VARIED = (*ATTITUDE, *RATES, "ax", "ay", "az", "vx", "vy", "vz")
 _PULSES = {"rcin": "pulse width received from the pilot", "rcout": "pulse width sent to a servo or motor"}
@@ -149,6 +150,19 @@ _LOGGED = {
         Channel("sid_target", "", "what ArduPilot's System ID mode adds, in the unit of its axis"),
         Channel("sid_frequency", "Hz", "frequency of ArduPilot's chirp", largest=_LARGEST["frequency"]),
         Channel("altitude_baro", "m", "barometric altitude above the start, up positive", largest=_LARGEST["height"]),
+        Channel("latitude", "rad", "geographic latitude, north positive", "", "deg", np.pi / 2),
+        Channel("longitude", "rad", "geographic longitude, east positive", "", "deg", np.pi),
+        Channel("gps_speed", "m/s", "speed over ground, of the GPS", largest=_LARGEST["speed"]),
+        Channel("gps_status", "1", "kind of the GPS's fix: 3 and more in three dimensions"),
+        Channel("gps_satellites", "1", "satellites that the GPS uses"),
+        Channel("gps_hdop", "1", "the GPS's horizontal dilution of precision"),
+        Channel("vibe_x", "m/s^2", "vibration of the accelerometer along x, as ArduPilot tells it"),
+        Channel("vibe_y", "m/s^2", "vibration of the accelerometer along y, as ArduPilot tells it"),
+        Channel("vibe_z", "m/s^2", "vibration of the accelerometer along z, as ArduPilot tells it"),
+        Channel("clips", "1", "samples of an accelerometer at the end of its range, counted"),
+        Channel("clips_2", "1", "the same of the second accelerometer"),
+        Channel("clips_3", "1", "the same of the third accelerometer"),
+        Channel("voltage_board", "V", "supply of the flight controller", largest=_LARGEST["voltage"]),
     )
 }
 _NUMBERED = re.compile(r"(rcin|rcout)_\d{1,2}")

@@ -83,6 +83,9 @@ class Looked:
 class Inspect(FromLogs[Looked]):
     """Show logs' channels, units, rates, gaps and frequency sweeps, and the problems in them; nothing is changed.
 
+    Then what a flight tells without a sweep: incidents with their times, step responses of the rate loops, filters and
+    their delay, noise, and the sweep to fly next.
+
     With --out FILE.html (or .pdf, .svg, .png) their channels are drawn, several logs over each other. --rotor-speed
     measures the rotor's speed from vibration, --reconstruct finds biases and scale factors of the sensors: with --out
     FILE.nc each writes the flight with it. A record of the test bench shows its columns and procedures. A
@@ -139,12 +142,19 @@ class Inspect(FromLogs[Looked]):
 
     def _inspected(self, flights: list[Flight]) -> Looked:
         from swashplate.flights.inspect import inspect
+        from swashplate.flights.review.review import review
 
         result = [inspect(flight) for flight in flights]
-        documents = [one.as_dict() for one in result]
+        reviews = [review(flight, swept=one.sweeps) for flight, one in zip(flights, result, strict=True)]
+        documents = [{**one.as_dict(), "review": beside.as_dict()} for one, beside in zip(result, reviews, strict=True)]
         damage = [words for one in result for words in one.damage]
+        shown = [
+            part
+            for one, beside in zip(result, reviews, strict=True)
+            for part in (one, *([f"\n{beside.words}"] if beside.tells else []))
+        ]
         return Looked(
-            tuple(result),
+            tuple(shown),
             documents[0] if len(documents) == 1 else documents,
             draw=lambda path: self._drawn(flights, path),
             damage="; ".join(damage),

@@ -12,6 +12,7 @@ from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from swashplate.flights.flight import Flight
     from swashplate.identification.responses.frequency_response import FrequencyResponse
 
 RESPONSES = "responses.nc"
@@ -67,6 +68,7 @@ class Respond(FromConditioned["FrequencyResponse"]):
         raw = self.read(self.logs)
         for names, option_name in ((ins, "--inputs"), (outs, "--outputs")):
             if not names:
+                self._refuse_unswept(raw)
                 raise SwashError("is missing.", channel=option_name, hint="Name channels, separated by commas.")
         flights = uniform_records(raw, (*ins, *outs, *references), rate=self.rate, cutoff=self.cutoff, names=ins | outs)
         check_disjoint(flights, called(self.logs))
@@ -80,6 +82,16 @@ class Respond(FromConditioned["FrequencyResponse"]):
             windows=self.windows,
             direct=self.direct,
         )
+
+    def _refuse_unswept(self, flights: list[Flight]) -> None:
+        from swashplate.flights.maneuvers.sweeps import sweeps
+
+        if not any(sweeps(flight) for flight in flights):
+            raise SwashError(
+                "No sweep was found, so no response of the vehicle can be given.",
+                where=", ".join(called(self.logs) or ()) or None,
+                hint="`swash inspect` tells what the flight shows without one, and the sweep to fly next.",
+            )
 
     def _combined(self) -> FrequencyResponse:
         from swashplate.identification.responses.arithmetic import combine
@@ -107,6 +119,16 @@ class Respond(FromConditioned["FrequencyResponse"]):
                 write_json(folder / name, self.document(answer))
             else:
                 report(answer, path=folder / name)
+
+    def text(self, answer: FrequencyResponse, width: int) -> list[Any]:
+        if self.combine is not None or not answer.problems:
+            return super().text(answer, width)
+        from swashplate.flights.maneuvers.sweeps import sweeps
+        from swashplate.flights.review.review import review
+
+        beside = [review(flight, swept=()) for flight in self.read(self.logs) if not sweeps(flight)]
+        told = [f"\nWhat {each.source} tells without a sweep\n\n{each.words}" for each in beside if each.tells]
+        return [*super().text(answer, width), *told]
 
     def remarks(self, answer: FrequencyResponse) -> list[str]:
         return []

@@ -101,9 +101,20 @@ _MESSAGES = (
     _Message("NKF1", "estimate", _ESTIMATE, "", (_INSTANCE, 0)),
     _Message("BARO", "barometer", {"Alt": ("altitude_baro", "m")}, "", (_INSTANCE, 0)),
     _Message("ARSP", "airspeed", {"Airspeed": ("airspeed", "m/s")}, "", (_INSTANCE, 0)),
+    _Message("GYR", "gyro_raw", {f: _INERTIAL[f] for f in ("GyrX", "GyrY", "GyrZ")}, "raw", (_INSTANCE, 0)),
+    _Message("ACC", "accelerometer_raw", {f: _INERTIAL[f] for f in ("AccX", "AccY", "AccZ")}, "raw", (_INSTANCE, 0)),
+    _Message("VIBE", "vibration", {
+        **{f"Vibe{axis}": (f"vibe_{axis.lower()}", "m/s^2") for axis in "XYZ"}, "Clip": ("clips", "1"),
+        **{f"Clip{k}": (f"clips{f'_{k + 1}' * bool(k)}", "1") for k in range(3)},
+    }, "", (("IMU", *_INSTANCE), 0)),
+    _Message("GPS", "gps", {
+        "Lat": ("latitude", "deg"), "Lng": ("longitude", "deg"), "Spd": ("gps_speed", "m/s"),
+        "Status": ("gps_status", "1"), "NSats": ("gps_satellites", "1"), "HDop": ("gps_hdop", "1"),
+    }, "", (_INSTANCE, 0)),
+    _Message("POWR", "supply", {"Vcc": ("voltage_board", "V")}),
     _Message("BAT", "battery", {"Volt": ("voltage", "V"), "Curr": ("current", "A")}, "", (_INSTANCE, 0)),
 )  # fmt: skip
-_STORIES = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "MODE", "EV", "ARM", "SIDS")
+_STORIES = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "MODE", "EV", "ERR", "ARM", "SIDS")
 
 
 def recognises(source: Source) -> bool:

@@ -105,6 +105,32 @@ def _arming(messages: Messages) -> list[Event]:
     return events
 
 
+_SUBSYSTEMS = {
+    2: "radio", 3: "compass", 5: "failsafe of the radio", 6: "failsafe of the battery",
+    8: "failsafe of the ground station", 9: "failsafe of the fence", 10: "change of mode refused", 11: "GPS",
+    12: "crash check", 13: "flip", 15: "parachute", 16: "EKF check", 17: "failsafe of the EKF", 18: "barometer",
+    19: "CPU overload", 21: "terrain data", 22: "navigation", 23: "failsafe of terrain", 24: "EKF changed its core",
+    25: "thrust loss", 26: "sensors", 27: "leak", 29: "vibration", 30: "internal error", 31: "dead reckoning",
+}  # fmt: skip
+"""ERR.Subsys, as ArduPilot's page "Diagnosing problems using logs" lists it."""
+
+
+def _errors(messages: Messages) -> list[Event]:
+    table = messages.get("ERR")
+    if table is None:
+        return []
+    rows = zip(seconds(table).tolist(), table.number("Subsys").tolist(), table.number("ECode").tolist(), strict=True)
+    return [
+        Event(
+            time,
+            "error",
+            f"{_SUBSYSTEMS.get(int(part), f'subsystem {part:g}')}: {f'code {code:g}' if code else 'over'}",
+        )
+        for time, part, code in rows
+        if math.isfinite(time) and math.isfinite(part) and math.isfinite(code)
+    ]
+
+
 def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
     """Sweeps of the System ID mode, with start and stop on the log's clock, and those that the log does not finish."""
     settings, data = messages.get("SIDS"), messages.get("SIDD")
@@ -187,5 +213,8 @@ def story(messages: Messages, *, end: float) -> Story:
     sweeps, damage = _sweeps(messages, end)
     if arming and arming[-1].kind == "armed":
         damage.append(f"the log is cut off: it ends at {end:.2f} s with the motors armed since {arming[-1].time:.2f} s")
-    events = sorted((*changes, *texts, *_modes(messages, firmware), *arming, *sweeps), key=lambda event: event.time)
+    events = sorted(
+        (*changes, *texts, *_modes(messages, firmware), *_errors(messages), *arming, *sweeps),
+        key=lambda event: event.time,
+    )
     return Story(_vehicle(firmware, texts), firmware, parameters, tuple(events), tuple(damage))

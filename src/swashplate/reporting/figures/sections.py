@@ -15,6 +15,7 @@ SECTIONS: Registry[Callable[[Any], Section]] = Registry(
     what="an object that shows itself",
     own={
         "Flight": f"{_HERE}.of_flight:section_of_flight",
+        "FlightReview": f"{_HERE}.of_review:section_of_review",
         "Inspection": f"{_HERE}.of_flight:section_of_inspection",
         "FrequencyResponse": f"{_HERE}.views:section_of_responses",
         "ModelComparison": f"{_HERE}.of_comparison:section_of_comparison",
