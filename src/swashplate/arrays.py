@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Values = float | Array | Complex
+"""One number, or rows of them; imaginary parts are slopes."""
 
 _SAME = 1e-6
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from swashplate.engine.c_text import Precision, literal
+from swashplate.engine.graph import Expression, Graph
 from swashplate.errors import ExportError
 
 _BINARY = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/"}
@@ -77,7 +77,7 @@ def _text(operation: str, of: Sequence[str], precision: Precision) -> str:
     return _OWN[operation].format(*of)
 
 
-def statements(function: Any, *, precision: Precision, inputs: Sequence[str]) -> Statements:
+def statements(function: Graph, *, precision: Precision, inputs: Sequence[str]) -> Statements:
     """A CasADi function, traced on SX, as statements.
 
     Args:
@@ -140,7 +140,7 @@ def _cheaper(made: Sequence[Statement]) -> list[Statement]:
     return cheaper
 
 
-def body(function: Any, *, real: str, precision: Precision, inputs: Sequence[str], outputs: Sequence[str]) -> str:
+def body(function: Graph, *, real: str, precision: Precision, inputs: Sequence[str], outputs: Sequence[str]) -> str:
     """Statements in C that compute a CasADi function.
 
     Args:
@@ -163,7 +163,7 @@ def printed(code: Statements, real: str, precision: Precision, outputs: Sequence
     return "\n".join([*lines, *stores]) + "\n"
 
 
-def _places(sparsity: Any) -> list[int]:
+def _places(sparsity: Expression) -> list[int]:
     """Where each nonzero of an output stands in the full matrix, row by row (a column vector: its row)."""
     rows, columns = sparsity.get_triplet()
     width = sparsity.size2()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.atomic import scratch_folder
+from swashplate.engine.graph import Graph
 from swashplate.engine.template import filled
 
 REFERENCES = ("x", "y", "z", "psi", "ahead", "right", "roll", "pitch")
@@ -39,7 +39,7 @@ class LawGraph:
         fixed: how many numbers at the end of what it carries never change.
     """
 
-    function: Any = field(repr=False)
+    function: Graph = field(repr=False)
     measured: tuple[str, ...]
     told: tuple[str, ...]
     memory: int
@@ -61,7 +61,7 @@ _OWN = {"fmax(x, y)": "x > y ? x : y", "fmin(x, y)": "x < y ? x : y", "fabs(x)":
 """What CasADi takes from the C library, written out."""
 
 
-def print_function(function: Any, real: str) -> tuple[str, dict[str, int]]:
+def print_function(function: Graph, real: str) -> tuple[str, dict[str, int]]:
     """A CasADi function as C by CasADi's own printer, which keeps its loops, and calls of the C library by name.
 
     Args:

@@ -13,6 +13,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.engine.c_expression import Statements, statements
+from swashplate.engine.graph import Graph
 
 _ROWS = 512
 """Rows at a time: what a statement reads and writes then stays in a core's cache."""
@@ -28,7 +29,7 @@ class OnArrays:
         ExportError: for an operation that the equations of this package do not use.
     """
 
-    def __init__(self, function: Any) -> None:
+    def __init__(self, function: Graph) -> None:
         self._names = [f"a{i}" for i in range(function.n_in())]
         self._shapes = [function.size_out(i) for i in range(function.n_out())]
         self._code = statements(function, precision="double", inputs=self._names)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from swashplate.engine.graph import Expression, Graph
 from swashplate.extras import library
 from swashplate.physics.backend import CasadiBackend
 
@@ -28,11 +29,11 @@ class Root:
         root: stands for the solution wherever it is used. steps: at most.
     """
 
-    start: Any
-    guess: Any
-    value: Any
-    slope: Any
-    root: Any
+    start: Expression
+    guess: Expression
+    value: Expression
+    slope: Expression
+    root: Expression
     steps: int
 
 
@@ -46,7 +47,7 @@ class Looped:
         steps: of each root, at most; later roots may depend on earlier ones.
     """
 
-    function: Any = field(repr=False)
+    function: Graph = field(repr=False)
     steps: tuple[int, ...] = ()
 
 
@@ -58,16 +59,18 @@ class Looping(CasadiBackend):
         self.roots: list[Root] = []
         self._casadi = casadi
 
-    def newton(self, residual: Any, start: Any, *, steps: int) -> Any:
+    def newton(
+        self, residual: Callable[[Expression], tuple[Expression, Expression]], start: Expression, *, steps: int
+    ) -> Expression:
         guess, root = (self._casadi.SX.sym(f"{name}{len(self.roots)}") for name in ("guess", "root"))
         value, slope = residual(guess)
         self.roots.append(Root(start, guess, value, slope, root, steps))
         return root
 
-    def looped(self, given: Sequence[Any], results: Sequence[Any]) -> Looped:
+    def looped(self, given: Sequence[Expression], results: Sequence[Expression]) -> Looped:
         """A function of `given` whose outputs are `results` and what the roots need."""
 
-        def column(*entries: Any) -> Any:
+        def column(*entries: Expression) -> Expression:
             return self._casadi.vertcat(self._casadi.SX(0, 1), *entries)
 
         symbols = [column(*(getattr(root, name) for root in self.roots)) for name in ("guess", "root")]

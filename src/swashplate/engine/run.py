@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.compiled import can_compile, loaded
+from swashplate.engine.graph import Graph
 from swashplate.engine.law import print_function
 
 _OPTIONS = ("-O1", "-w")
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
-def runnable(function: Any) -> Callable[..., list[Array]]:
+def runnable(function: Graph) -> Callable[..., list[Array]]:
     """A CasADi function with dense inputs and outputs, as one of arrays to arrays of the shapes that it has."""
     if not can_compile():
         return lambda *given: [np.asarray(part.full()) for part in function.call(list(given))]

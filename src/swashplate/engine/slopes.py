@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.engine.equations import Equations, unpack_rows
+from swashplate.engine.graph import Expression, Graph
 from swashplate.engine.roots import Looping, require_casadi
 from swashplate.engine.untraced import untraced
 from swashplate.physics.backend import Backend, CasadiBackend, newton
 
-Scalars = Callable[[Sequence[Any], Sequence[Any], Sequence[Any], Backend], Sequence[Any]]
+Scalars = Callable[[Sequence[Expression], Sequence[Expression], Sequence[Expression], Backend], Sequence[Expression]]
 """`f(x, w, p, xp)`: a row of scalars of a state row, a driving row and a row of numbers."""
 Slopes = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
 """Of (x, w, p) the values (m,), their slopes by x (m, n) and by w (m, driving)."""
@@ -57,7 +57,7 @@ def slopes_of(f: Scalars, sizes: tuple[int, int, int], *, where: str) -> Slopes:
     return at
 
 
-def with_slopes(f: Scalars, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
+def with_slopes(f: Scalars, x: Expression, w: Expression, p: Expression) -> tuple[Expression, Expression]:
     """Values (m, 1) and slopes by x and w side by side (m, n + driving), as CasADi's expressions of columns.
 
     Slopes of a root are those of its residual there (implicit function theorem), not of the search that finds it.
@@ -85,10 +85,12 @@ class _Recording(CasadiBackend):
 
     def __init__(self) -> None:
         super().__init__()
-        self.roots: list[Any] = []
+        self.roots: list[Expression] = []
         self._plain = CasadiBackend()
 
-    def newton(self, residual: Any, start: Any, *, steps: int) -> Any:
+    def newton(
+        self, residual: Callable[[Expression], tuple[Expression, Expression]], start: Expression, *, steps: int
+    ) -> Graph:
         self.roots.append(newton(residual, start, steps=steps, xp=self._plain))
         return self.roots[-1]
 
@@ -98,7 +100,7 @@ def _of_rates(equations: Equations) -> Slopes:
     return slopes_of(_rates(equations), _sizes(equations), where=equations.vehicle.name)
 
 
-def rates_at(equations: Equations) -> Any:
+def rates_at(equations: Equations) -> Graph:
     """The rates and their slopes by state and driving row side by side, as a CasADi function of (x, w, p)."""
     casadi = require_casadi()
     given = [casadi.SX.sym(name, size) for name, size in zip("xwp", _sizes(equations), strict=True)]

@@ -14,10 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.engine.graph import Expression
 from swashplate.engine.roots import require_casadi
 
 Symbols = NDArray[Any]
 """An array of `Symbol`s and numbers."""
+
+Operand: TypeAlias = Any
+"""A `Symbol`, a number, or an array of them: operators of arrays of objects give what a type cannot tell."""
 
 ArrayFunctions: TypeAlias = Any
 """NumPy, or `SymbolArrays` for a trace: what a step calls `xp`."""
@@ -28,61 +32,61 @@ class Symbol:
 
     __slots__ = ("expression",)
 
-    def __init__(self, expression: Any) -> None:
+    def __init__(self, expression: Expression) -> None:
         self.expression = expression
 
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a + b, self, other)
 
-    def __radd__(self, other: Any) -> Any:
+    def __radd__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: b + a, self, other)
 
-    def __sub__(self, other: Any) -> Any:
+    def __sub__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a - b, self, other)
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: b - a, self, other)
 
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a * b, self, other)
 
-    def __rmul__(self, other: Any) -> Any:
+    def __rmul__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: b * a, self, other)
 
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a / b, self, other)
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: b / a, self, other)
 
-    def __pow__(self, other: Any) -> Any:
+    def __pow__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a**b, self, other)
 
-    def __rpow__(self, other: Any) -> Any:
+    def __rpow__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: b**a, self, other)
 
-    def __and__(self, other: Any) -> Any:
+    def __and__(self, other: Operand) -> Operand:
         return _combined(require_casadi().logic_and, self, other)
 
-    def __rand__(self, other: Any) -> Any:
+    def __rand__(self, other: Operand) -> Operand:
         return self & other
 
-    def __or__(self, other: Any) -> Any:
+    def __or__(self, other: Operand) -> Operand:
         return _combined(require_casadi().logic_or, self, other)
 
-    def __ror__(self, other: Any) -> Any:
+    def __ror__(self, other: Operand) -> Operand:
         return self | other
 
-    def __gt__(self, other: Any) -> Any:
+    def __gt__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a > b, self, other)
 
-    def __ge__(self, other: Any) -> Any:
+    def __ge__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a >= b, self, other)
 
-    def __lt__(self, other: Any) -> Any:
+    def __lt__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a < b, self, other)
 
-    def __le__(self, other: Any) -> Any:
+    def __le__(self, other: Operand) -> Operand:
         return _combined(lambda a, b: a <= b, self, other)
 
     def __neg__(self) -> Symbol:
@@ -95,25 +99,25 @@ class Symbol:
         raise TypeError("a symbol is neither true nor false: ask `xp.where`, and `xp.greater` of whole arrays")
 
 
-def _combined(f: Callable[[Any, Any], Any], one: Symbol, other: Any) -> Any:
+def _combined(f: Callable[[Expression, Expression], Expression], one: Symbol, other: Operand) -> Operand:
     return NotImplemented if isinstance(other, np.ndarray) else Symbol(f(one.expression, expression_of(other)))
 
 
-def expression_of(value: Any) -> Any:
+def expression_of(value: Operand) -> Expression:
     """What CasADi knows of a symbol or a number."""
     if isinstance(value, Symbol):
         return value.expression
     return float(value) if isinstance(value, int | float | np.generic | bool) else value
 
 
-def symbols(column: Any) -> Symbols:
+def symbols(column: Expression) -> Symbols:
     """The entries of a column of CasADi as an array (n,)."""
     made = np.empty(column.shape[0], dtype=object)
     made[:] = [Symbol(column[i]) for i in range(column.shape[0])]
     return made
 
 
-def expressions(values: Any) -> Any:
+def expressions(values: Operand) -> Expression:
     """An array (n,) of symbols and numbers as a column of CasADi."""
     return require_casadi().vertcat(*(expression_of(value) for value in np.ravel(values)))
 
@@ -142,22 +146,22 @@ class SymbolArrays:
         self.greater, self.less_equal = _each(lambda a, b: a > b, 2), _each(lambda a, b: a <= b, 2)
         self.where = _each(casadi.if_else, 3)
 
-    def clip(self, x: Any, low: Any, high: Any) -> Any:
+    def clip(self, x: Operand, low: Operand, high: Operand) -> Operand:
         return self.minimum(self.maximum(x, low), high)
 
-    def radians(self, x: Any) -> Any:
+    def radians(self, x: Operand) -> Operand:
         return x * (np.pi / 180.0)
 
 
 def _each(function: Callable[..., Any], arguments: int) -> Callable[..., Any]:
     """A function of expressions as one of arrays."""
 
-    def wrapped(*values: Any) -> Symbol:
+    def wrapped(*values: Operand) -> Symbol:
         return Symbol(function(*map(expression_of, values)))
 
     many = np.frompyfunc(wrapped, arguments, 1)
 
-    def applied(*values: Any) -> Any:
+    def applied(*values: Operand) -> Operand:
         return many(*values) if any(isinstance(value, np.ndarray) for value in values) else wrapped(*values)
 
     return applied

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 from swashplate.engine.equations import Equations, unpack_rows
+from swashplate.engine.graph import Graph
 from swashplate.engine.roots import Looped, Looping, require_casadi
 from swashplate.engine.untraced import untraced
 from swashplate.models.nesting import rebuild
@@ -31,7 +31,7 @@ def traced_rates(equations: Equations) -> Looped:
         raise untraced(error, "equations", vehicle.name) from error
 
 
-def traced_force(equations: Equations) -> Any:
+def traced_force(equations: Equations) -> Graph:
     """The specific force [m/s^2] as a CasADi function of (x, w, p); rows and errors as in `traced_rates`."""
     casadi, vehicle = require_casadi(), equations.vehicle
     sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
@@ -46,7 +46,7 @@ def traced_force(equations: Equations) -> Any:
         raise untraced(error, "specific force", vehicle.name) from error
 
 
-def traced_angles() -> Any:
+def traced_angles() -> Graph:
     """Roll, pitch and yaw [rad] as a CasADi function of a quaternion."""
     casadi = require_casadi()
     q = casadi.SX.sym("q", 4)
@@ -54,7 +54,7 @@ def traced_angles() -> Any:
     return casadi.Function("angles", [q], [casadi.vertcat(*angles)], {"cse": True})
 
 
-def traced_placing(states: int) -> Any:
+def traced_placing(states: int) -> Graph:
     """A state row with Euler angles as one with a quaternion, a CasADi function of a row of so many states."""
     casadi = require_casadi()
     x = casadi.SX.sym("x", states)
@@ -63,7 +63,7 @@ def traced_placing(states: int) -> Any:
 
 
 @lru_cache(maxsize=32)
-def unrolled_rates(equations: Equations) -> Any:
+def unrolled_rates(equations: Equations) -> Graph:
     """The rates as a CasADi function of (x, w, p), with roots sought in a fixed number of steps.
 
     Raises:

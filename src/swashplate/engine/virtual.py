@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.engine.c_text import Precision
 from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of
+from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
 from swashplate.engine.trace import traced_angles, traced_force, unrolled_rates
 from swashplate.engine.tumbling import from_euler, tumbling
@@ -63,7 +64,7 @@ def fly_virtually(
 
 
 @lru_cache(maxsize=32)
-def rk4_graph(equations: Equations) -> Any:
+def rk4_graph(equations: Equations) -> Graph:
     """A step of Runge and Kutta as a CasADi function of (x, w at its begin, middle and end, p, dt)."""
     casadi = require_casadi()
     rates = unrolled_rates(equations)
@@ -86,7 +87,7 @@ def _as_seen(x: Array, before: Array) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _angles(total: int) -> Any:
+def _angles(total: int) -> Graph:
     return traced_angles().map(total)
 
 

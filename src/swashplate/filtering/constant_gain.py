@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
+from swashplate.engine.graph import Expression
 from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import (
     Numbers,
@@ -15,10 +15,17 @@ from swashplate.filtering.observer import (
     keeping,
     moving,
 )
+from swashplate.physics.backend import Scalar
 
 
 def corrected_steadily(
-    plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, y: Any, phase: Any, w: Any, M: Matrices
+    plan: ObserverPlan,
+    numbers: Numbers,
+    estimate: ObserverEstimate,
+    y: Expression,
+    phase: Expression,
+    w: Expression,
+    M: Matrices,
 ) -> ObserverEstimate:
     """The estimate after this sample's readings: a matrix in each phase of the cycle, zero for readings not due.
 
@@ -35,7 +42,7 @@ def corrected_steadily(
 
 
 def predicted_steadily(
-    plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Any, taken: Sequence[Any], M: Matrices
+    plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Scalar, taken: Sequence[Scalar], M: Matrices
 ) -> ObserverEstimate:
     """The mean alone one sample later; arguments as in `observer.predicted`."""
     xp, dt, e = M.xp, plan.dt, estimate.mean

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, Values
 from swashplate.models.card import Card
+
+V = TypeVar("V")
 
 DISTURBED = ("u", "v", "w", "p", "q", "r")
 """The states whose rates are disturbed, in the order of the disturbances."""
 
 
-def on_axes(level: Any, down: Any, tilt: Any, yaw: Any) -> list[Any]:
+def on_axes(level: V, down: V, tilt: V, yaw: V) -> list[V]:
     """A number of each disturbance in the order of `DISTURBED`, from those of its four kinds."""
     return [level, level, down, tilt, tilt, yaw]
 
@@ -33,33 +35,33 @@ class Noise(NamedTuple):
     `sensor_rate` [rad/s]: of a gyroscope's readings, given and not estimated; 0: none is used.
     """
 
-    white_tilt: Any = 0.5
-    white_yaw: Any = 2.0
-    white_horizontal: Any = 0.02
-    white_vertical: Any = 0.02
-    gust_tilt: Any = 3.0
-    gust_yaw: Any = 15.0
-    gust_horizontal: Any = 0.4
-    gust_vertical: Any = 0.3
-    tau_gust_moment: Any = 0.5
-    tau_gust_force: Any = 0.5
-    drift_moment: Any = 0.1
-    drift_force: Any = 0.03
-    sensor_position: Any = 3e-4
-    sensor_angle: Any = 1.5e-3
-    wind: Any = 0.0
-    tau_wind: Any = 1.0
-    speed: Any = 0.0
-    tau_gust_yaw: Any = 0.0
-    drift_yaw: Any = 0.0
-    tau_gust_vertical: Any = 0.0
-    drift_vertical: Any = 0.0
-    line_hertz: Any = 0.0
-    line_angle: Any = 1e-3
-    line_height: Any = 2e-4
-    line_time: Any = 0.3
-    sensor_heading: Any = 0.0
-    sensor_rate: Any = 0.0
+    white_tilt: Values = 0.5
+    white_yaw: Values = 2.0
+    white_horizontal: Values = 0.02
+    white_vertical: Values = 0.02
+    gust_tilt: Values = 3.0
+    gust_yaw: Values = 15.0
+    gust_horizontal: Values = 0.4
+    gust_vertical: Values = 0.3
+    tau_gust_moment: Values = 0.5
+    tau_gust_force: Values = 0.5
+    drift_moment: Values = 0.1
+    drift_force: Values = 0.03
+    sensor_position: Values = 3e-4
+    sensor_angle: Values = 1.5e-3
+    wind: Values = 0.0
+    tau_wind: Values = 1.0
+    speed: Values = 0.0
+    tau_gust_yaw: Values = 0.0
+    drift_yaw: Values = 0.0
+    tau_gust_vertical: Values = 0.0
+    drift_vertical: Values = 0.0
+    line_hertz: Values = 0.0
+    line_angle: Values = 1e-3
+    line_height: Values = 2e-4
+    line_time: Values = 0.3
+    sensor_heading: Values = 0.0
+    sensor_rate: Values = 0.0
 
 
 GYROSCOPE = 0.04

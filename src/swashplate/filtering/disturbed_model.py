@@ -12,18 +12,18 @@ turned into the heading first, so that the gain does not depend on where the nos
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, Values
 from swashplate.engine.equations import Equations, equations_of
 from swashplate.filtering.block_matrices import blocks, diagonal
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.schema import POSITION, RATES
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend
+from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 from swashplate.simulation.discretisation import held_series
 
@@ -34,21 +34,21 @@ class FilterGain(NamedTuple):
     """Constant measurement update of states, gusts (the wind with them) and drifts, and the innovations' covariance;
     and that of a rotor's line, where there is one."""
 
-    state: Any
-    gust: Any
-    drift: Any
-    covariance: Any
-    line: Any = ()
+    state: Scalar
+    gust: Scalar
+    drift: Scalar
+    covariance: Scalar
+    line: Scalar = ()
 
 
 class FilterState(NamedTuple):
     """Estimated vehicle states, gusts (six accelerations, and the wind to north and east where modelled) and drifts;
     and where a rotor's line is modelled, its part of roll and pitch and of height, each with its quadrature."""
 
-    x: Any
-    gust: Any
-    drift: Any
-    line: Any = ()
+    x: Scalar
+    gust: Scalar
+    drift: Scalar
+    line: Scalar = ()
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class StochasticModel:
         return 2 * len(_LINE) * self.lined
 
     # ---- what is seen ------------------------------------------------------------------------------------------
-    def measure(self, x: Any, nuisance: Nuisance, xp: Backend) -> Any:
+    def measure(self, x: Scalar, nuisance: Nuisance, xp: Backend) -> Scalar:
         """The measured channels of a state, whose entries come first."""
         here = {name: x[self.vehicle.index(name)] for name in self.output_names}
         attitude = Euler(*(x[self.vehicle.index(name)] for name in ("phi", "theta", "psi")))
@@ -140,12 +140,12 @@ class StochasticModel:
         C = np.concatenate([by_state, np.zeros((*by_state.shape[:-1], g + d)), shaken], axis=-1)
         return A, C, self.process_noise(by_push, noise), diagonal(self.sensor_variances(noise))
 
-    def white(self, noise: Noise) -> Any:
+    def white(self, noise: Noise) -> Array:
         """Intensities of white noise on the disturbed accelerations."""
         tilt, yaw, horizontal, vertical = noise[:4]
         return np.stack(on_axes(horizontal, vertical, tilt, yaw), axis=-1)
 
-    def process_noise(self, by_push: Any, noise: Noise) -> Any:
+    def process_noise(self, by_push: Array, noise: Noise) -> Array:
         """Covariance of what a sample adds to states, gusts, drifts and the line.
 
         Args:
@@ -165,36 +165,36 @@ class StochasticModel:
         rows = [[spread, None, None, None], [None, gusts, None, None], [None, None, drifts, None], [None] * 3 + [line]]
         return blocks(rows, (n, g, d, self.n_line))
 
-    def gain_of(self, K: Any, S: Any) -> FilterGain:
+    def gain_of(self, K: Array, S: Array) -> FilterGain:
         """The parts of a joined gain (..., joined, outputs)."""
         n, d = len(self.vehicle.state_names), len(self.vehicle.state_names) + self.n_gusts
         k = d + N_DISTURBANCES
         line = K[..., k:, :] if self.lined else ()
         return FilterGain(K[..., :n, :], K[..., n:d, :], K[..., d:k, :], S, line)
 
-    def fade(self, noise: Noise) -> Any:
+    def fade(self, noise: Noise) -> Array:
         """What is left of each gust after one sample."""
         taus = [*on_axes(*_shared_or_own(noise, "tau_gust")), noise.tau_wind, noise.tau_wind]
         return np.exp(-self.dt / np.stack(taus[: self.n_gusts], axis=-1))
 
-    def lasting(self, noise: Noise) -> Any:
+    def lasting(self, noise: Noise) -> Array:
         """How gusts, drifts and the line together go on for one sample (..., all three, all three)."""
         fade, turn = diagonal(self.fade(noise)), self.line_turn(noise)
         rows = [[fade, None, None], [None, np.eye(N_DISTURBANCES), None], [None, None, turn]]
         return blocks(rows, (self.n_gusts, N_DISTURBANCES, self.n_line))
 
-    def line_turn(self, noise: Noise) -> Any:
+    def line_turn(self, noise: Noise) -> Array:
         """The line one sample later (..., n_line, n_line): pairs that turn by its frequency, and forget their phase."""
         angle, quarter = 2.0 * np.pi * self.dt * noise.line_hertz, [[0.0, -1.0], [1.0, 0.0]]
         along, across = (self._line_kept(noise) * part for part in (np.cos(angle), np.sin(angle)))
         over = np.kron(np.eye(self.n_line // 2), quarter)
         return along[..., None, None] * np.eye(self.n_line) + across[..., None, None] * over
 
-    def _line_kept(self, noise: Noise) -> Any:
+    def _line_kept(self, noise: Noise) -> Array:
         return np.exp(-self.dt / np.asarray(noise.line_time))
 
     @property
-    def line_seen(self) -> Any:
+    def line_seen(self) -> Array:
         """What the line adds to the measured channels (outputs, n_line): roll + i pitch turns, height swings."""
         pairs = np.eye(2 * len(_LINE))
         shaken = {"phi": pairs[0], "theta": pairs[1], "z": pairs[2]}
@@ -205,7 +205,7 @@ class StochasticModel:
         """A little variance per sample on states that no disturbance reaches: rotor speeds [rad/s], and others."""
         return np.where([role == "rotor speed" for role in self.vehicle.roles], 1e-4, 1e-10)
 
-    def sensor_variances(self, noise: Noise) -> Any:
+    def sensor_variances(self, noise: Noise) -> Array:
         """Variances of the measured channels."""
         sigma = dict.fromkeys(POSITION, noise.sensor_position)
         sigma |= dict.fromkeys(RATES, np.where(noise.sensor_rate > 0.0, noise.sensor_rate, noise.sensor_angle))
@@ -217,8 +217,8 @@ class StochasticModel:
         return len(self.output_names)
 
     def correct(
-        self, state: FilterState, y: Any, gain: FilterGain, nuisance: Nuisance, xp: Backend
-    ) -> tuple[FilterState, Any]:
+        self, state: FilterState, y: Scalar, gain: FilterGain, nuisance: Nuisance, xp: Backend
+    ) -> tuple[FilterState, Scalar]:
         """The state after a measurement, and the innovation with its horizontal part in heading axes."""
         psi = state.x[self.vehicle.index("psi")]
         expected = self.measure(state.x, nuisance, xp)
@@ -242,12 +242,12 @@ class StochasticModel:
         line = state.line + line if self.lined else ()
         return FilterState(state.x + x, state.gust + gust, state.drift + drift, line)
 
-    def acting(self, state: FilterState, xp: Backend) -> Any:
+    def acting(self, state: FilterState, xp: Backend) -> Scalar:
         """The disturbances that act: gusts and drifts together, and perhaps the wind."""
         return state.gust + xp.arrays.concatenate([state.drift, np.zeros(2 * self.windy)])
 
 
-def _shared_or_own(noise: Noise, kind: str) -> tuple[Any, Any, Any, Any]:
+def _shared_or_own(noise: Noise, kind: str) -> tuple[Values, Array, Values, Array]:
     """A number of level, downward, tilting and yawing disturbances: down and yaw have their own, where there is one."""
     force, down, moment, yaw = (getattr(noise, f"{kind}_{name}") for name in ("force", "vertical", "moment", "yaw"))
     return force, np.where(down > 0.0, down, force), moment, np.where(yaw > 0.0, yaw, moment)
@@ -260,7 +260,7 @@ _GUST_NAMES = (*DISTURBED, "x", "y")
 """The gusts, the wind by the axes that it blows along."""
 
 
-def _turn(row: Any, names: tuple[str, ...], angle: Any, xp: Backend) -> Any:
+def _turn(row: Scalar, names: tuple[str, ...], angle: Scalar, xp: Backend) -> Scalar:
     """The part of a row that lies along x and y, turned by an angle about the vertical.
 
     Sums of unit rows instead of setting entries: a loop that scatters is not compiled as one function.

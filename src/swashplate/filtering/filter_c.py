@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from swashplate.engine.c_loops import looped
 from swashplate.engine.c_split import ROOTS, split
 from swashplate.engine.c_tangents import VECTORS, Tangents
 from swashplate.engine.equations import Equations
+from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
 from swashplate.engine.template import filled
 from swashplate.engine.trace import traced_rates
@@ -45,7 +46,7 @@ class Sample:
         linear: what drives goes straight from sample to sample; otherwise it is held.
     """
 
-    correct: Any
+    correct: Graph
     pushed: Sequence[int]
     windy: bool = False
     rated: bool = False
@@ -155,7 +156,7 @@ def _following(model: StochasticModel, rates: Statements, steps: Sequence[int]) 
     return filled("follow.c", blanks)
 
 
-def sensing(model: StochasticModel) -> Any:
+def sensing(model: StochasticModel) -> Graph:
     """(state, nuisance) to what is measured and its slopes by the state."""
     casadi = require_casadi()
     xp, n, line = _Symbols(casadi), len(model.vehicle.state_names), model.n_line
@@ -172,13 +173,13 @@ def _indented(lines: list[str]) -> str:
 class _Symbols(CasadiBackend):
     """Expressions side by side are a column."""
 
-    def __init__(self, casadi: Any) -> None:
+    def __init__(self, casadi: ModuleType) -> None:
         super().__init__()
         self.arrays = self
         self.stack = self.concatenate = lambda parts: casadi.vertcat(*parts)
 
 
-def correction(model: StochasticModel) -> Any:
+def correction(model: StochasticModel) -> Graph:
     """(predicted, reading, given) to (innovation, corrected, acting, what of the state goes on by itself).
 
     `given` is the gain row by row, `Nuisance`, what is left of gusts after a sample, and how the line turns.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import ctypes
 import math
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
@@ -112,7 +112,7 @@ class FilterLibrary:
         return results
 
 
-def flat(rows: Any) -> Array:
+def flat(rows: ArrayLike) -> Array:
     """Numbers as C reads them."""
     return np.ascontiguousarray(rows, dtype=np.float64)
 

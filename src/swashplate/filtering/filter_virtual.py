@@ -7,11 +7,12 @@ samples are taken side by side (`engine/on_arrays.py`), and what goes along the 
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.engine.equations import Equations
+from swashplate.engine.graph import Graph
 from swashplate.engine.on_arrays import OnArrays
 from swashplate.engine.roots import require_casadi
 from swashplate.engine.trace import unrolled_rates
@@ -53,7 +54,7 @@ class VirtualFilter:
         return innovations, corrected, np.concatenate([fixed.start[None], following[:-1]])
 
     @cached_property
-    def _sample(self) -> Any:
+    def _sample(self) -> Graph:
         """(predicted state, reading, what drives, given, numbers) to the next predicted state, the innovation and
         the corrected state."""
         casadi, model, dt = require_casadi(), self._model, self._model.dt
@@ -171,7 +172,7 @@ class VirtualFilter:
 
 
 @lru_cache(maxsize=32)
-def _slopes(equations: Any, of_numbers: tuple[int, ...]) -> OnArrays:
+def _slopes(equations: Equations, of_numbers: tuple[int, ...]) -> OnArrays:
     """(x, w, p) to the rates, and their slopes by x, by w and by some of p."""
     casadi, rates = require_casadi(), unrolled_rates(equations)
     x, w, p = (casadi.SX.sym(name, rates.size1_in(i)) for i, name in enumerate("xwp"))

@@ -10,7 +10,7 @@ and a slope there would be zero.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -180,9 +180,9 @@ class _ComplexArrays(ArrayBackend):
         self.atan2 = self._atan2
 
     @staticmethod
-    def _atan2(y: Complex, x: Complex) -> Any:
+    def _atan2(y: Complex, x: Complex) -> Complex:
         slope = (np.real(x) * np.imag(y) - np.real(y) * np.imag(x)) / (np.real(x) ** 2 + np.real(y) ** 2)
-        return np.arctan2(np.real(y), np.real(x)) + 1j * slope
+        return np.asarray(np.arctan2(np.real(y), np.real(x)) + 1j * slope, dtype=np.complex128)
 
 
 COMPLEX_ARRAYS = _ComplexArrays()

@@ -6,16 +6,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
+from swashplate.engine.graph import Expression, Graph
 from swashplate.engine.roots import require_casadi
-from swashplate.physics.backend import Backend, CasadiBackend
+from swashplate.physics.backend import Backend, CasadiBackend, Scalar
 from swashplate.simulation.discretisation import held_series
 from swashplate.simulation.runge_kutta import rk4_change
 
-Scalars = Callable[[Sequence[Any], Sequence[Any]], Sequence[Any]]
+Scalars = Callable[[Sequence[Scalar], Sequence[Scalar]], Sequence[Scalar]]
 """A function of two rows of scalars; scalars back."""
 
 
@@ -25,35 +25,35 @@ class Matrices:
     def __init__(self) -> None:
         self._casadi = require_casadi()
         self.xp: Backend = CasadiBackend()
-        self._made: dict[Any, Any] = {}
+        self._made: dict[tuple[object, ...], Graph] = {}
 
-    def column(self, scalars: Sequence[Any], /) -> Any:
+    def column(self, scalars: Sequence[Scalar], /) -> Expression:
         return self._casadi.vertcat(*scalars)
 
-    def scalars(self, column: Any, /) -> list[Any]:
+    def scalars(self, column: Expression, /) -> list[Scalar]:
         return [column[i] for i in range(column.shape[0])]
 
-    def stacked(self, parts: Sequence[Any], /) -> Any:
+    def stacked(self, parts: Sequence[Scalar], /) -> Expression:
         """One above the other."""
         return self._casadi.vertcat(*parts)
 
-    def diagonal(self, values: Any, /) -> Any:
+    def diagonal(self, values: Expression, /) -> Expression:
         """A matrix of a row's values."""
         return self._casadi.diag(self._casadi.DM(np.asarray(values)))
 
-    def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
+    def value(self, f: Scalars, x: Expression, w: Expression, /) -> Expression:
         """A column (m, 1) of columns, without the slopes, which a call would compute all the same."""
         return self._traced(f, x, w, slopes=False)(x, w)
 
-    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
+    def linearised(self, f: Scalars, x: Expression, w: Expression, /) -> tuple[Expression, Expression]:
         """Value (m, 1) and Jacobian by x (m, n)."""
         return tuple(self._traced(f, x, w, slopes=True)(x, w))
 
-    def change(self, rates: Scalars, x: Any, w: Any, dt: float) -> Any:
+    def change(self, rates: Scalars, x: Expression, w: Expression, dt: float) -> Expression:
         """How far a Runge-Kutta step of length `dt` [s] takes a column `x` under a column `w` that stays."""
         return rk4_change(lambda x, w: self.value(rates, x, w), x, lambda _: w, dt)
 
-    def _traced(self, f: Scalars, x: Any, w: Any, *, slopes: bool) -> Any:
+    def _traced(self, f: Scalars, x: Expression, w: Expression, *, slopes: bool) -> Graph:
         """The four stages of a Runge-Kutta step call one function."""
         casadi, key = self._casadi, (f.__code__, x.shape[0], w.shape[0], slopes)
         if key not in self._made:
@@ -64,8 +64,14 @@ class Matrices:
         return self._made[key]
 
     def updated(
-        self, H: Any, mean: Any, covariance: Any, innovations: Any, measurement: Any, /
-    ) -> tuple[Any, Any, Any]:
+        self,
+        H: Expression,
+        mean: Expression,
+        covariance: Expression,
+        innovations: Expression,
+        measurement: Expression,
+        /,
+    ) -> tuple[Expression, Expression, Expression]:
         """Mean (N, 1) and covariance (N, N) after readings, and the covariance of the innovations (m, m).
 
         Args:
@@ -87,7 +93,9 @@ class Matrices:
         told, news = known[:, : mean.shape[0]], known[:, mean.shape[0] :]
         return mean + told.T @ news, covariance - told.T @ told, spread
 
-    def propagated(self, A: Any, J: Any | None, P: Any, process: Any, dt: float, /) -> Any:
+    def propagated(
+        self, A: Expression, J: Expression | None, P: Expression, process: Expression, dt: float, /
+    ) -> Expression:
         """The covariance (N, N) one sample later.
 
         Args:

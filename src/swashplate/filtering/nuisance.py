@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from swashplate.filtering.disturbances import DISTURBED, on_axes
+from swashplate.physics.backend import Scalar
 
 
 class Nuisance(NamedTuple):
@@ -18,24 +19,24 @@ class Nuisance(NamedTuple):
     [m/s^2, rad/s^2], with which the filter's drifts begin (a battery that is not in the middle, a bent blade).
     """
 
-    delay_servo: Any = 0.0
-    delay_motor: Any = 0.0
-    trim_motor_lower: Any = 0.0
-    trim_motor_upper: Any = 0.0
-    trim_servo_roll: Any = 0.0
-    trim_servo_pitch: Any = 0.0
-    lever_x: Any = 0.0
-    lever_y: Any = 0.0
-    lever_z: Any = 0.0
-    level_phi: Any = 0.0
-    level_theta: Any = 0.0
-    level_psi: Any = 0.0
-    push_u: Any = 0.0
-    push_v: Any = 0.0
-    push_w: Any = 0.0
-    push_p: Any = 0.0
-    push_q: Any = 0.0
-    push_r: Any = 0.0
+    delay_servo: Scalar = 0.0
+    delay_motor: Scalar = 0.0
+    trim_motor_lower: Scalar = 0.0
+    trim_motor_upper: Scalar = 0.0
+    trim_servo_roll: Scalar = 0.0
+    trim_servo_pitch: Scalar = 0.0
+    lever_x: Scalar = 0.0
+    lever_y: Scalar = 0.0
+    lever_z: Scalar = 0.0
+    level_phi: Scalar = 0.0
+    level_theta: Scalar = 0.0
+    level_psi: Scalar = 0.0
+    push_u: Scalar = 0.0
+    push_v: Scalar = 0.0
+    push_w: Scalar = 0.0
+    push_p: Scalar = 0.0
+    push_q: Scalar = 0.0
+    push_r: Scalar = 0.0
 
 
 DELAYS = ("delay_servo", "delay_motor")

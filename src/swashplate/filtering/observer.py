@@ -11,19 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.engine.equations import Equations
+from swashplate.engine.graph import Expression, Row
 from swashplate.engine.slopes import slopes_of
 from swashplate.errors import ControllerError
 from swashplate.filtering.disturbances import DISTURBED, Unrest, on_axes
 from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.sensor_suite import BIASED, Suite, biased, readings
 from swashplate.models.nesting import rebuild
-from swashplate.physics.backend import Backend
+from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
@@ -145,18 +146,18 @@ class Numbers(NamedTuple):
         steady: constant gains through a cycle, (period, N, channels); None where the observer finds them as it flies.
     """
 
-    parameters: Any
-    fade: Any
-    process: Any
-    measurement: Any
-    steady: Any = None
+    parameters: Scalar
+    fade: Scalar
+    process: Scalar
+    measurement: Scalar
+    steady: Scalar = None
 
 
 class ObserverEstimate(NamedTuple):
     """Estimates, a column (N, 1), and their covariance (N, N), or (0, 0) with constant gains."""
 
-    mean: Any
-    covariance: Any
+    mean: Scalar
+    covariance: Scalar
 
 
 def process_noise(plan: ObserverPlan, unrest: Unrest) -> tuple[Array, Array]:
@@ -188,7 +189,7 @@ def start_variance(plan: ObserverPlan, unrest: Unrest) -> Array:
 
 
 # ---- scalar functions --------------------------------------------------------------------------------------------
-def _surrounded(plan: ObserverPlan, numbers: Any, e: Sequence[Any], voltage: Any) -> tuple[Any, Environment]:
+def _surrounded(plan: ObserverPlan, numbers: Scalar, e: Row, voltage: Scalar) -> tuple[Scalar, Environment]:
     vehicle = plan.equations.vehicle
     count = len(vehicle.parameter_names)
     slow = dict(zip(plan.slow, e[plan.moves - len(plan.slow) : plan.moves], strict=True))
@@ -198,7 +199,7 @@ def _surrounded(plan: ObserverPlan, numbers: Any, e: Sequence[Any], voltage: Any
     return parameters, Environment(voltage=voltage, air_density=numbers[count], gravity=numbers[count + 1])
 
 
-def moving(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+def moving(plan: ObserverPlan, numbers: Numbers, e: Row, w: Row, xp: Backend) -> list[Scalar]:
     """Rates of everything estimated; `w` is the inputs and the voltage."""
     vehicle, n = plan.equations.vehicle, plan.n
     parameters, around = _surrounded(plan, numbers.parameters, e, w[plan.inputs])
@@ -211,7 +212,7 @@ def moving(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[A
     return [*rates, *fading, *[0.0] * (len(e) - n - 6)]
 
 
-def shown(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+def shown(plan: ObserverPlan, numbers: Numbers, e: Row, w: Row, xp: Backend) -> list[Scalar]:
     """What every sensor would read now of an estimate, channel by channel."""
     vehicle, n = plan.equations.vehicle, plan.n
     body = RigidBody(*e[:_BODY])
@@ -235,7 +236,7 @@ def pieces(plan: ObserverPlan) -> list[tuple[Sampling, slice, int]]:
     return placed
 
 
-def arriving(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+def arriving(plan: ObserverPlan, numbers: Numbers, e: Row, w: Row, xp: Backend) -> list[Scalar]:
     """What should arrive now: fresh readings, and for late sensors the oldest one kept."""
     now = shown(plan, numbers, e, w, xp)
     for at, part, place in pieces(plan):
@@ -245,7 +246,7 @@ def arriving(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence
     return now
 
 
-def keeping(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+def keeping(plan: ObserverPlan, numbers: Numbers, e: Row, w: Row, xp: Backend) -> list[Scalar]:
     """Estimates with the readings taken now put in store; `w` ends in a flag per sensor: 1 where it takes one."""
     now, after = shown(plan, numbers, e, w, xp), list(e)
     for number, (at, part, place) in enumerate(pieces(plan)):
@@ -256,7 +257,7 @@ def keeping(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[
     return after
 
 
-OfObserver = Callable[[ObserverPlan, Numbers, Sequence[Any], Sequence[Any], Backend], list[Any]]
+OfObserver = Callable[[ObserverPlan, Numbers, Row, Row, Backend], list[Scalar]]
 """`shown`, `keeping`."""
 
 
@@ -272,11 +273,11 @@ def corrected(
     plan: ObserverPlan,
     numbers: Numbers,
     estimate: ObserverEstimate,
-    y: Any,
-    due: Sequence[Any],
-    w: Any,
+    y: Scalar,
+    due: Row,
+    w: Scalar,
     M: Matrices,
-) -> tuple[ObserverEstimate, Any, Any]:
+) -> tuple[ObserverEstimate, Expression, Expression]:
     """The estimate after the readings that are due, the innovations (channels, 1) and their covariance.
 
     Args:
@@ -291,7 +292,7 @@ def corrected(
     flags = [flag for flag, sensor in zip(due, plan.sensors, strict=True) for _ in sensor.channels]
     first = plan.inputs + 1
 
-    def heard(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
+    def heard(e: Row, w: Row) -> list[Scalar]:
         """What arrives now; zero, whatever is estimated, of what does not."""
         now = arriving(plan, numbers, e, w[:first], xp)
         return [flag * value for flag, value in zip(w[first:], now, strict=True)]
@@ -302,7 +303,7 @@ def corrected(
     return ObserverEstimate(mean, covariance), innovations, spread
 
 
-def innovations_of(plan: ObserverPlan, y: Any, expected: Any, M: Matrices) -> list[Any]:
+def innovations_of(plan: ObserverPlan, y: Scalar, expected: Scalar, M: Matrices) -> list[Scalar]:
     """Readings less what was expected, headings the short way round."""
     away = M.scalars(y - expected)
     for i, name in enumerate(plan.channels):
@@ -312,7 +313,7 @@ def innovations_of(plan: ObserverPlan, y: Any, expected: Any, M: Matrices) -> li
 
 
 def predicted(
-    plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Any, taken: Sequence[Any], M: Matrices
+    plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Scalar, taken: Sequence[Scalar], M: Matrices
 ) -> ObserverEstimate:
     """The estimate one sample later.
 
@@ -325,7 +326,7 @@ def predicted(
     begin, P = estimate
     moves, own = plan.moves, plan.moves + len(plan.biases)
 
-    def rates(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
+    def rates(e: Row, w: Row) -> list[Scalar]:
         return moving(plan, numbers, e, w, xp)
 
     x = begin[:moves, :]
@@ -334,7 +335,7 @@ def predicted(
     mean, J = [x + moved, begin[moves:own, :]], None
     if any(at.kept for at in plan.sampling):
 
-        def kept(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
+        def kept(e: Row, w: Row) -> list[Scalar]:
             return keeping(plan, numbers, e, w, xp)[own:]
 
         readings, J = M.linearised(kept, begin, M.column([*M.scalars(w), *taken]))

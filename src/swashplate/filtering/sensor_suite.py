@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from swashplate.errors import ControllerError
 from swashplate.physics.backend import Backend, Scalar
@@ -146,7 +146,7 @@ def readings(
         bias: of the channels in `biased`.
         xp: the operations.
     """
-    shown: dict[str, Any] = {
+    shown: dict[str, Scalar] = {
         **body._asdict(),
         "ax": force.x,
         "ay": force.y,

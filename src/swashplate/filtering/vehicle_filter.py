@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.compiled import can_compile
 from swashplate.engine.equations import CONSTANTS, Equations
+from swashplate.engine.graph import Expression, Graph
 from swashplate.engine.roots import require_casadi
 from swashplate.engine.trace import traced_force, unrolled_rates
 from swashplate.filtering.filter_c import Sample, sample_source
@@ -124,14 +124,16 @@ def _library(equations: Equations, seen: tuple[int, ...]) -> FilterLibrary:
     return FilterLibrary(sample_source(equations, Sample(correct, range(n), rated=rated, linear=True)), m)
 
 
-def _told(equations: Equations, seen: tuple[int, ...], x: Any, w: Any, p: Any, shift: Any) -> Any:
+def _told(
+    equations: Equations, seen: tuple[int, ...], x: Expression, w: Expression, p: Expression, shift: Expression | float
+) -> Expression:
     """What is measured, in symbols."""
     every = require_casadi().vertcat(x, unrolled_rates(equations)(x, w, p) + shift, traced_force(equations)(x, w, p))
     return every[list(seen)]
 
 
 @lru_cache(maxsize=16)
-def _linear(equations: Equations, seen: tuple[int, ...]) -> Any:
+def _linear(equations: Equations, seen: tuple[int, ...]) -> Graph:
     """(x, w, p, dx, dp) to the slopes by x of rates and outputs, and how these move."""
     casadi, rates = require_casadi(), unrolled_rates(equations)
     (x, w, p), (dx, dp) = ([casadi.SX.sym("s", rates.size1_in(i)) for i in places] for places in ((0, 1, 2), (0, 2)))
@@ -143,7 +145,7 @@ def _linear(equations: Equations, seen: tuple[int, ...]) -> Any:
 
 
 @lru_cache(maxsize=16)
-def _sample(equations: Equations, seen: tuple[int, ...], dt: float) -> Any:
+def _sample(equations: Equations, seen: tuple[int, ...], dt: float) -> Graph:
     """A sample in symbols: (state, drive and reading, numbers), the first and last with a direction behind, to the next
     state and (error, corrected state) likewise."""
     casadi, rates = require_casadi(), unrolled_rates(equations)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array, Complex
 from swashplate.filtering.riccati import steady_gain, steady_gain_moved
 from swashplate.simulation.discretisation import held_series
 
@@ -16,7 +14,7 @@ STEP = 1e-30
 _HALVINGS, _TERMS = 8, 5
 
 
-def gathered_noise(A: NDArray[Any], W: NDArray[Any], dt: float) -> tuple[Any, Any]:
+def gathered_noise(A: Array | Complex, W: Array | Complex, dt: float) -> tuple[Array | Complex, Array | Complex]:
     """Transition e^(A dt) and the noise gathered meanwhile, the integral of e^(As) W e^(A's).
 
     Series over a small part of the sample, then doubled (Smith 1968, SIAM J. Appl. Math. 16, 198-201): of Van Loan's
@@ -39,8 +37,8 @@ def gathered_noise(A: NDArray[Any], W: NDArray[Any], dt: float) -> tuple[Any, An
 
 
 def white_noise_gain(
-    A: NDArray[Any], intensity: NDArray[Any], C: NDArray[Any], sensors: NDArray[Any], dt: float
-) -> tuple[Any, Any]:
+    A: Array | Complex, intensity: Array | Complex, C: Array | Complex, sensors: Array | Complex, dt: float
+) -> tuple[Array | Complex, Array | Complex]:
     """Gains x + K e (k, n, m) and innovations' covariances (k, m, m) of one model with complex steps in its numbers.
 
     Where no filter settles they are not finite.
