@@ -18,7 +18,7 @@ import swashplate as sp
 from swashplate.control.analysis.straightness import command_for_speed, paths_of, step_paths
 from swashplate.control.draws.robustness import draw_models
 from swashplate.control.laws.autopilot import autopilot
-from swashplate.control.laws.learning import corrected_by_step, drift_sources
+from swashplate.control.laws.learning import corrected_by_step
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 
 SPEED, TAUGHT = 1.8, 100
@@ -45,8 +45,6 @@ def main(folder: Path, models: int) -> None:
     print("without", told(flown(bare, **drawn)))
     drift = flown(law, **drawn)
     print("with   ", told(drift))
-    shares, explained = drift_sources(drift, drawn)
-    print(f"shares of the variance (a line explains {100 * explained:.0f} %):", dict(shares))
     alone: dict[bytes, list[str]] = {}
     for name, values in drawn.items():
         alone.setdefault(values.tobytes(), []).append(name)  # tied numbers move together

@@ -19,7 +19,7 @@ from swashplate.control.draws.robustness import draw_models
 from swashplate.control.lateness import lateness
 from swashplate.control.laws.autopilot import Autopilot, Mode, autopilot
 from swashplate.control.laws.decoupling import Lag, estimated_lag
-from swashplate.control.laws.learning import corrected_by_step, drift_sources, straightened
+from swashplate.control.laws.learning import corrected_by_step, straightened
 from swashplate.errors import SwashError
 from swashplate.export.controller_c import ControllerCode, Precision, controller_code
 from swashplate.identification.core.result import Result
@@ -49,15 +49,11 @@ class FlownStep:
         draws: how many models were drawn, or flights flown in gusts.
         many: what the many flights are, in words; empty where there are none.
         gusts: that each of them had of its own, None for still air; the first run of the model has none.
-        sources: of the drift's variance over them: numbers and their shares.
-        explained: share of it that a line explains.
     """
 
     command: float
     runs: Mapping[str, StepRun]
     draws: int
-    sources: tuple[tuple[str, float], ...] = ()
-    explained: float = 0.0
     many: str = ""
     gusts: Gusts | None = None
 
@@ -94,11 +90,6 @@ class FlownStep:
         told = ", ".join(f"than {name} on {wins} of {of}" for name, (wins, of) in self.nearer_than().items())
         if told:
             lines.append(f"\nof {self.draws} {self.many}, the law ends nearer to straight ahead {told}")
-        if self.sources:
-            told = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in self.sources[:4])
-            lines.append(
-                f"\nof the drift's variance with the law: {told} (a line explains {100.0 * self.explained:.0f} %)"
-            )
         return "\n".join(lines)
 
 
@@ -158,8 +149,7 @@ class DecouplingDesign(Shown):
         if self.margins is not None:
             document["margins"] = margins_document(self.margins)
         if self.step is not None:
-            sources = dict(self.step.sources)
-            document["step"] = {"command": self.step.command, **self.step.figures(), "drift_sources": sources}
+            document["step"] = {"command": self.step.command, **self.step.figures()}
             if against := self.step.nearer_than():
                 gusts = None if self.step.gusts is None else asdict(self.step.gusts)
                 document["step"] |= {"nearer_than": against, "gusts": gusts}
@@ -178,7 +168,6 @@ class DecouplingDesign(Shown):
             self.step.runs,
             command=self.step.command,
             lag=self.lag(),
-            sources=self.step.sources,
             many=self.step.many,
             nearer_than=self.step.nearer_than(),
             title=title,
@@ -338,8 +327,6 @@ def _flown(
         for name, controller in flown.items()
         if controller is not None
     }
-    spread = runs["with"].drawn
-    if spread is None:
+    if runs["with"].drawn is None:
         return FlownStep(step, runs, many.draws)
-    sources, explained = ((), 0.0) if drawn is None else drift_sources(spread.drift, drawn)
-    return FlownStep(step, runs, many.draws, tuple(sources), explained, many.words(), many.gusts)
+    return FlownStep(step, runs, many.draws, many.words(), many.gusts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,6 @@ def compose_straightness(
     *,
     command: float,
     lag: float,
-    sources: Sequence[tuple[str, float]] = (),
     many: str = "",
     nearer_than: Mapping[str, tuple[int, int]] | None = None,
     title: str | None = None,
@@ -46,7 +45,6 @@ def compose_straightness(
         runs: "without" and "with" the decoupling, from `step_run`; "by the paper" where the lag was chosen by flying.
         command: the step of the pitch command.
         lag: that the law takes out at hover [deg].
-        sources: of the drawn models' drift, from `drift_sources`.
         many: what the many flights are, in words.
         nearer_than: on how many of the same drawn flights the law ends nearer to straight ahead, from `nearer`.
         title: heading.
@@ -73,7 +71,7 @@ def compose_straightness(
         banners=(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),),
         summary=tuple(summary),
         picture=_path_figure(runs, many),
-        sections=(_numbers(runs, lag, vehicle, sources), _time(runs), _provenance(vehicle)),
+        sections=(_numbers(runs, lag), _time(runs), _provenance(vehicle)),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
@@ -134,24 +132,7 @@ def _path_figure(runs: Mapping[str, StepRun], many: str) -> Figure:
     )
 
 
-def _sources(vehicle: Vehicle, sources: Sequence[tuple[str, float]]) -> Table:
-    card = vehicle.card.parameters
-    rows = tuple(
-        (Cell(name), Cell(card[name].unit if name in card else ""), Cell(f"{100.0 * share:.0f}", number=True))
-        for name, share in sources
-    )
-    return Table(
-        "What makes the drawn models' drift differ, with the law",
-        ("number", "unit", "share of the variance [%]"),
-        rows,
-        note="Linear regression over the drawn models. A step flown once with the law measures it: "
-        "`swash control decouple ... --drift` corrects the law by what was measured.",
-    )
-
-
-def _numbers(
-    runs: Mapping[str, StepRun], lag: float, vehicle: Vehicle, sources: Sequence[tuple[str, float]]
-) -> Section:
+def _numbers(runs: Mapping[str, StepRun], lag: float) -> Section:
     rows = []
     for name, run in runs.items():
         of_model = [float(getattr(run.path, key)[0]) for key in ("drift", "leftmost", "rightmost", "speed", "time")]
@@ -173,8 +154,6 @@ def _numbers(
             "they bend the path; a lag that was chosen in flights of the model allows for them."
         ),
     ]
-    if sources:
-        blocks.append(_sources(vehicle, sources))
     return Section("path", "The path in numbers", tuple(blocks))
 
 

@@ -1,20 +1,16 @@
 """What a flown step teaches the decoupling: the lag that flies straight, and how the lower rotor tilts with speed.
 
-The identified models that a hover flight cannot tell apart differ most in that tilt (`drift_sources` says so for any
-fit), and a path that bends with the law on is its measurement.
+The identified models that a hover flight cannot tell apart differ most in that tilt, and a path that bends with the law
+on is its measurement.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from swashplate.arrays import Array
 from swashplate.control.analysis.straightness import step_paths
 from swashplate.control.laws.autopilot import Autopilot
 from swashplate.errors import ControllerError
@@ -26,8 +22,6 @@ _NUDGE = 0.004
 _FURTHEST_LAG = math.radians(40.0)
 """Either way of the rotor's own lag; a step that needs more is not bent by a lag."""
 _LAG_TOLERANCE = math.radians(0.02)
-_MODELS_PER_NUMBER = 5
-"""Fewer models than that for each number, and a regression explains what is chance."""
 
 
 def straightened(
@@ -122,39 +116,3 @@ def corrected_by_step(
     ]
     slope = (ends[1] - ends[0]) / _NUDGE
     return with_tilt(-drift / slope)
-
-
-def drift_sources(
-    drift: ArrayLike, drawn: Mapping[str, ArrayLike], *, least: float = 0.01
-) -> tuple[Sequence[tuple[str, float]], float]:
-    """Which drawn numbers make the spread of a drift: shares of its variance, and how much a line explains.
-
-    Regression of the drift on the standardised numbers; the share of a number is the covariance of its part with the
-    drift over the variance (shares add up to R^2; a number that others undo has a negative one).
-
-    Args:
-        drift: of each model, NaN where the distance was not covered, shape (models,).
-        drawn: numbers of the models by name, shape (models,) each; numbers that move together count once.
-        least: shares smaller than this are left out.
-
-    Returns:
-        (name, share), largest first, and R^2; nothing where there are too few models for a regression.
-    """
-    y = np.asarray(drift, dtype=np.float64)
-    arrived = np.isfinite(y)
-    columns: dict[str, Array] = {}
-    for name, values in drawn.items():
-        x = np.asarray(values, dtype=np.float64)[arrived]
-        spread = float(np.std(x))
-        if spread > 0.0:
-            x = (x - np.mean(x)) / spread
-            if not any(np.allclose(x, other) for other in columns.values()):
-                columns[name] = x
-    y = y[arrived] - np.mean(y[arrived])
-    if y.size < _MODELS_PER_NUMBER * len(columns) or not columns:
-        return (), 0.0
-    X = np.column_stack(list(columns.values()))
-    slopes = np.linalg.lstsq(X, y, rcond=None)[0]
-    shares = {name: float(b * (x @ y) / (y @ y)) for b, (name, x) in zip(slopes, columns.items(), strict=True)}
-    ordered = sorted(shares.items(), key=lambda item: -abs(item[1]))
-    return tuple((name, share) for name, share in ordered if abs(share) >= least), float(sum(shares.values()))

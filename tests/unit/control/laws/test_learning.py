@@ -1,4 +1,4 @@
-"""A flown step teaches the decoupling what a hover leaves open, and the spread of many paths is told by its sources."""
+"""A flown step teaches the decoupling what a hover leaves open."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import swashplate as sp
 from swashplate.control.analysis.straightness import step_paths
 from swashplate.control.laws import learning
 from swashplate.control.laws.autopilot import Autopilot, autopilot
-from swashplate.control.laws.learning import corrected_by_step, drift_sources, straightened
+from swashplate.control.laws.learning import corrected_by_step, straightened
 from swashplate.errors import ControllerError
 
 
@@ -71,15 +71,3 @@ def test_a_path_that_no_lag_makes_straight_is_refused() -> None:
     bent = coax.with_values({"a_alpha_u_linear": 0.12}, status="identified", source="a test")
     with pytest.raises(ControllerError, match=r"no constant lag makes a step of 0\.2 end straight ahead"):
         straightened(bent, law, sp.trim(bent), command=0.2)
-
-
-def test_sources_add_up_and_tied_numbers_count_once() -> None:
-    random = np.random.default_rng(0)
-    a, b, c = random.standard_normal((3, 4000))
-    shares, explained = drift_sources(3.0 * a + b + 0.1, {"a": 5.0 + 2.0 * a, "twin": a, "b": -b, "c": c, "d": 0.0 * c})
-    assert [name for name, _ in shares] == ["a", "b"]
-    assert dict(shares)["a"] == pytest.approx(0.9, abs=0.02)
-    assert explained == pytest.approx(1.0, abs=1e-9)
-    drift = np.where(a > 2.0, np.nan, a)  # some never arrived
-    assert drift_sources(drift, {"a": a})[0][0][0] == "a"
-    assert drift_sources([1.0, 2.0, 3.0, 3.5], {"a": [1.0, 2.0, 3.0, 4.0]}) == ((), 0.0)  # too few to tell
