@@ -177,6 +177,23 @@ def test_a_card_opens_a_flight_that_ships_and_names_its_command(browser: Any, ad
     visit.close()
 
 
+@pytest.mark.parametrize(("size", "theme"), [("desk", "dark"), ("telephone", "light")])
+def test_an_ordinary_flight_is_answered(size: str, theme: str, browser: Any, address: str) -> None:
+    """On a desk unasked; an incident is a time in the plots."""
+    visit = Visit(browser, address, size, theme)
+    visit.page.click("[data-try='ordinary_flight.bin']")
+    drawn(visit)
+    if size == "telephone":
+        visit.view("review")
+    visit.until("document.getElementById('review').dataset.drawn")
+    told = visit.text("#review")
+    for words in ("oscillat", "Step response, roll", "Noise of p", "SID_AXIS"):
+        assert words in told
+    visit.page.locator("#review tr.go").first.click()
+    visit.until("swash.state.seen.low > 90 && swash.state.seen.high < 120")
+    visit.close()
+
+
 def test_a_strangers_table_is_mapped_in_a_dialog(browser: Any, address: str, tmp_path: Path) -> None:
     wave = np.sin(0.04 * np.arange(500))
     rows = (f"{0.01 * k:.2f};{20 * x:.3f};{-50 * x:.3f}".replace(".", ",") for k, x in enumerate(wave.tolist()))

@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 _LARGEST = 1e30  # in the channel's unit: no sensor reaches it, and its square is still a number
 _COMMANDS = {"motor_lower": (0, 1), "motor_upper": (0, 1), "servo_roll": (-1, 1), "servo_pitch": (-1, 1)}
 """Ranges of commands."""
-_STILL = ("rcin_", "rcout_", "omega_", "pid_", "sid_", "voltage", "current", "airspeed", "wind_")
+_STILL = (
+    "rcin_", "rcout_", "omega_", "pid_", "sid_", "voltage", "current", "airspeed", "wind_", "gps_", "clips", "vibe_",
+)  # fmt: skip
 """Channels that may stand still all flight: switches and unused outputs, governed rotors, terms of gains that are zero,
-sensors that are not there. Set-points may too."""
+sensors that are not there, how well satellites are seen, and what counts faults. Set-points may too."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from starlette.types import ASGIApp
 from swashplate.links.logs import requests as ask
 from swashplate.links.logs.columns import apply_columns, columns_of
 from swashplate.links.logs.desk import BINS, MOST_LOGS, Desk
+from swashplate.links.logs.flight_review import review_of
 from swashplate.links.logs.map import map_of
 from swashplate.links.logs.remedies import Remedy
 from swashplate.links.logs.spectra import spectra
@@ -114,6 +115,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             rows=ask.rows(300, ask.whole(0, 10_000), _NAME, ask.text(60, least=0), ask.number, ask.number),
             rate=ask.number,
         ),
+        _post("/review", lambda log: review_of(desk.log(log)), log=_LOG),
         _post("/map", lambda log: map_of(desk.log(log)), log=_LOG),
         _post("/track", lambda log: track(desk.log(log)), log=_LOG),
         _post("/align", desk.align, first=_LOG, second=_LOG),

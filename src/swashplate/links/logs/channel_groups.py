@@ -20,6 +20,7 @@ _GROUPS = (
     ("Specific force", ("ax", "ay", "az")),
     ("Rotors", ("omega", "alpha", "beta", "eta", "zeta")),
     ("Battery", ("voltage", "current")),
+    ("GPS and vibration", ("gps", "vibe", "clips")),
     ("Radio", ("rcin", "rcout")),
 )
 OTHER = "Other"

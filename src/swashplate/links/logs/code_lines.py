@@ -84,6 +84,14 @@ def inspected(read: Read) -> Code:
     )
 
 
+def reviewed(read: Read) -> Code:
+    """What a flight tells without a sweep."""
+    shell = " ".join(part for part in ("swash inspect", read.named(), read.words) if part)
+    return Code(
+        f"Review {PurePath(read.file).name}", shell, "\n".join([IMPORT, read.python(), "print(sp.review(flight))"])
+    )
+
+
 def plotted(reads: Sequence[Read], channels: Sequence[Sequence[str]], span: tuple[float, float] | None) -> Code:
     """Channels of one or several logs over time, one figure a log; `span` is that of the first log [s]."""
     lines = [IMPORT]

@@ -70,7 +70,7 @@ function nyquist(worth) {
 }
 
 export function gains(home, axis) {
-  const start = axis.gains.map((gain) => gain.suggested ?? gain.flown), values = start.slice();
+  const values = (axis.mine ??= axis.gains.map((gain) => gain.suggested ?? gain.flown)); // kept while the page is drawn anew
   const of = axis.loop;
   const has = (which) => axis.gains.some((gain) => gain[which] !== null);
   const worth = { flown: has("flown") ? figures(of, loopOf(axis, axis.gains.map((g) => g.flown))) : null, suggested: has("suggested") ? figures(of, loopOf(axis, axis.gains.map((g) => g.suggested))) : null };

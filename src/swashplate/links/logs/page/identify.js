@@ -55,7 +55,7 @@ const begin_button = (log, sweep, words) => make("button", { class: "first", "da
 
 function list() {
   const all = ready().flatMap((log) => log.sweeps.map((sweep) => [log, sweep])), together = several();
-  if (!all.length) return make("p", { class: "soft" }, ready().some((log) => !log.checked) ? "Sweeps are being looked for …" : NO_SWEEP);
+  if (!all.length) return make("div", {}, make("p", { class: "soft" }, ready().some((log) => !log.checked) ? "Sweeps are being looked for …" : NO_SWEEP), make("button", { onclick: () => view("review") }, "What the flight tells without one"));
   const rows = all.map(([log, sweep]) => make("li", { class: "fine" }, make("b", {}, label(sweep)), make("div", { class: "soft" }, `${ready().length > 1 ? `${log.name}, ` : ""}${sweep.words.split(": ").slice(1).join(": ")}`), together ? "" : begin_button(log, sweep, "Identify this")));
   return make("div", {}, make("ul", { class: "cards" }, ...rows), together ? begin_button(...all[0], "Identify them together") : "");
 }

@@ -11,6 +11,7 @@ import * as log_list from "./log_list.js";
 import * as map from "./map.js";
 import * as parameters from "./parameters.js";
 import * as plots from "./plots.js";
+import * as review from "./review.js";
 import { post } from "./server.js";
 import * as spectrum from "./spectrum.js";
 import * as start from "./start.js";
@@ -23,7 +24,7 @@ import * as views from "./views.js";
 const LOOPS = { "Roll rate": ["p_demand", "p"], "Pitch rate": ["q_demand", "q"], "Yaw rate": ["r_demand", "r"] }; // of a log that tunes: target and actual
 const FIRST = { Rates: 3, Attitude: 3, Commands: 4, Position: 3 }; // channels that are drawn unasked, by group
 const MOST = 3; // charts of them
-let known = "";
+let known = "", answered = 0;
 
 // What is drawn of a log that has just come: targets and what came of them, else rates, attitude and commands where it has
 // them, else its first channels.
@@ -51,8 +52,18 @@ function greet() {
   state.say("charts");
 }
 
-for (const part of [trouble, code, views, channel_list, columns, log_list, plots, gestures, findings, events, parameters, spectrum, map, track, identify, drop, start]) part.begin();
+// A flight without a sweep, whose loops the log tells of, is answered unasked; a person who has chosen a view keeps it.
+function answer() {
+  const [log] = state.ready();
+  if (!log?.checked || answered === log.id) return;
+  answered = log.id;
+  const loops = Object.values(LOOPS).some((pair) => pair.every((name) => state.channels().has(name)));
+  if (loops && !log.sweeps.length && document.body.dataset.view === "findings" && !matchMedia("(max-width: 900px)").matches) views.view("review");
+}
+
+for (const part of [trouble, code, views, channel_list, columns, log_list, plots, gestures, findings, events, parameters, spectrum, map, track, review, identify, drop, start]) part.begin();
 state.on("logs", greet);
+state.on("logs", answer);
 theme.begin();
 const told = await log_list.refresh();
 if (told) {

@@ -3,7 +3,7 @@ import { $, make } from "./make.js";
 import { ready, say } from "./state.js";
 
 const VIEWS = [
-  ["channels", "Channels"], ["plots", "Plots"], ["findings", "Findings"], ["events", "Events"], ["parameters", "Parameters"],
+  ["channels", "Channels"], ["plots", "Plots"], ["review", "Flight"], ["findings", "Findings"], ["events", "Events"], ["parameters", "Parameters"],
   ["spectrum", "Spectrum"], ["map", "Map"], ["track", "3-D"], ["identify", "Identify"], ["code", "Code"],
 ];
 
