@@ -24,6 +24,7 @@ from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.time.output_error import OutputError
+from swashplate.models.coax_choices import CHOICES
 
 WARM = {"output-error": 5.0, "filter-error": 12.0}
 COLD = 60.0
@@ -68,7 +69,7 @@ def identify(method: str, logged: sp.Flight, *, iterations: int = 60) -> float:
     begin = time.perf_counter()
     fit = sp.identify(_start(), logged, free="full", method=method, keep_unexcited=True, iterations=iterations)
     seconds = time.perf_counter() - begin
-    assert len(fit.names) == len(sp.CHOICES["full"].free)
+    assert len(fit.names) == len(CHOICES["full"].free)
     return seconds
 
 

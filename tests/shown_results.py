@@ -13,7 +13,12 @@ from swashplate.api.autopilot_gains import AutopilotGains
 from swashplate.api.check_autopilot import AutopilotCheck
 from swashplate.api.designed_maneuver import DesignedManeuver, Offer
 from swashplate.control.analysis.cascade_gains import LoopWorth
+from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
+from swashplate.flights.conditioning.reconstruction import reconstruct
 from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.planned import plan_maneuver
+from swashplate.flights.maneuvers.series import parse as maneuver
+from swashplate.identification.time.equation_error import equation_error
 
 
 def shaken() -> Flight:
@@ -37,7 +42,7 @@ def reconstruction() -> Any:
     }
     noise = np.random.default_rng(4)
     noisy = {name: values + 0.003 * noise.standard_normal(time.size) for name, values in rates.items()}
-    return sp.reconstruct(Flight.from_arrays(time, {**angles, **noisy}, source="turned.csv"))
+    return reconstruct(Flight.from_arrays(time, {**angles, **noisy}, source="turned.csv"))
 
 
 def sweep() -> Flight:
@@ -57,17 +62,17 @@ def responses() -> Any:
 def equation() -> Any:
     rng = np.random.default_rng(2)
     x = rng.standard_normal((200, 2))
-    return sp.equation_error(x @ [2.0, -0.5] + 0.1 * rng.standard_normal(200), x, ["Lp", "Lv"])
+    return equation_error(x @ [2.0, -0.5] + 0.1 * rng.standard_normal(200), x, ["Lp", "Lv"])
 
 
 def steps() -> Any:
     model = sp.fit_transfer_function(responses(), "0/1", input="servo_roll", outputs=["p"]).model
-    return sp.rate_loop_steps(model, {"P": 0.1, "FF": 0.2}, rate="p", command="servo_roll")
+    return rate_loop_steps(model, {"P": 0.1, "FF": 0.2}, rate="p", command="servo_roll")
 
 
 def designed() -> DesignedManeuver:
     names = ("tau_f_upper", "linkage_lower")
-    pieces = tuple(sp.maneuver(f"sweep:{axis},0.8-8Hz,5s,0.2") for axis in ("roll", "pitch"))
+    pieces = tuple(maneuver(f"sweep:{axis},0.8-8Hz,5s,0.2") for axis in ("roll", "pitch"))
     peaks = {"attitude": 9.0, "rate": 80.0, "place": 0.9}
     bounds = {"tau_f_upper": 0.1, "linkage_lower": 0.001}
     limits = {"attitude": 20.0, "rate": 120.0, "place": 3.0, "seconds": 10.0}
@@ -96,7 +101,7 @@ MAKE = {
     "harmonics": lambda: sp.harmonics(shaken(), "p"),
     "reconstruction": reconstruction,
     "equation error": equation,
-    "planned maneuver": lambda: sp.plan_maneuver("sweep:pitch,0.5-8Hz,20s,0.1"),
+    "planned maneuver": lambda: plan_maneuver("sweep:pitch,0.5-8Hz,20s,0.1"),
     "designed maneuver": designed,
     "autopilot's gains": gains,
     "steps of a rate loop": steps,

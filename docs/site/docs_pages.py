@@ -88,8 +88,9 @@ def trust_text() -> str:
 def choices_text() -> str:
     """The ready choices of free parameters with their priors."""
     import swashplate as sp
+    from swashplate.models.coax_choices import CHOICES
 
-    coax = "\n\n".join(map(_choice, sp.CHOICES.values()))
+    coax = "\n\n".join(map(_choice, CHOICES.values()))
     others = "\n\n".join(map(_choice, sp.vehicle("raptor50", bar=True).choices.values()))
     words = "A single-rotor helicopter's take their priors from its card; here those of `raptor50` with `bar = true`."
     return f"For the CoaX:\n\n{coax}\n\n{words}\n\n{others}"

@@ -79,7 +79,7 @@ class Command:
     @property
     def runs(self) -> bool:
         """Whether it ends by itself, without a network."""
-        served = self.line == "swash" or self.line.startswith(("swash live", "swash replay"))
+        served = self.line == "swash" or self.line.startswith("swash live")
         return self.words[0] == "swash" and not served and not self.line.startswith("swash data fetch")
 
 

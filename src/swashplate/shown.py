@@ -60,6 +60,11 @@ class Shown(Saved):
         """One figure as a `plotly.graph_objects.Figure`, to zoom and point at; arguments and errors as of `plot`."""
         return resolve("explore")(self, figure, theme=theme, frequency=frequency)
 
+    def report(self, path: str | Path, *, title: str | None = None) -> Path:
+        """A page about it: see `swashplate.report`."""
+        written: Path = resolve("report")(self, path=path, title=title)
+        return written
+
     def _repr_html_(self) -> str:
         page: str = resolve("html_of")(self)
         return page

@@ -13,8 +13,8 @@ import pytest
 from commands import one_message, saying, swash
 from scipy import signal
 
-import swashplate as sp
 from swashplate.cli.console import Progress
+from swashplate.flights.maneuvers.series import parse as maneuver
 from swashplate.identification.time.linear_simulation import delayed
 from swashplate.models.linear.state_space_file import structure
 from swashplate.simulation.discretisation import first_order_hold
@@ -36,7 +36,7 @@ def log(
     u[:, 1] = 0.0 if dead else 0.5 * u[:, 0] if doubled else u[:, 1] + 0.4 * u[:, 0]
     if swept:
         half = np.arange(n // 2) / RATE
-        sweep = sp.maneuver(f"sweep:mixer_roll,0.2-12Hz,{half[-1] - 4.0:.0f}s,0.05").signals(half - 2.0)["mixer_roll"]
+        sweep = maneuver(f"sweep:mixer_roll,0.2-12Hz,{half[-1] - 4.0:.0f}s,0.05").signals(half - 2.0)["mixer_roll"]
         u = np.zeros((n, 2))
         u[: n // 2, 0], u[n - n // 2 :, 1] = sweep, sweep
     a, b, c, _ = structure("rotor_body").with_values(TRUTH).explicit()

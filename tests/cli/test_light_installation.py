@@ -50,7 +50,7 @@ except ImportError as error:
 from pathlib import Path
 from swashplate.links.logs.app import logs_app
 try:
-    sp.open_logs("nowhere.bin")
+    open_logs("nowhere.bin")
 except sp.SwashError as error:
     assert "there is no such file" in str(error), "the verb itself runs without JAX"
 from swashplate.links.logs.desk import Desk
@@ -145,7 +145,7 @@ def test_the_light_verbs_do_without_what_the_others_name(tmp_path: Path) -> None
     for verb, code, _, err in told[len(light) : len(light) + len(heavy)]:
         assert (code, err.count("\n")) == (2, 1), err
         assert " needs the library " in err, (verb, err)
-        assert f"Install it with: pip install 'swashplate[{'plot' if verb == 'plot' else 'model'}]'" in err
+        assert f"Install it with: pip install 'swashplate[{'plot' if verb == 'inspect' else 'model'}]'" in err
     assert ran.returncode == 0, ran.stderr
     assert told[len(light) + len(heavy)] == ["open", "ready", False, ""]
     late = told[len(light) + len(heavy) + 1 :]

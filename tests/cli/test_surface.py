@@ -8,15 +8,17 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from typer.main import get_command
 
+import swashplate as sp
 from swashplate.cli.app import app
 from swashplate.cli.verbs import VERBS
 
 ROOT = Path(__file__).resolve().parents[2]
-MOST_VERBS, MOST_OPTIONS = 20, 260
+MOST_VERBS, MOST_OPTIONS, MOST_NAMES = 20, 260, 60
 HELP_SECONDS = 0.3
 """Of the processor."""
 SAME = (
@@ -78,6 +80,15 @@ def test_an_option_of_one_name_takes_the_same_everywhere() -> None:
             if p.param_type_name == "option" and p.opts[0] in SAME:
                 taken.setdefault(p.opts[0], set()).add((p.is_flag, (p.metavar or "").removesuffix("|FILE")))
     assert {flag: kinds for flag, kinds in taken.items() if len(kinds) > 1} == {}
+
+
+def test_there_are_few_public_names_and_nothing_else() -> None:
+    print(f"{len(sp.__all__)} names")
+    assert len(sp.__all__) == len(set(sp.__all__)) <= MOST_NAMES
+    others = {name for name in dir(sp) if not name.startswith("__")} - set(sp.__all__)
+    assert others == set()
+    modules = {name for name, value in vars(sp).items() if isinstance(value, ModuleType)}
+    assert {name for name in vars(sp) if not name.startswith("_")} - modules <= set(sp.__all__)
 
 
 def test_help_is_there_at_once() -> None:

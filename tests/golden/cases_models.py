@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 import swashplate as sp
+from swashplate.flights.maneuvers.series import parse
 from swashplate.models.linear.linear_vehicle import structure_of
 
 from . import extract
@@ -184,7 +185,7 @@ def maneuvers(folder: Path) -> Values:
         "3211:yaw,0.3s,0.005",
         "pulse:pitch,0.4s,0.1",
     ):
-        maneuver = sp.maneuver(text)
+        maneuver = parse(text)
         label = text.partition(",")[0]
         for axis, signal in maneuver.signals(time).items():
             busy = time[np.abs(signal) > 0]

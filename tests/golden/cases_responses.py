@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 import swashplate as sp
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.validation.verify import verify
 
 from . import extract
 from .case import Values, case, named
@@ -30,12 +32,12 @@ def ardupilot_rates(folder: Path) -> Values:
     """Roll and pitch sweeps: responses, rotor-body model, gains, an unseen log in time, and a fit in time."""
     sweeps = [sitl(f"heli_sid_{axis}_mix.BIN", *MIXER, *RATES) for axis in ("roll", "pitch")]
     responses = sp.respond(sweeps, inputs=MIXER, outputs=RATES, band=(0.1, 16.0))
-    fit = sp.fit_state_space(sp.structure("rotor_body"), responses)
+    fit = fit_state_space(sp.structure("rotor_body"), responses)
     unseen = sitl("heli_sid_allbits_roll_rate.BIN", *MIXER, *RATES)
     found = named("response", extract.of_responses(responses)) | named("model", extract.of_state_space_fit(fit))
     for s in suggest_gains(fit.solution):
         found |= {f"gain.{name}": float(value) for name, value in s.parameters.items()}
-    found |= named("verify", extract.of_verification(sp.verify(fit.solution, unseen)))
+    found |= named("verify", extract.of_verification(verify(fit.solution, unseen)))
     in_time = sp.identify(fit.solution, unseen, iterations=20)
     return found | named("time", extract.of_time_fit(in_time))
 
@@ -112,8 +114,8 @@ def r50_from_sweeps(folder: Path) -> Values:
     responses = sp.respond(sweeps, references=["sweep"], **how)
     random = np.random.default_rng(1)
     off = {n: truth.parameters[n].value * (1.0 + 0.3 * random.choice([-1.0, 1.0])) for n in truth.free}
-    fit = sp.fit_state_space(truth.with_values(off), responses)
-    unseen = sp.verify(fit.solution, r50.fly(truth, "lateral", seed=99, seconds=30.0), outputs=["p", "q", "r"])
+    fit = fit_state_space(truth.with_values(off), responses)
+    unseen = verify(fit.solution, r50.fly(truth, "lateral", seed=99, seconds=30.0), outputs=["p", "q", "r"])
     found = named("response", extract.of_responses(responses, most=3)) | named("fit", extract.of_state_space_fit(fit))
     return found | named("verify", extract.of_verification(unseen))
 

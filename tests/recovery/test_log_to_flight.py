@@ -12,6 +12,8 @@ import pytest
 import swashplate as sp
 from made_results import result
 from proof_page import leave
+from swashplate.api.demo import demo
+from swashplate.api.fly_maneuver import fly_maneuver
 from swashplate.api.monte_carlo import MonteCarlo
 from swashplate.control.draws.spread import Limits
 from swashplate.models.delays import input_delays
@@ -61,7 +63,7 @@ def test_a_design_that_knows_its_delays_flies_and_one_that_does_not_is_lost() ->
 @pytest.mark.proof
 def test_the_coax_from_its_real_log_to_a_hundred_aircraft(shared_data: Path) -> None:
     """The August flight: what the fit found of delays is flown, in still air and in gusts of 0.3 m/s."""
-    found = sp.demo()
+    found = demo()
     model = found.fit.model
     made = sp.design_controller(model, sensors=SENSORS)
     assert "identified" in made.late
@@ -89,7 +91,7 @@ def test_the_raptor_from_its_log_to_a_hundred_aircraft(tmp_path: Path) -> None:
     """Servos and 30 ms between logged command and motion: the fit finds the delay; hover, then to 10 m/s."""
     card = sp.vehicle("raptor50", servos=True)
     truth = card.with_values({"hub_stiffness": 30.0, "wake_distortion": 1.2, "blade_inertia": 0.0215})
-    log = sp.fly_maneuver(truth, "multisine:roll+pitch,0.6-5Hz,9s,0.02", sensors="clean", seed=1).flight
+    log = fly_maneuver(truth, "multisine:roll+pitch,0.6-5Hz,9s,0.02", sensors="clean", seed=1).flight
     for name in truth.input_names:  # logged 30 ms before they act
         values, late_by = log.values(name), round(0.03 * log.rate(name))
         log = log.with_channel(name, np.concatenate([values[late_by:], np.repeat(values[-1:], late_by)]), like=name)

@@ -11,6 +11,7 @@ import swashplate as sp
 from proof_page import leave
 from swashplate.flights.flight import Flight
 from swashplate.identification.frequency.response_cost import cost_of, target
+from swashplate.identification.time.equation_error import equation_error
 from swashplate.models.delays import input_delays
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
@@ -54,7 +55,7 @@ def start_values(logs: Mapping[str, Flight]) -> dict[str, float]:
     for row, letter in zip(by, "XYZLMN", strict=True):
         names = [f"{letter}{name}" for name in (*by, *SHORT.values())]
         measured = np.gradient(joined[row]) * RATE - weight.get(row, 0.0)
-        solved = sp.equation_error(measured, columns, names, dt=1.0 / RATE, band=(0.15, 1.2))
+        solved = equation_error(measured, columns, names, dt=1.0 / RATE, band=(0.15, 1.2))
         found |= dict(zip(names, map(float, np.real(solved.values)), strict=True))
     return found
 

@@ -31,6 +31,7 @@ from swashplate.filtering.sensor_suite import suite
 from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.growing import Growing
+from swashplate.flights.maneuvers.series import parse as maneuver
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.links.servos import servo_mapping
@@ -306,7 +307,7 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     "fit of a vehicle": _documents("json", lambda: (_fit_of_vehicle(),), _drawn("coax")),
     "fit of a model": _documents("json", lambda: (_fit_of_model(),), _drawn("structure")),
     "linear model": _documents("json", lambda: (_linear(),), read_linear),
-    "maneuver": _texts(MANEUVERS, sp.maneuver),
+    "maneuver": _texts(MANEUVERS, maneuver),
     "expression": _texts(EXPRESSIONS, parse_tie),
     **MORE,
 }

@@ -1,25 +1,24 @@
 """One text for each verb: a dataclass whose fields are its arguments, with type, unit, default and help.
 
-From it come the signature in Python (`as_function`), the command line (`swashplate.cli.generate`), the words of
-`--settings FILE.toml`, and the reference page. The type that a field is annotated with says how its text is read
+From it come the command line (`swashplate.cli.generate`), the words of `--settings`, the reference page and the check
+of what was given; in Python a question is asked as `Respond(flight, inputs="mixer_roll", outputs="p").answer()`.
+The type that a field is annotated with says how its text is read
 (`swashplate.api.languages`). The modules of `swashplate.api.verbs` load nothing heavy before `answer` is called.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Literal, ParamSpec, TypeVar
+from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 from swashplate.api.languages import Language, language_of
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 Answer = TypeVar("Answer")
-Given = ParamSpec("Given")
 Place = Literal["argument", "option", "setting"]
 
 
@@ -219,31 +218,3 @@ def _known(word: str, known: Mapping[str, Any], *, where: str) -> str:
 
         raise SwashError("is no setting of this verb.", where=where, channel=word, hint=nearest(name, known))
     return name
-
-
-def as_function(question: Callable[Given, VerbQuestion[Answer]]) -> Callable[Given, Answer]:
-    """A verb as Python has it: the question's fields are its arguments, by name from the first option on."""
-
-    def verb(*args: Given.args, **kwargs: Given.kwargs) -> Answer:
-        say = kwargs.pop("say", silent)
-        return question(*args, **kwargs).answer(say)  # pyrefly: ignore[bad-argument-type]
-
-    asked = typing.cast(type[VerbQuestion[Any]], question)
-    parameters = []
-    for field in sorted(fields_of(asked), key=lambda field: bool(field.kw_only)):
-        kind = inspect.Parameter.KEYWORD_ONLY if field.kw_only else inspect.Parameter.POSITIONAL_OR_KEYWORD
-        default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
-        parameters.append(inspect.Parameter(field.name, kind, default=default, annotation=field.type))
-    verb.__signature__ = inspect.Signature(parameters)  # pyrefly: ignore[missing-attribute]
-    verb.__doc__ = described(asked)
-    verb.__module__ = asked.__module__
-    return verb
-
-
-def described(question: type[VerbQuestion[Any]]) -> str:
-    """The help of a verb in Python: its docstring, and a line for each field."""
-    lines = [inspect.getdoc(question) or "", "", "Args:"]
-    for name, (_, entry) in entries(question).items():
-        unit = f" [{entry.unit}]" if entry.unit and f"[{entry.unit}]" not in entry.help else ""
-        lines.append(f"    {name}: {entry.help.rstrip('.')}{unit}.")
-    return "\n".join(lines)

@@ -37,7 +37,7 @@ VERBS: dict[str, Verb] = {
     "inspect": Verb("Show what is in logs and what is wrong with them; plot them.", "look:Inspect", LOOK),
     "respond": Verb("Frequency responses from logs of sweeps.", "respond:Respond", LOOK),
     "identify": Verb("Identify a model from flights or responses, with a report.", "identify:Identify", FLIGHTS),
-    "track": Verb("Estimate along a log, sample by sample as on board.", "identify:TrackLog", FLIGHTS),
+    "track": Verb("Estimate along a log, sample by sample as on board.", "track:TrackLog", FLIGHTS),
     "validate": Verb("Predict flights with a model and judge the predictions.", "validate:Validate", FLIGHTS),
     "compare": Verb("Responses, models or fits side by side.", "validate:Compare", FLIGHTS),
     "maneuver": Verb(

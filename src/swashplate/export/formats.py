@@ -105,7 +105,7 @@ def export_model(
     """A vehicle or a linear model in another program's format.
 
     Args:
-        model: a vehicle (packaged, a card's or identified) or a linear model, as `swash fit-ss` writes it or as
+        model: a vehicle (packaged, a card's or identified) or a linear model, as `swash identify` writes it or as
             `read_linear` and `read_matlab` read it.
         form: "c", "fmu", "control", "matlab", "simulink", "web", or another package's (`FORMATS`).
         name: what files and C functions begin with.

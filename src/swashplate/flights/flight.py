@@ -307,6 +307,29 @@ class Flight:
         )
         return conditioned
 
+    def inspect(self) -> Any:
+        """What is in it and what is wrong with it: see `swashplate.inspect`."""
+        return resolve("inspect")(self)
+
+    def respond(
+        self,
+        *,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        references: Sequence[str] = (),
+        band: tuple[float, float] | None = None,
+        windows: Sequence[float] | None = None,
+        direct: bool = False,
+    ) -> Any:
+        """Frequency responses of its outputs to its inputs: see `swashplate.respond`."""
+        channels = {"inputs": inputs, "outputs": outputs, "references": references}
+        return resolve("respond")(self, **channels, band=band, windows=windows, direct=direct)
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """A page about it: see `swashplate.report`."""
+        written: Path = resolve("report")(self, path=path)
+        return written
+
     def __repr__(self) -> str:
         name = self.provenance.source or "(unnamed)"
         lines = [f"Flight {name}: {self.duration:.1f} s, {len(self.channels)} channels"]

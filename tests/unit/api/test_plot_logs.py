@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import swashplate as sp
 from swashplate.api.plot_logs import align, plot_logs
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
@@ -49,7 +48,7 @@ def test_other_flights_are_put_by_the_clock_or_the_start_and_said_so() -> None:
 
 def test_files_of_every_kind_are_written(tmp_path: Path) -> None:
     for suffix, head in (("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG"), ("html", b"<!DOCTYPE")):
-        sp.plot_logs(_log(), channels=["p"], path=tmp_path / "made" / f"a.{suffix}")
+        plot_logs(_log(), channels=["p"], path=tmp_path / "made" / f"a.{suffix}")
         assert (tmp_path / "made" / f"a.{suffix}").read_bytes().startswith(head)
 
 

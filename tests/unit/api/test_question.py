@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,6 @@ from swashplate.api.languages import Band, Bands, Names, Values
 from swashplate.api.question import (
     VerbQuestion,
     argument,
-    as_function,
-    described,
     entries,
     option,
     setting,
@@ -40,7 +37,8 @@ class Asking(VerbQuestion[dict[str, Any]]):
         return {name: getattr(self, name) for name in entries(type(self))}
 
 
-ask = as_function(Asking)
+def ask(what: str, **given: Any) -> dict[str, Any]:
+    return Asking(what, **given).answer()
 
 
 def test_texts_lists_and_objects_mean_the_same() -> None:
@@ -89,17 +87,16 @@ def test_a_setting_that_cannot_be_is_refused(texts: list[str], words: str) -> No
     assert words in str(caught.value)
 
 
-def test_the_function_has_the_fields_as_arguments() -> None:
-    found = inspect.signature(ask).parameters
-    assert [name for name, p in found.items() if p.kind is p.POSITIONAL_OR_KEYWORD] == ["what"]
-    assert found["rate"].default == 100.0
-    assert "rate: Rate [Hz]." in described(Asking)
-    assert ask.__doc__ == described(Asking)
+def test_the_class_has_the_fields_as_arguments() -> None:
     with pytest.raises(TypeError, match="wrong"):
-        ask("x", wrong=1)  # type: ignore[call-arg]
+        ask("x", wrong=1)
+    with pytest.raises(TypeError, match="positional"):
+        Asking("x", "p,q")  # type: ignore[misc]
+    with pytest.raises(TypeError, match="what"):
+        Asking()  # type: ignore[call-arg]
 
 
 def test_what_is_done_is_said() -> None:
     said: list[str] = []
-    ask("x", say=lambda what, **_: said.append(what))  # type: ignore[call-arg]
+    Asking("x").answer(lambda what, **_: said.append(what))
     assert said == ["asking"]

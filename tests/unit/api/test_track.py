@@ -10,6 +10,7 @@ import pytest
 
 import swashplate as sp
 from short_period import TRUTH, short_period
+from swashplate.api.track import recursive_estimator
 from swashplate.errors import ExportError, FlightError, IdentificationError
 from swashplate.flights.flight import Flight, stream
 from swashplate.identification.recursive.fourier_regression import RegressionPlan
@@ -119,7 +120,7 @@ def test_the_band_that_is_not_given_ends_where_the_rate_ends(rate: float, high: 
 
 
 def test_an_estimator_for_a_stream_of_ones_own() -> None:
-    estimator = sp.recursive_estimator(EQUATION, rate=100, held=["servo_pitch"])
+    estimator = recursive_estimator(EQUATION, rate=100, held=["servo_pitch"])
     for row in short_period(500, gust=0.02):
         estimator.step(0.01, row)
     found = estimator.estimate()

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.api.bench import evaluate_bench, simulate_bench
 from swashplate.bench.evaluate import evaluate
+from swashplate.bench.plan import plan as plan_bench
 from swashplate.bench.record import BenchRecord, read_record, write_record
 from swashplate.bench.record_files import read_records
 from swashplate.bench.virtual_bench import RecordSchedule, Setup, points, repeated, virtual_bench
@@ -211,7 +213,7 @@ def test_a_table_of_averaged_points_needs_no_time(coax: Vehicle, tmp_path: Path)
         evaluate(read_records(path), coax)
 
 
-@pytest.mark.parametrize("work", [sp.plan_bench, sp.simulate_bench, lambda vehicle: sp.evaluate_bench(vehicle=vehicle)])
+@pytest.mark.parametrize("work", [plan_bench, simulate_bench, lambda vehicle: evaluate_bench(vehicle=vehicle)])
 def test_another_vehicle_than_the_bench_measures_is_refused(work: Callable[[Vehicle], object]) -> None:
     with pytest.raises(BenchError, match=r"raptor50: has the inputs theta0, B1, A1, theta0T, expected motor_lower"):
         work(sp.vehicle("raptor50"))

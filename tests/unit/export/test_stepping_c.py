@@ -8,6 +8,7 @@ import pytest
 import swashplate as sp
 from link_bench import PlainFloats
 from swashplate.api import link
+from swashplate.api.link import link_ardupilot
 from swashplate.compiler import compiler
 from swashplate.errors import DivergenceError, ExportError
 from swashplate.export import stepping_c
@@ -82,7 +83,7 @@ def test_a_compiler_that_fails_is_told_of_and_the_link_flies_on(monkeypatch: pyt
 
     monkeypatch.setattr(stepping_c, "loaded", refused)
     monkeypatch.setattr(link, "VirtualEngine", PlainFloats)  # nothing to compile
-    linked = sp.link_ardupilot(sp.vehicle("coax"), port=0, idle_exit=0.1, notice=said.append)
+    linked = link_ardupilot(sp.vehicle("coax"), port=0, idle_exit=0.1, notice=said.append)
     assert linked.exchanges == 0
     assert said == [
         "The vehicle's C cannot be used here, a slower virtual machine steps instead: "

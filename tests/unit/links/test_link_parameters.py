@@ -12,6 +12,7 @@ import swashplate as sp
 from heli_autopilot import EKF_WAIT, Gains, HeliAutopilot
 from link_bench import QUICK, bench
 from swashplate.api import link
+from swashplate.api.link import write_ardupilot_parameters
 from swashplate.errors import ControllerError, LinkError
 from swashplate.links.ardupilot.gains import ardupilot_law, read_parameter_file
 from swashplate.links.ardupilot.mixing import tail_sense
@@ -53,7 +54,7 @@ def test_a_helicopter_takes_off_and_hovers_at_1200_frames_a_second(tmp_path: Pat
     """The EKF's 40 s on the ground, armed, run-up, lift-off and hover with the file's gains, loops at 400 Hz."""
     vehicle, file = sp.vehicle("raptor50"), tmp_path / "raptor50.parm"
     raptor = read_parameter_file(
-        sp.write_ardupilot_parameters(vehicle, file, trim=sp.trim(vehicle), name="raptor50")  # gains included
+        write_ardupilot_parameters(vehicle, file, trim=sp.trim(vehicle), name="raptor50")  # gains included
     )
     axes = ("RLL", "PIT", "YAW")
     angle = tuple(raptor[f"ATC_ANG_{axis}_P"] for axis in axes)

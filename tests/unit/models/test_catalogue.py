@@ -10,9 +10,11 @@ import pytest
 import swashplate as sp
 from swashplate.errors import CardError, TrimError
 from swashplate.export.formats import export_model
+from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space_file import structure_names
+from swashplate.validation.verify import verify
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +78,7 @@ def test_fits_and_exports_take_the_vehicle(mettler: sp.Vehicle) -> None:
     h = truth.response(omega)
     one = np.ones(h.shape)
     told = (h, 0.99 * one, 0.99 * one[:, :, 0], 0.02 * one, one[:, 0], one[:, :, 0], one[:, :1, :])
-    fit = sp.fit_state_space(heave, FrequencyResponse(omega, truth.inputs, truth.outputs, *told), starts=1)
+    fit = fit_state_space(heave, FrequencyResponse(omega, truth.inputs, truth.outputs, *told), starts=1)
     assert isinstance(fit.model, sp.Vehicle)
     assert structure_of(fit.model).parameters["Zw"].value == pytest.approx(-1.1, rel=1e-3)
     assert all(isinstance(one, sp.Vehicle) for one in fit.draw(2, seed=0))
@@ -84,7 +86,7 @@ def test_fits_and_exports_take_the_vehicle(mettler: sp.Vehicle) -> None:
     files = export_model(mettler, "control", name="m").files
     assert files == export_model(structure_of(mettler), "control", name="m").files
     with pytest.raises(CardError, match="has no matrices of named parameters"):
-        sp.verify(sp.vehicle("coax"), [])
+        verify(sp.vehicle("coax"), [])
 
 
 def test_what_is_no_model_is_told_with_what_is_near(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from swashplate.reporting.theme import axis, base_layout, line
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim_curve import trim_curve
 
-_WAYS = ("inspect", "explore", "_repr_html_", "save")
+_WAYS = ("plot", "explore", "_repr_html_", "save")
 _UNIT = re.compile(r"\[[^\]]+\]")
 
 
@@ -67,41 +67,18 @@ MADE: dict[str, Callable[[], dict[str, Figure]]] = {
 }
 
 WITHOUT = {
-    "AxisExcitation": "one line of words",
     "Autopilot": "a law; `check_controller` shows what it is worth",
-    "Batch": "arrays of many flights: `flight(i)` shows one, `monte_carlo` all",
-    "BenchDetails": "the result shows them",
-    "BenchRecord": "the bench's columns; `evaluate_bench` shows what they say",
     "CampaignPlan": "cost and size in words",
-    "Card": "a table of numbers in words",
     "Controller": "a law; `check_controller` shows what it is worth",
-    "DatasetFile": "a file's name",
-    "Decoupling": "a law; `decouple_axes` shows what it is worth",
     "Export": "files",
     "Hold": "a law; `check_controller` shows what it is worth",
-    "Line": "one line of words",
-    "Linked": "counts in words",
-    "Maneuver": "words; `plan_maneuver` shows it",
     "Margins": "two numbers",
-    "MeasurementPlan": "a list to print",
-    "OmissionStudy": "a table in words",
-    "PublishedComparison": "a table in words",
-    "RecursiveRegression": "an estimator that has not begun; `track` shows what it finds",
-    "Replay": "the page shows it: `show_replay`",
-    "Schedule": "linear models, each of which shows itself",
     "StateHold": "a law; `check_controller` shows what it is worth",
-    "StateSpaceDetails": "the result shows them",
-    "StateSpaceModel": "the result shows it",
-    "Structures": "a list of names",
-    "Synchronisation": "one number and the two flights, which show themselves",
     "TransferFunctionDetails": "the result shows them",
     "TransferFunctions": "the result shows it",
     "NeededExcitation": "a handful of numbers",
     "Trim": "one point's numbers; `trim_curve` shows many",
     "Vehicle": "`trim_curve`, `derivatives` and `linearize` show what it does",
-    "WrittenStructure": "words",
-    "Aligned": "flights and shifts beside a figure",
-    "Figure": "a figure",
 }
 """What the verbs return that does not show itself, and why."""
 

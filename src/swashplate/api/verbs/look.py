@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from swashplate.api.asking import FLIGHT, FromLogs
 from swashplate.api.languages import Logs, Names, Texts
 from swashplate.api.question import argument, option, setting
-from swashplate.api.saying import Say, ready, silent
+from swashplate.api.saying import QUIET, Say, ready, silent
 from swashplate.errors import FlightError, SwashError
 
 if TYPE_CHECKING:
@@ -211,5 +211,9 @@ class Inspect(FromLogs[Looked]):
         if not answer.damage:
             return []
         (where, *_) = map(str, self.logs)
-        error = FlightError(f"{answer.damage}.", where=where, hint="Everything else was read, and is shown.")
+        error = FlightError(
+            f"{answer.damage}.",
+            where=where,
+            hint="Everything else was read" + ("." if QUIET.get() else ", and is shown."),
+        )
         return [str(error)]

@@ -28,7 +28,7 @@ def bounds_of(model: StateSpaceModel) -> dict[str, float]:
             "no number of the file has a standard deviation (cramer_rao).",
             where=model.name,
             channel="--tolerances",
-            hint="Take a model of `swash fit-ss` or `swash fit-time`, or say what varies: --vary Xu=5%.",
+            hint="Take a model of `swash identify`, or say what varies: --vary Xu=5%.",
         )
     return bounds
 

@@ -289,6 +289,10 @@ class Result(Shown, Generic[Model, Details]):
         drawn = {name: rows[:, i] for i, name in enumerate(self.names)}
         return drawn | {e.name: drawn[e.tie] for e in self.estimates if e.tie in drawn}
 
+    def validate(self, flights: Any, **how: Any) -> Any:
+        """How its model predicts flights that it has not seen: see `swashplate.validate`."""
+        return resolve("validate")(self, flights, **how)
+
     def draw(self, count: int, *, seed: int) -> tuple[Any, ...]:
         """Vehicles that the data cannot tell from the identified one (see `draw_values`, which it takes).
 

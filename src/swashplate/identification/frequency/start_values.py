@@ -135,7 +135,7 @@ def from_models(
 
     Args:
         model: what needs start values.
-        fitted: models with inputs and outputs of it (those that `swash fit-tf` wrote).
+        fitted: models with inputs and outputs of it (those that `swash identify` wrote).
         responses: measured, for the bands.
 
     Raises:

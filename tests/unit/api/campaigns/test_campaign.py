@@ -23,6 +23,7 @@ from swashplate.api.campaigns import verbs, worker
 from swashplate.api.campaigns.result_files import ENDINGS, packed
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
+from swashplate.api.campaigns.verbs import replay_campaign
 from swashplate.errors import CampaignError
 from swashplate.reporting.structure import Figure, Table
 
@@ -101,17 +102,17 @@ def test_stopped_and_gone_on_with_it_is_as_in_one_go(
 
     # One row again.
     monkeypatch.setattr(verbs, "ProcessPool", lambda work, workers: InProcess(work))
-    again = sp.replay_campaign(tmp_path / "whole", 1)
+    again = replay_campaign(tmp_path / "whole", 1)
     assert again["Lb"].value == whole.table["Lb"][1]
     with pytest.raises(CampaignError, match="has no fit 2; it has 2"):
-        sp.replay_campaign(tmp_path / "whole", 2)
+        replay_campaign(tmp_path / "whole", 2)
 
     # Another program.
     monkeypatch.setattr(verbs, "program", lambda: {"numpy": "9.9"})
     with pytest.raises(CampaignError, match=r"was begun with another program: .*numpy is 9\.9"):
         sp.resume_campaign(tmp_path / "parts")
     with pytest.raises(CampaignError, match=r"was begun with another program: .*numpy is 9\.9"):
-        sp.replay_campaign(tmp_path / "whole", 1)
+        replay_campaign(tmp_path / "whole", 1)
 
 
 def test_a_changed_file_is_refused_with_what_changed(

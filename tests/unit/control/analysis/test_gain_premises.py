@@ -16,6 +16,7 @@ from swashplate.control.analysis import ardupilot_gains
 from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.control.analysis.gain_premises import refuse_turned_commands
 from swashplate.control.analysis.rate_gain_names import untuned
+from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
 from swashplate.errors import ControllerError
 from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
 from swashplate.identification.responses.frequency_response import FrequencyResponse
@@ -141,7 +142,7 @@ def test_flown_gains_refute_a_model_and_do_not_where_they_are_stable() -> None:
         model = structure("yaw").with_values({"Nr": -0.5, "Nped": 45.0, "tau_yaw": delay})
         flown = {name.replace("RLL", "YAW"): value for name, value in FLOWN.items()}
         (yaw,) = ardupilot_gains.suggest_gains(model, autopilot=flown)
-        steps = sp.rate_loop_steps(model, flown, rate="r", command="mixer_yaw")
+        steps = rate_loop_steps(model, flown, rate="r", command="mixer_yaw")
         assert steps.stable != refuted
         assert ("the model is refuted" in yaw.refused) == refuted
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-import swashplate as sp
 from conditioning_flights import hover, tracked
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.condition import condition, replay
@@ -139,7 +138,7 @@ def test_biases_and_scale_factors_of_sensors() -> None:
 
 def test_what_was_found_is_taken_out_of_the_flight() -> None:
     wrong, right = sensed_flight(), sensed_flight({}, {})
-    found = sp.reconstruct(wrong)
+    found = reconstruct(wrong)
     mended = found.corrected(wrong)
     for name in ("p", "q", "r", "ax", "ay"):
         before, after = (np.std(f.values(name) - right.values(name)) for f in (wrong, mended))

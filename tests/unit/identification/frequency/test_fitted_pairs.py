@@ -13,6 +13,7 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.lacking_parts import lacking_words, parts_in
 from swashplate.identification.frequency.response_names import under_names_of
+from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.models.linear.state_space_file import structure
 
@@ -38,7 +39,7 @@ def test_bands_of_pairs_channels_and_all(responses: FrequencyResponse) -> None:
 
 
 def test_what_is_left_out_and_its_bands_are_kept_with_the_result(responses: FrequencyResponse) -> None:
-    fit = sp.fit_state_space(
+    fit = fit_state_space(
         HEAVE_YAW, responses, bands={"r/pedal": (0.3, 3.0)}, without=("r/collective", "w/pedal"), starts=1
     )
     assert [t.name for t in fit.targets] == ["w / collective", "r / pedal"]
@@ -112,7 +113,7 @@ def test_another_kind_of_aircraft_gets_no_parts_of_a_helicopter() -> None:
 
 
 def test_a_fit_says_what_its_structure_may_lack(responses: FrequencyResponse) -> None:
-    fit = sp.fit_state_space(HEAVE_YAW, responses, starts=1)
+    fit = fit_state_space(HEAVE_YAW, responses, starts=1)
     (words,) = (text for text in fit.warnings if "not all of the aircraft" in text)
     assert "may be lacking are 'torque' (r / collective)" in words
     assert "Try compose:heave+yaw+torque, or --search." in words
@@ -126,7 +127,7 @@ def test_a_response_that_comes_later_than_the_others_of_its_input_is_fitted(resp
     columns = [truth.inputs.index(name) for name in responses.inputs]
     scatter = np.exp(0.01 * np.random.default_rng(0).standard_normal(responses.response.shape))
     there = replace(responses, response=truth.response(responses.omega)[:, rows][:, :, columns] * scatter)
-    found = sp.fit_state_space(own, there, starts=1)
+    found = fit_state_space(own, there, starts=1)
     for name in ("tau_col", "tau_r_col"):
         assert found.solution.numbers()[name] == pytest.approx(values[name], abs=3e-3)
-    assert found.cost < 0.2 * sp.fit_state_space(HEAVE_YAW, there, starts=1).cost
+    assert found.cost < 0.2 * fit_state_space(HEAVE_YAW, there, starts=1).cost

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-import swashplate as sp
+from swashplate.api.open_logs import open_logs
 from swashplate.links.web.libraries import PAGE
 
 
@@ -18,4 +18,4 @@ def _interrupted(address: str) -> None:
     reason="the page's libraries are not here: python scripts/vendor_page.py",
 )
 def test_an_interrupt_behind_the_address_ends_the_page() -> None:
-    sp.open_logs((), port=0, ready=_interrupted)
+    open_logs((), port=0, ready=_interrupted)

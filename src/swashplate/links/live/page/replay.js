@@ -108,7 +108,7 @@ new ResizeObserver(() => (dirty = true)).observe($("scene"));
 const answer = await fetch("/flight");
 flight = await answer.json();
 $("title").textContent = flight.title;
-document.title = `${flight.title} · swash replay`;
+document.title = `${flight.title} · swash live --replay`;
 $("simulated").hidden = !flight.simulated;
 $("state").textContent = flight.vehicle;
 const fan = flight.drawn ? ` Thin lines and shaded: ${flight.drawn} models that the fit cannot tell from it.` : "";

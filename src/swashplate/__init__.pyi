@@ -1,0 +1,64 @@
+"""The public names, once: `swashplate.public` reads this file, and so do those who check types."""
+
+from swashplate.api.accept_autopilot import accept_autopilot as accept_autopilot
+from swashplate.api.autopilot_gains import autopilot_gains as autopilot_gains
+from swashplate.api.campaigns.plan import plan_campaign as plan_campaign
+from swashplate.api.campaigns.results import campaign_results as campaign_results
+from swashplate.api.campaigns.verbs import campaign as campaign
+from swashplate.api.campaigns.verbs import resume_campaign as resume_campaign
+from swashplate.api.check_autopilot import check_autopilot as check_autopilot
+from swashplate.api.check_controller import check_controller as check_controller
+from swashplate.api.compare import compare as compare
+from swashplate.api.controllers import load_controller as load_controller
+from swashplate.api.decouple import decouple as decouple
+from swashplate.api.design_controller import design_controller as design_controller
+from swashplate.api.design_maneuver import design_maneuver as design_maneuver
+from swashplate.api.export import export_model as export_model
+from swashplate.api.fit_ss import fit_ss as fit_ss
+from swashplate.api.fit_tf import fit_tf as fit_tf
+from swashplate.api.gains import suggest_gains as suggest_gains
+from swashplate.api.load import load as load
+from swashplate.api.monte_carlo import monte_carlo as monte_carlo
+from swashplate.api.needed_excitation import needed_excitation as needed_excitation
+from swashplate.api.stitch import stitch as stitch
+from swashplate.api.track import track as track
+from swashplate.control.analysis.stability import loop_margins as loop_margins
+from swashplate.control.laws.autopilot import autopilot as autopilot
+from swashplate.control.laws.hold import hover_hold as hover_hold
+from swashplate.control.laws.state_hold import state_hold as state_hold
+from swashplate.errors import SwashError as SwashError
+from swashplate.flights.conditioning.uniform_records import uniform_records as uniform_records
+from swashplate.flights.flight import Flight as Flight
+from swashplate.flights.inspect import inspect as inspect
+from swashplate.flights.readers.read import read as read
+from swashplate.flights.review.review import review as review
+from swashplate.flights.spectrum import harmonics as harmonics
+from swashplate.flights.spectrum import spectrogram as spectrogram
+from swashplate.flights.spectrum import spectrum as spectrum
+from swashplate.identification.core.result import Result as Result
+from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function as fit_transfer_function
+from swashplate.identification.identify import identify as identify
+from swashplate.identification.posterior import posterior as posterior
+from swashplate.identification.responses.arithmetic import combine as combine
+from swashplate.identification.responses.frequency_response import FrequencyResponse as FrequencyResponse
+from swashplate.identification.responses.respond import respond as respond
+from swashplate.models.catalogue import structure as structure
+from swashplate.models.catalogue import vehicle as vehicle
+from swashplate.models.vehicle import Vehicle as Vehicle
+from swashplate.physics.environment import Environment as Environment
+from swashplate.reporting.report import report as report
+from swashplate.simulation.closed_loop import simulate_closed_loop as simulate_closed_loop
+from swashplate.simulation.closed_loop import simulate_maneuver as simulate_maneuver
+from swashplate.simulation.derivatives_over_speed import derivatives as derivatives
+from swashplate.simulation.integrate import simulate as simulate
+from swashplate.simulation.linearize import linearize as linearize
+from swashplate.simulation.sensors import QUIET as QUIET
+from swashplate.simulation.sensors import Sensors as Sensors
+from swashplate.simulation.sensors import observe as observe
+from swashplate.simulation.trim import trim as trim
+from swashplate.validation.residuals import residuals as residuals
+from swashplate.validation.validation import Validation as Validation
+from swashplate.validation.verb import validate as validate
+
+__version__: str
+__all__: list[str]
