@@ -27,7 +27,7 @@ class Noise(NamedTuple):
     `white_*` [rad/s^2 or m/s^2 per sqrt(Hz)], `gust_*` and `drift_*` [rad/s^3 or m/s^3 per sqrt(Hz)], `wind`
     [m/s^2 per sqrt(Hz)], `tau_*` [s], `sensor_*` per sample [m, rad]. `speed`: root mean square of each horizontal
     velocity that is flown [m/s], for the filter's gain alone. `wind` 0: none, and slopes are those at hover.
-    `line_hertz`: signed frequency of a rotor's line in what is measured, as `inspect --rotor-speed` tells [Hz]; 0: none.
+    `line_hertz`: signed frequency of a rotor's line in what is measured, as `inspect --rotor-speed` tells [Hz], or 0.
     `line_angle`, `line_height`: its root mean square in roll and pitch [rad] and in height [m]; `line_time`: how long
     its phase lasts [s].
     `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces;

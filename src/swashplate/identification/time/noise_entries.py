@@ -49,7 +49,7 @@ def with_line(noise: Noise, hertz: float, pieces: Sequence[Record]) -> Noise:
             f"a line at {hertz:g} Hz, expected between 0 and {half:g} Hz, half the sample rate.",
             where=pieces[0].name,
             channel="rotor_line",
-            hint="Take what `inspect --rotor-speed` says of the flight, and condition to a higher rate where it needs one.",
+            hint="Take what `inspect --rotor-speed` says of the flight, and condition to a higher rate if needed.",
         )
     return noise._replace(line_hertz=float(hertz), sensor_heading=SEPARATE["sensor_heading"][1])
 
