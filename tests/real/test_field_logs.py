@@ -17,9 +17,22 @@ def field(shared_data: Path) -> Path:
 
 
 # ---- 02: firmware before 3.1 -----------------------------------------------------------------------------------------
-def test_a_log_without_stamps_says_so(field: Path) -> None:
+def test_a_log_without_stamps_takes_them_from_the_gps(field: Path) -> None:
+    flight = sp.read(field / "02-no-time-old-text-log" / "tradheli_v301.log")
+    assert flight.duration == pytest.approx(59.7, abs=0.2)  # 300 fixes, 0.2 s apart
+    assert flight.rate("phi") == pytest.approx(10.0, rel=0.3)
+    (note,) = (text for text in flight.provenance.notes if "no time stamps" in text)
+    assert "too coarse for a fit" in note
+    assert "LOG_BITMASK" not in note
+    assert flight.provenance.events[0].text == "STABILIZE"
+
+
+def test_without_a_gps_there_is_no_time(field: Path, tmp_path: Path) -> None:
+    text = (field / "02-no-time-old-text-log" / "tradheli_v301.log").read_text()
+    bare = tmp_path / "bare.log"
+    bare.write_text("\n".join(line for line in text.splitlines() if not line.startswith("GPS")))
     with pytest.raises(FlightError, match=r"no time stamps.*firmware before 3\.1") as told:
-        sp.read(field / "02-no-time-old-text-log" / "tradheli_v301.log")
+        sp.read(bare)
     assert "LOG_BITMASK" not in str(told.value)
     assert "Copy" not in str(told.value)
 

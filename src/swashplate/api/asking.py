@@ -49,7 +49,8 @@ class FromLogs(VerbQuestion[Answer]):
         from swashplate.flights.readers.windows import split_log, split_window
 
         stamps = "drop" if self.drop_bad_stamps else "error"
-        flight = read_log(text, mapping=self.mapping, units=self.units, bad_stamps=stamps)
+        mapping = self.mapping or self._kept(text)
+        flight = read_log(text, mapping=mapping, units=self.units, bad_stamps=stamps)
         if getattr(self, "as_logged", False):
             flight = flight.done(UNCHECKED)
         if not flight.provenance.simulated:
@@ -57,6 +58,17 @@ class FromLogs(VerbQuestion[Answer]):
         # Messages and reports name the file, not "simulated coax", of which there may be several.
         called = Path(split_log(split_window(text)[0])[0]).name
         return replace(flight, provenance=replace(flight.provenance, source=called))
+
+    def _kept(self, text: str) -> Path | None:
+        """The mapping that was kept for a table with these columns; units that are given speak for themselves."""
+        from swashplate.flights.datasets import locate
+        from swashplate.flights.readers.windows import split_log, split_window
+        from swashplate.links.logs.kept_mappings import kept
+
+        place = None if self.units else kept(Path(locate(split_log(split_window(text)[0])[0])))
+        if place is not None:
+            notice(f"{text}: read with the mapping that was kept for these columns ({place}).")
+        return place
 
 
 class FromFewLogs(FromLogs[Answer]):

@@ -33,6 +33,18 @@ class AircraftKind:
     rotors: int = 0
     told: str = ""
 
+    @property
+    def made_for(self) -> str:
+        """What is made for it here and what is not, in a sentence; "" for those that everything is made for."""
+        if self.main_rotors:
+            return ""
+        looked = "is read, checked and plotted, and its rate loops, filters, noise and incidents are told"
+        if self.multirotor:
+            return (
+                f"{self.words}: it {looked}; sweeps give responses and gains. Models from geometry are of helicopters"
+            )
+        return f"{self.words}: it {looked}. Models and gains are made here for helicopters and multirotors only"
+
 
 def _rotors(number: int) -> AircraftKind:
     return AircraftKind(f"a multirotor with {number} rotors", multirotor=True, rotors=number)

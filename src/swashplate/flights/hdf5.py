@@ -39,7 +39,7 @@ def read(path: Path, *, wanted: str) -> dict[str, Group] | None:
 
     Args:
         path: the file.
-        wanted: an attribute of the root.
+        wanted: an attribute of the root; "" for any file.
 
     Returns:
         None where it has no such attribute: it is no file of ours, and nothing more of it is read.

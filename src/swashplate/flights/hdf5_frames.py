@@ -35,7 +35,8 @@ def frames(path: Path, *, wanted: str) -> Iterator[Frame]:
 
     Args:
         path: the file.
-        wanted: an attribute of the root; without it {"foreign": True} is all that is told.
+        wanted: an attribute of the root; without it {"foreign": True} is all that is told. With "" any file is told,
+            and what is neither numbers nor texts is told as the text of its type.
 
     Yields:
         {"group": name, "attributes": {...}} before the variables of a group ("" is the root), and for each of those
@@ -51,11 +52,11 @@ def frames(path: Path, *, wanted: str) -> Iterator[Frame]:
             return
         claimed = _claimed(path, file.id, "", set())
         refuse_oversized(claimed, size=path.stat().st_size, where=str(path), what="its data sets together")
-        yield from _group(path, file, "", set())
+        yield from _group(path, file, "", set(), strict=bool(wanted))
     yield {}, b""
 
 
-def _group(path: Path, group: h5py.Group, name: str, seen: set[int]) -> Iterator[Frame]:
+def _group(path: Path, group: h5py.Group, name: str, seen: set[int], *, strict: bool) -> Iterator[Frame]:
     yield {"group": name, "attributes": _attributes(group)}, b""
     inner: list[tuple[str, h5py.Group]] = []
     for key in group:
@@ -67,15 +68,17 @@ def _group(path: Path, group: h5py.Group, name: str, seen: set[int]) -> Iterator
         if isinstance(item, h5py.Group):
             inner.append((f"{name}/{key}".removeprefix("/"), item))
         elif isinstance(item, h5py.Dataset):
-            yield _variable(path, key, item)
+            yield _variable(path, key, item, strict=strict)
     for below, item in inner:
-        yield from _group(path, item, below, seen)
+        yield from _group(path, item, below, seen, strict=strict)
 
 
-def _variable(path: Path, name: str, item: h5py.Dataset) -> Frame:
+def _variable(path: Path, name: str, item: h5py.Dataset, *, strict: bool) -> Frame:
     told: dict[str, Any] = {"variable": name, "attributes": _attributes(item), "shape": item.shape}
     if h5py.check_string_dtype(item.dtype) is not None:
         return told | {"texts": [_plain(text) for text in np.ravel(item.asstr(errors="replace")[()])]}, b""
+    if item.dtype.kind not in "fiub" and not strict:  # a cell's references, a compound: named, not read
+        return told | {"shape": (1,), "texts": [str(item.dtype)]}, b""
     if item.dtype.kind not in "fiub" or item.shape is None:
         raise FlightError(f"has the type {item.dtype}, expected numbers or texts.", where=path, channel=item.name[1:])
     values = np.ascontiguousarray(item[()])

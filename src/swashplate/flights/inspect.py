@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swashplate.flights.aircraft_kind import aircraft_kind
 from swashplate.flights.consistency import consistency
 from swashplate.flights.epoch import note
 from swashplate.flights.flight import Flight
@@ -277,6 +278,7 @@ def inspect(flight: Flight) -> Inspection:
         channels=channels,
         notes=(
             *flight.provenance.notes,
+            *([kind.made_for] if (kind := aircraft_kind(flight)) is not None and kind.made_for else []),
             *([note(flight.epoch)] if flight.epoch else ()),
             *(text for stream in streams for text in stream.notes),
         ),

@@ -88,9 +88,9 @@ class Inspect(FromLogs[Looked]):
 
     With --out FILE.html (or .pdf, .svg, .png) their channels are drawn, several logs over each other. --rotor-speed
     measures the rotor's speed from vibration, --reconstruct finds biases and scale factors of the sensors: with --out
-    FILE.nc each writes the flight with it. A record of the test bench shows its columns and procedures. A
-    log that is itself damaged (cut off, bytes lost, its clock set back) is shown as far as it could be read, and ends
-    with an error.
+    FILE.nc each writes the flight with it. --map guesses the columns of your own table.
+    A record of the test bench shows its columns and procedures. A log that is itself damaged (cut off, bytes lost, its
+    clock set back) is shown as far as it could be read, and ends with an error.
     """
 
     by_name: ClassVar[tuple[str, ...]] = ("plot.html", "plot.pdf", "plot.svg", "plot.png", "flight.nc")
@@ -106,6 +106,11 @@ class Inspect(FromLogs[Looked]):
         default="auto", help="how several logs are aligned", choices=("auto", "motion", "clock", "start", "none")
     )
     theme: str = setting(default="paper", help="colours of a .pdf, .svg or .png", choices=("paper", "light", "dark"))
+    map: bool = option(
+        default=False,
+        help="Guess which column of a table is which channel, and keep the mapping for logs like it; with --mapping, "
+        "keep that one.",
+    )
     rotor_speed: bool = option(default=False, help="Tell the rotor speed: as the log has it, else from vibration.")
     line: Texts | None = option(
         default=None,
@@ -132,9 +137,11 @@ class Inspect(FromLogs[Looked]):
         logs = list(self.logs)
         if self.rotor_speed and self.reconstruct:
             raise SwashError("and --rotor-speed are two questions.", channel="--reconstruct")
-        if self.rotor_speed or self.reconstruct:
+        if self.rotor_speed or self.reconstruct or self.map:
             if len(logs) != 1:
                 raise SwashError(f"are {len(logs)}, expected one.", channel="LOG")
+            if self.map:
+                return self._mapped(str(logs[0]))
             return self._rotor() if self.rotor_speed else self._reconstructed()
         if len(logs) == 1 and isinstance(logs[0], str | Path) and is_bench(place := locate(str(logs[0]))):
             return self._bench(str(logs[0]), place)
@@ -159,6 +166,12 @@ class Inspect(FromLogs[Looked]):
             draw=lambda path: self._drawn(flights, path),
             damage="; ".join(damage),
         )
+
+    def _mapped(self, name: str) -> Looked:
+        from swashplate.links.logs.kept_mappings import map_table
+
+        mapped = map_table(Path(name), self.mapping)
+        return Looked((str(mapped),), mapped.as_dict(), damage=" ".join(mapped.faults))
 
     def _drawn(self, flights: list[Flight], path: Path) -> None:
         from swashplate.api.plot_logs import plot_logs

@@ -141,7 +141,7 @@ def read(source: Source, options: Options) -> Flight:
     refuse_mapping(options, "an ArduPilot log", where=source.name)
     text = source.text
     log = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
-    _refuse_unstamped(log, source)
+    log, coarse = _stamped(log, source)
     log, end, said = _one_run(log)
     told = story(log, end=end)
     left = clocked.Remarks(list(log.notes), [*log.damage, *filter(None, (said,)), *told.damage])
@@ -155,7 +155,7 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Copy the log again; check that ATT, RATE or IMU are in LOG_BITMASK.",
         )
-    left.notes += [*_filters(told.parameters, streams), *_remarks(log, streams)]
+    left.notes += [*coarse, *_filters(told.parameters, streams), *_remarks(log, streams)]
     provenance = source.provenance(
         NAME,
         VERSION,
@@ -169,18 +169,40 @@ def read(source: Source, options: Options) -> Flight:
     return Flight(streams, provenance)
 
 
-def _refuse_unstamped(log: Messages, source: Source) -> None:
-    """Refuses a log of measurements none of which says when: counting messages would be a guess at their times."""
-    known = {message.name for message in _MESSAGES}
+def _stamped(log: Messages, source: Source) -> tuple[Messages, tuple[str, ...]]:
+    """The messages with times, and a note where they are not their own: firmware before 3.1 wrote none.
+
+    The GPS's messages say when they came; what stands between two of them is spread evenly.
+
+    Raises:
+        FlightError: where no message says when it was written.
+    """
+    known = {message.name for message in _MESSAGES} - {"GPS"}
     there = {name: table for name, table in log.tables.items() if name in known and len(table)}
-    if there and not any(np.isfinite(seconds(table)).any() for table in there.values()):
+    if not there or any(np.isfinite(seconds(table)).any() for table in there.values()):
+        return log, ()
+    fixes = log.get("GPS")
+    clock = np.zeros(0) if fixes is None else fixes.number("Time")
+    good = np.isfinite(clock) & (np.diff(clock, prepend=-1.0) > 0.0)
+    if fixes is None or good.sum() < 2:
         raise FlightError(
             f"the messages carry no time stamps (found {', '.join(sorted(there))}, expected TimeUS or TimeMS in each): "
-            "firmware before 3.1 wrote none, so the log does not say when anything was measured.",
+            "firmware before 3.1 wrote none, and no GPS message says the time, so the log does not say when anything "
+            "was measured.",
             where=source.name,
             channel="time",
             hint="Fly again with newer firmware: nothing can be identified from this log.",
         )
+    place, micro = fixes.place[good], 1e3 * (clock[good] - clock[good][0])
+    tables = {}
+    for name, table in log.tables.items():
+        kept = table if name in _STORIES else table.rows((table.place >= place[0]) & (table.place <= place[-1]))
+        tables[name] = MessageTable({**kept.columns, "TimeUS": np.interp(kept.place, place, micro)}, kept.place)
+    note = (
+        "the messages carry no time stamps (firmware before 3.1): times are those of the GPS, spread evenly between "
+        f"its messages ({1e-3 * float(np.median(np.diff(micro))):.0f} ms apart): good to look at, too coarse for a fit"
+    )
+    return Messages(tables, log.notes, log.damage), (note,)
 
 
 def _one_run(log: Messages) -> tuple[Messages, float, str]:

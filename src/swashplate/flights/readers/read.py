@@ -11,7 +11,7 @@ from swashplate.errors import FlightError
 from swashplate.flights import datasets
 from swashplate.flights.epoch import rebased
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import analogue, blackbox, checks
+from swashplate.flights.readers import analogue, blackbox, checks, no_log
 from swashplate.flights.readers.given_units import with_units
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
@@ -72,7 +72,7 @@ def read(
     log: int | None = None,
 ) -> Flight:
     """Reads a flight log: ArduPilot DataFlash (`.bin`, `.log`), PX4 ULog (`.ulg`) or `.px4log`, Blackbox of Rotorflight
-    and Betaflight (`.bbl`, `.bfl`, or exported as CSV), a ROS bag (1 or 2), MATLAB files of level 5 (`.mat`), tables of
+    and Betaflight (`.bbl`, `.bfl`, or exported as CSV), a ROS bag (1 or 2), MATLAB files (`.mat`), tables of
     text (CSV), a NanoBench CSV file, a swashplate netCDF file, a Vicon or OptiTrack CSV export.
 
     ULog files and ROS bags need `pip install 'swashplate[logs]'`.
@@ -141,6 +141,7 @@ def _whole(
 ) -> Flight:
     """One log of a file from its first sample to its last."""
     source = open_source(path)
+    no_log.refuse(source)
     options = Options(
         units=units or {},
         mapping=load_mapping(mapping),
