@@ -25,7 +25,7 @@ def silent(what: str, *, done: float = 0.0, total: float | None = None, note: st
 def tell(words: str) -> None:
     """Results that come while a verb runs, on standard output."""
     if not QUIET.get():
-        print(words, flush=True)
+        print(f"{words}\n", end="", flush=True)  # in one piece, whatever another thread says
 
 
 def notice(words: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +30,16 @@ def test_the_receivers_places_become_metres() -> None:
     assert path is not None
     log = opened(path)
     found = map_of(log)
-    assert "GPS.Lat" in found["words"]
+    assert "latitude and longitude" in found["words"]
     assert found["north"][0] == found["east"][0] == 0.0
     latitude = log.shown("GPS.Lat").values
     expected = np.radians(latitude - latitude[0]) * 6_371_000.0
     assert found["north"] == pytest.approx(expected, abs=1e-3)
+    flight = log.ready
+    log.flight = replace(flight, streams={n: d for n, d in flight.streams.items() if "latitude" not in d})
+    again = map_of(log)
+    assert "GPS.Lat" in again["words"], "the field of the log where there is no such channel"
+    assert again["north"] == pytest.approx(expected, abs=1e-3)
 
 
 def test_the_estimates_track_comes_first() -> None:

@@ -13,7 +13,7 @@ const log_ticks = (_, ticks) => ticks.map((tick) => (Math.abs(Math.log10(tick) %
 
 // `lines`: { name, values, colour, dash, points }; what is null is a gap.
 export function curves(home, { title, x, xLabel, yLabel, lines, log = false, height = 170, range = null, level = null }) {
-  const keys = lines.length > 1 ? lines.map((line) => make("span", { class: "key" }, sample(colour(line.colour), line.dash), line.name)) : [];
+  const keys = lines.length > 1 ? lines.filter((line) => !line.hidden).map((line) => make("span", { class: "key" }, sample(colour(line.colour), line.dash), line.name)) : [];
   const box = make("div", {});
   home.append(make("figure", { class: "curves" }, make("figcaption", {}, make("strong", {}, title), ...keys), box));
   const font = "11.5px system-ui, sans-serif";

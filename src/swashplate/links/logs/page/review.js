@@ -31,7 +31,7 @@ function loop(home, one) {
   if (!one.step) return;
   const { time, response, low, high } = one.step;
   curves(home, { title: `Step response, ${one.axis}`, x: time, xLabel: "time [s]", yLabel: "rate / target [1]", level: 1, lines: [
-    { name: "95 % band", values: low, colour: 7, dash: [3, 3] }, { name: "", values: high, colour: 7, dash: [3, 3] }, { name: "response", values: response, colour: 0, dash: [] }] });
+    { name: "95 % band", values: low, colour: 7, dash: [3, 3] }, { name: "", hidden: true, values: high, colour: 7, dash: [3, 3] }, { name: "response", values: response, colour: 0, dash: [] }] });
 }
 
 function noise(home, one) {
