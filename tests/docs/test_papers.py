@@ -24,7 +24,7 @@ HAS = {
 """What each paper numbers."""
 CONSTANTS = {
     "coax": (
-        "18 states and 4 inputs", "300.0", "340.0", "274 mm", "1 to 3 %", "1 to\n4 %", "5 to 20 %", "49.0", "45.0",
+        "18 states and 4 inputs", "300.0", "340.0", "274 mm", "1 to 3 %", "1 to 4 %", "5 to 20 %", "49.0", "45.0",
         "about 1 m above", "10 × 10 × 10 m with 8 cameras", "200 Hz", "100 Hz", "10.5 and 12.5 V", "0.5 to 8 Hz",
         "7 deg", "1.8 m/s",
     ),
