@@ -40,7 +40,7 @@ REPORTS: dict[str, tuple[list[str], str]] = {
         ["bench simulate records --seed 1 --quiet", "bench records --out card.toml --out bench.html"],
         "bench.html",
     ),
-    "report-speed": (["vehicle derivatives raptor50 --speed 0-12/3 --plot speed.html"], "speed.html"),
+    "report-speed": (["vehicle derivatives raptor50 --speed 0-12/3 --out speed.html"], "speed.html"),
 }
 
 
