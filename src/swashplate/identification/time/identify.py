@@ -37,12 +37,17 @@ from swashplate.identification.time.filter_error import SETTLING, FilterError
 from swashplate.identification.time.flight_details import FlightDetails, moving_air
 from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.identification.time.linear_residual import LinearResidual
+from swashplate.identification.time.linear_residual import (
+    LinearResidual,
+    begun,
+    begun_where_it_ended,
+    beside_physics,
+    moved,
+)
 from swashplate.identification.time.noise_entries import in_wind, with_line
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.record_fit import LAGS
 from swashplate.identification.time.residual_fit import fit_residual
-from swashplate.identification.time.residual_joint import begun, begun_where_it_ended, beside_physics, moved
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.residual import PREFIX
 from swashplate.models.vehicle import Vehicle

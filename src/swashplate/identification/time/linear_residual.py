@@ -1,4 +1,9 @@
-"""What a linear residual is, what speaks for it, and its part of the accelerations."""
+"""What a linear residual is, what speaks for it, its part of the accelerations, and how a fit goes on with it.
+
+A physics that is fitted without its residual leans towards what is missing, and a residual that is fitted beside a
+physics that is held finds only the rest. So the search goes on with everything free: the physics with its own priors,
+and the coefficients about zero with the ridge that the blocks chose (a ridge is a normal prior).
+"""
 
 from __future__ import annotations
 
@@ -12,11 +17,12 @@ from swashplate.arrays import Array
 from swashplate.filtering.disturbances import DISTURBED, Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.core.parameters import trim_of_record
+from swashplate.identification.core.parameter_row import Row
+from swashplate.identification.core.parameters import Free, Parameterization, trim_of_record
+from swashplate.identification.time.estimates import Found
 from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.innovations import Filtered
-from swashplate.models.choices import Free
-from swashplate.models.residual import HEADING, ROWS, coefficients, counted_from, heading_counted
+from swashplate.models.residual import HEADING, ROWS, coefficients, counted_from, heading_counted, with_residual
 from swashplate.models.vehicle import Vehicle
 
 _FAR = 2.0
@@ -137,3 +143,32 @@ def accelerations_along(likelihoods: Sequence[FilterError]) -> dict[str, Array]:
         states = np.asarray(ran(likelihood).states.x)[:, [vehicle.index(name) for name in DISTURBED]]
         made.append(np.gradient(states, likelihood.model.dt, axis=0)[likelihood.counted[0]])
     return dict(zip(DISTURBED, np.concatenate(made).T, strict=True))
+
+
+def beside_physics(table: Parameterization, residual: LinearResidual) -> Parameterization:
+    """What a fit has free, then the coefficients of its residual with the ridge as their priors."""
+    spread = residual.strength**-0.5
+    free = tuple(
+        Free(name, unit, 0.0, spread * unit, source="ridge of the residual") for name, unit in residual.units.items()
+    )
+    return replace(table, vehicle=begun(table.vehicle, residual), free=(*table.free, *free))
+
+
+def begun(vehicle: Vehicle, residual: LinearResidual) -> Vehicle:
+    """A vehicle with coefficients that are still zero, counted from where those of a residual are."""
+    return with_residual(vehicle, counted_from(residual.vehicle))
+
+
+def begun_where_it_ended(row: Row, alone: Row, reached: Array, residual: LinearResidual) -> Array:
+    """The scaled row with everything free: records and noise as found alone, physics and residual as found together."""
+    known = dict(zip(alone.names, (reached * alone.scale).tolist(), strict=True))
+    known |= {name: entry.value for name, entry in residual.vehicle.card.parameters.items() if name in row.names}
+    return np.array([known[name] for name in row.names]) / row.scale
+
+
+def moved(alone: Found, together: Found) -> dict[str, float]:
+    """How far the physics moved, in standard deviations of what is free with the residual."""
+    sigma = np.sqrt(np.maximum(np.diag(together.scaled(together.corrected)), 1e-300))
+    before = alone.table.identified(alone.numbers[: len(alone.table.free)])
+    after = together.table.identified(together.numbers[: len(together.table.free)])
+    return {name: (after[name] - before[name]) / float(sigma[i]) for i, name in enumerate(alone.table.names)}
