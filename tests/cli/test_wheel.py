@@ -61,7 +61,7 @@ def test_it_runs_from_another_folder(wheel: Path, tmp_path: Path) -> None:
         return done.stdout
 
     assert str(installed) in said("-c", "import swashplate; print(swashplate.__file__)")
-    assert "raptor50" in said("-m", "swashplate", "vehicles")
+    assert "raptor50" in said("-m", "swashplate", "vehicle", "list")
     script = "import swashplate as sp; print(sp.structure('thirteen_state').structure.name)"
     assert "thirteen_state" in said("-c", script)
 
@@ -100,7 +100,7 @@ def test_an_empty_environment_runs_all_of_it_elsewhere(kind: str, tmp_path: Path
 
     assert str(there) in said(python, "-c", "import swashplate; print(swashplate.__file__)")
     assert "casadi not installed" in said(swash, "--version")
-    assert "coax" in said(swash, "vehicles")
+    assert "coax" in said(swash, "vehicle", "list")
     _serves(swash, "open", cwd=elsewhere, env=plain)
     subprocess.run([*asked, f"{made}[model]"], env=plain, capture_output=True, check=True)
     assert "casadi not installed" not in said(swash, "--version")

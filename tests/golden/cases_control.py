@@ -59,7 +59,7 @@ def toml(path: Path) -> Any:
 def decoupling_checked(folder: Path) -> Values:
     """Margins, handling qualities, steps, coupling and gusts of the decoupling autopilot."""
     swash("control", "decouple", "coax", "--mode", "place", "--out", folder / "place.toml", "-q")
-    how = ("--duration", "10", "--gusts", "indoor")
+    how = ("--settings", "duration=10", "--gusts", "indoor")
     return numbers(swash_json("control", "check", "coax", "--controller", folder / "place.toml", *how))
 
 
@@ -69,7 +69,7 @@ def lqg_of_the_coax(folder: Path) -> Values:
     sensors = ("--sensors", "imu@100,mocap@50+20ms", "--delay", "20")
     told = swash_json("control", "design", "coax", *sensors, "--out", folder / "lqg.toml")
     found = named("told", numbers(told)) | named("file", numbers(toml(folder / "lqg.toml"), 12))
-    how = ("--duration", "5", "--gusts", "none")
+    how = ("--settings", "duration=5", "--gusts", "none")
     checked = swash_json("control", "check", "coax", "--controller", folder / "lqg.toml", *how)
     return found | named("check", numbers(checked))
 

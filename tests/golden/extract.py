@@ -29,8 +29,9 @@ def swash(*arguments: str | Path, code: int = 0) -> str:
 
 
 def swash_json(*arguments: str | Path, code: int = 0) -> Any:
-    """The same as JSON."""
-    return json.loads(swash(*arguments, "--json", code=code))
+    """The same as JSON, without the files that it names."""
+    told = json.loads(swash(*arguments, "--json", code=code))
+    return {name: value for name, value in told.items() if name != "written"} if isinstance(told, dict) else told
 
 
 def of_fit(fit: Any) -> Values:

@@ -99,7 +99,7 @@ class Decouple(OfVehicle["DecouplingDesign | AxesDecoupling"]):
 
     def answer(self, say: Say = silent) -> DecouplingDesign | AxesDecoupling:
         vehicle = self.flying(self.vehicle)
-        if self.linear or vehicle.card.vehicle != "coax":
+        if self.linear or not vehicle.traits.coaxial:
             self._refuse(
                 lambda name: name not in (*_LINEAR, "linear", "vehicle", "changes", "precision", "paged"), "--linear"
             )
