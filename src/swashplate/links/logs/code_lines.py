@@ -115,7 +115,9 @@ def plotted(reads: Sequence[Read], channels: Sequence[Sequence[str]], span: tupl
 
 def aligned(first: Read, second: Read) -> Code:
     """Bringing a log on the clock of another one."""
-    lines = [IMPORT, first.python("first"), second.python("second"), "print(sp.synchronise(first, second))"]
+    given = "from swashplate.flights.conditioning.synchronise import synchronise"
+    reads = [first.python("first"), second.python("second")]
+    lines = [IMPORT, given, *reads, "print(synchronise(first, second))"]
     return Code(f"Align {PurePath(second.file).name} with {PurePath(first.file).name}", "", "\n".join(lines))
 
 
