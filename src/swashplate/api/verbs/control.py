@@ -152,29 +152,26 @@ class DesignController(OfVehicle["ControllerDesign"]):
         write_design(self, answer, folder, names)
 
     def text(self, answer: ControllerDesign, width: int) -> list[Any]:
-        return [repr(answer), *costs(answer, self.precision)]
-
-
-_CODES: dict[int, Any] = {}
+        return [repr(answer), *costs(self)]
 
 
 def write_design(question: Any, answer: Any, folder: Path, names: tuple[str, ...]) -> None:
-    """A controller's file, its C, its page."""
+    """A controller's file, its page, and its C, which the question keeps for `costs`."""
     c = [name for name in names if name.endswith(".c")]
     VerbQuestion.write(question, answer, folder, tuple(name for name in names if name not in c))
     for name in c:
         code = answer.code(precision=question.precision)
         code.save(folder / name)
-        _CODES[id(answer)] = code
+        object.__setattr__(question, "_code", code)
 
 
-def costs(answer: Any, precision: str) -> list[str]:
+def costs(question: Any) -> list[str]:
     """What a step of C that was written costs."""
-    code = _CODES.pop(id(answer), None)
+    code = getattr(question, "_code", None)
     if code is None:
         return []
-    told = f"\nC of one step: {code.operations} operations, {code.work_bytes} bytes of temporaries"
-    return [told + (f", {code.memory_bytes} bytes between steps" if code.memory_bytes else "")]
+    per_step = f"\nC of one step: {code.operations} operations, {code.work_bytes} bytes of temporaries"
+    return [per_step + (f", {code.memory_bytes} bytes between steps" if code.memory_bytes else "")]
 
 
 class CheckController(OfVehicle["ControllerCheck"]):

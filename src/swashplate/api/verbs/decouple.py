@@ -162,7 +162,7 @@ class Decouple(OfVehicle["DecouplingDesign | AxesDecoupling"]):
         write_design(self, answer, folder, names)
 
     def text(self, answer: Any, width: int) -> list[Any]:
-        return [repr(answer), *costs(answer, self.precision)]
+        return [repr(answer), *costs(self)]
 
     def problems(self, answer: Any) -> list[str]:
         problem = getattr(answer, "problem", None)
