@@ -172,10 +172,10 @@ def test_matlab_files_of_any_layout_are_read_with_a_mapping(field: Path, name: s
     np.testing.assert_array_equal(flight.time("p"), np.ravel(raw["time"] if "time" in raw else raw["t"]))
 
 
-def test_the_hint_on_version_7_3_names_no_variable_that_is_not_there(field: Path) -> None:
-    with pytest.raises(FlightError, match=r"7\.3.*save.*'-v7'") as told:
-        sp.read(field / "06-mat" / "v73.mat")
-    assert "'Data'" not in str(told.value)
+def test_version_7_3_is_read(field: Path) -> None:
+    flight = sp.read(field / "06-mat" / "v73.mat", units={"p": "rad/s", "mixer_roll": "1"})
+    assert flight.values("p").size == 1000
+    assert flight.rate("p") == pytest.approx(50.0)
 
 
 def test_a_healthy_file_with_an_object_is_not_called_damaged(field: Path) -> None:

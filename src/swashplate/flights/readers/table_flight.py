@@ -28,6 +28,8 @@ from swashplate.flights.schema import LOGGED_UNIT, is_known
 from swashplate.registry import nearest
 
 _FEW = 0.02  # of the rows: as many may lack a number, and the channels still go together
+_USUAL = {"latitude": "deg", "longitude": "deg"}
+"""Units of channels that nobody writes in another one."""
 _SLOWER = 1.5  # times the table's step: a channel whose own steps are longer was logged at a rate of its own
 
 
@@ -56,7 +58,7 @@ def flight_of(table: ColumnTable, source: Source, options: Options, *, reader: s
     faults, told = Faults(source.name), table.told
     chosen = _chosen(table, options, faults)
     given = _given_units(options, chosen)
-    units = {name: given.get(name, place.unit) for name, place in chosen.channels.items()}
+    units = {name: given.get(name, place.unit or _USUAL.get(name)) for name, place in chosen.channels.items()}
     _check_given(given, chosen, table, faults)
     table_columns.check_units(units, table.where, faults)
     channels, labels = _numbers(table, chosen.channels, units, faults, mapped=bool(options.mapping))

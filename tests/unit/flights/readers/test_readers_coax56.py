@@ -162,7 +162,7 @@ def test_what_another_file_holds_is_named(tmp_path: Path, variables: dict[str, A
     [
         (b"", "empty"),
         (b"time,x\n0,1\n", "not a MATLAB"),
-        (b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + b"\x89HDF\r\n\x1a\n", "7.3.*'-v7'"),
+        (b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + b"\x89HDF\r\n\x1a\n", r"damaged MATLAB 7\.3 file"),
         (b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM", "holds nothing"),
         (b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + b"\xff" * 64, "damaged"),
         (b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + b"\x0f\0\0\0\x08\0\0\0notazlib", "does not unpack"),
