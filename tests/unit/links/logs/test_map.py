@@ -32,7 +32,7 @@ def test_the_receivers_places_become_metres() -> None:
     found = map_of(log)
     assert "latitude and longitude" in found["words"]
     assert found["north"][0] == found["east"][0] == 0.0
-    latitude = log.shown("GPS.Lat").values
+    latitude = log.shown("latitude").values
     expected = np.radians(latitude - latitude[0]) * 6_371_000.0
     assert found["north"] == pytest.approx(expected, abs=1e-3)
     flight = log.ready
