@@ -41,6 +41,7 @@ STARTS = {
     "compiler.py": "the C compiler; that of ziglang by Python's -I",
     "flights/foreign.py": "own_python",
     "links/ardupilot/sitl.py": "an autopilot that the user names",
+    "links/betaflight/binary.py": "an autopilot that the user names",
     "links/live/identifying.py": "own_python",
     "links/logs/cockpit.py": "own_python",
     "systems.py": "ends what sitl.py has started",

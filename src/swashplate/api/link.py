@@ -16,6 +16,8 @@ from swashplate.control.analysis.cascade_gains import cascade_gains
 from swashplate.errors import ControllerError, SwashError
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, written_gains
 from swashplate.links.ardupilot.parameters import Parameters, parameter_file, parameters
+from swashplate.links.betaflight.motors import MotorMapping
+from swashplate.links.betaflight.servo_outputs import SwashServoMapping
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.recorder import Recorder, recover
@@ -154,19 +156,19 @@ def link_ardupilot(
     from swashplate.links.ardupilot.runner import serve
     from swashplate.links.ardupilot.session import ArduPilotSession
 
-    made = _Asked(vehicle, servos, environment, name, voltage, sag, record, record_rate, estimate, truth, seed)
-    plant, recorder = _plant(made, "", notice)
+    made = LinkAsked(vehicle, servos, environment, name, voltage, sag, record, record_rate, estimate, truth, seed)
+    plant, recorder = linked_plant(made, "", notice)
     notices = Notices(notice)
     with listen_udp(listen, port) as bound:
         _tell_where("UDP", bound.getsockname(), listen, plant, notice=notice, say=say)
-        session = ArduPilotSession(plant, _sensing(plant, noisy=noisy, seed=seed), notices)
+        session = ArduPilotSession(plant, linked_sensing(plant, noisy=noisy, seed=seed), notices)
         saved: tuple[Path, ...] = ()
         try:
             serve(bound, session, idle_exit=idle_exit)
         except KeyboardInterrupt:
             pass
         finally:
-            saved = _finish(plant, recorder, session.progress.exchanges, notices.summary(), say)
+            saved = finish_link(plant, recorder, session.progress.exchanges, notices.summary(), say)
     return Linked(session.progress.exchanges, plant.time, notices.summary(), saved, _known(plant))
 
 
@@ -198,10 +200,10 @@ def link_px4(
     from swashplate.links.px4.runner import serve
     from swashplate.links.px4.session import Px4Session
 
-    made = _Asked(vehicle, servos, environment, name, voltage, sag, record, record_rate, estimate, truth, seed)
-    plant, recorder = _plant(made, "_px4", notice)
+    made = LinkAsked(vehicle, servos, environment, name, voltage, sag, record, record_rate, estimate, truth, seed)
+    plant, recorder = linked_plant(made, "_px4", notice)
     notices = Notices(notice)
-    session = Px4Session(plant, _sensing(plant, noisy=noisy, seed=seed), notices, seed=seed)
+    session = Px4Session(plant, linked_sensing(plant, noisy=noisy, seed=seed), notices, seed=seed)
     with listen_tcp(listen, port) as listening:
         _tell_where("TCP", listening.getsockname(), listen, plant, notice=notice, say=say)
         saved: tuple[Path, ...] = ()
@@ -210,7 +212,7 @@ def link_px4(
         except KeyboardInterrupt:
             pass
         finally:
-            saved = _finish(plant, recorder, session.exchanges, notices.summary(), say)
+            saved = finish_link(plant, recorder, session.exchanges, notices.summary(), say)
     return Linked(session.exchanges, plant.time, notices.summary(), saved, _known(plant))
 
 
@@ -255,7 +257,7 @@ def gains_to_write(mapping: ServoMapping, vehicle: Vehicle, trim: Trim, *, notic
 
 
 @dataclass(frozen=True)
-class _Asked:
+class LinkAsked:
     """What both links are asked for alike; see `link_ardupilot`."""
 
     vehicle: Vehicle
@@ -271,7 +273,9 @@ class _Asked:
     seed: int
 
 
-def _plant(asked: _Asked, suffix: Literal["", "_px4"], notice: Say) -> tuple[Plant, Recorder | None]:
+def linked_plant(
+    asked: LinkAsked, suffix: Literal["", "_px4"], notice: Say, motors: MotorMapping | SwashServoMapping | None = None
+) -> tuple[Plant, Recorder | None]:
     file = None if asked.record is None else Path(asked.record)
     check_record(file)
     _own_process()
@@ -281,7 +285,7 @@ def _plant(asked: _Asked, suffix: Literal["", "_px4"], notice: Say) -> tuple[Pla
             raise SwashError(f"is {asked.voltage:g} V, expected 0 to 1000.", channel="voltage")
         around = around._replace(voltage=asked.voltage)
     aircraft = standing(asked.vehicle.with_values(asked.truth) if asked.truth else asked.vehicle)
-    mapping = mapping_of(aircraft, asked.servos, name=asked.name, suffix=suffix)
+    mapping = motors or mapping_of(aircraft, asked.servos, name=asked.name, suffix=suffix)
     recorder = None
     if file is not None:
         recover(file, notice)
@@ -325,7 +329,7 @@ def link_engine(notice: Say) -> MakeEngine:
     return make
 
 
-def _sensing(plant: Plant, *, noisy: bool, seed: int) -> Sensing:
+def linked_sensing(plant: Plant, *, noisy: bool, seed: int) -> Sensing:
     return Sensing(plant, unit=InertialUnit() if noisy else None, seed=seed)
 
 
@@ -339,7 +343,7 @@ def _known(plant: Plant) -> tuple[KnownNow, ...]:
     return () if plant.estimating is None else plant.estimating.known
 
 
-def _finish(plant: Plant, recorder: Recorder | None, exchanges: int, counts: str, say: Say) -> tuple[Path, ...]:
+def finish_link(plant: Plant, recorder: Recorder | None, exchanges: int, counts: str, say: Say) -> tuple[Path, ...]:
     say(repr(Linked(exchanges, plant.time, counts, (), _known(plant))))
     saved = () if recorder is None else recorder.finish()
     if recorder is not None:

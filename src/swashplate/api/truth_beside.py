@@ -215,12 +215,12 @@ def _form(exact: FrequencyResponse, axis: str) -> str:
 def _misses(exact: FrequencyResponse, axis: str, best: Complex) -> Array:
     """Degrees by which a form is off the vehicle's own response when it is fitted to that."""
     a = MIXER_AXES[axis]
-    return _distance(best, exact.pair(a.output, a.input)[0])[1]
+    return gain_and_phase_off(best, exact.pair(a.output, a.input)[0])[1]
 
 
 def _follows(exact: FrequencyResponse, axis: str, estimate: Complex) -> bool:
     a = MIXER_AXES[axis]
-    gain, phase = _distance(estimate, exact.pair(a.output, a.input)[0])
+    gain, phase = gain_and_phase_off(estimate, exact.pair(a.output, a.input)[0])
     return bool(gain.max() <= _FOLLOWS * GAIN and phase.max() <= _FOLLOWS * PHASE)
 
 
@@ -229,7 +229,7 @@ def _told(line: TrialLine, who: str) -> TrialLine:
     return line._replace(expected=words, passed=None)
 
 
-def _distance(estimate: Complex, true: Complex) -> tuple[Array, Array]:
+def gain_and_phase_off(estimate: Complex, true: Complex) -> tuple[Array, Array]:
     """Gain [dB] and phase [deg] between two responses, both positive."""
     ratio = estimate / true
     return 20.0 * np.abs(np.log10(np.abs(ratio))), np.degrees(np.abs(np.angle(ratio)))
@@ -247,7 +247,7 @@ def _verdict(
     within = f"within {GAIN:g} dB and {limit.min():.1f} to {limit.max():.1f} deg, or {SIGMAS:g} random errors"
     if not good.any():
         return TrialLine(what, "nothing coherent", within, False)
-    gain, phase = _distance(estimate[good], true[good])
+    gain, phase = gain_and_phase_off(estimate[good], true[good])
     sigma = np.nan_to_num(error[good])
     allowed = (
         np.maximum(GAIN, SIGMAS * 20.0 / np.log(10.0) * sigma),

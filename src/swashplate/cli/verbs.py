@@ -84,9 +84,11 @@ VERBS: dict[str, Verb] = {
         verbs={
             "ardupilot": Verb("Be the physics of ArduPilot's SITL.", "link:LinkArduPilot"),
             "px4": Verb("Be the simulator of PX4's SITL.", "link:LinkPx4"),
-            "parameters": Verb("Write ArduPilot's parameters and gains for a vehicle.", "link:WriteParameters"),
+            "betaflight": Verb("Be the physics of Betaflight's SITL.", "link:LinkBetaflight"),
+            "rotorflight": Verb("Be the physics of a SITL of Rotorflight.", "link:LinkRotorflight"),
+            "parameters": Verb("Write an autopilot's parameters and gains for a vehicle.", "link:WriteParameters"),
             "check": Verb("Read a running autopilot's parameters, and judge them.", "link:CheckAutopilot"),
-            "accept": Verb("Start, fly and judge a SITL binary of ArduPilot.", "link:Accept"),
+            "accept": Verb("Start, fly and judge a SITL binary of ArduPilot or Betaflight.", "link:Accept"),
         },
     ),
     "export": Verb("Write a model as C, an FMU, an S-function, .mat or JSON.", "export:ExportModel", MODELS),

@@ -10,6 +10,8 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
+from swashplate.links.betaflight.motors import MotorMapping
+from swashplate.links.betaflight.servo_outputs import SwashServoMapping
 from swashplate.links.recorder import Recorder
 from swashplate.links.servos import ServoMapping
 from swashplate.models.surroundings import environment_of
@@ -65,7 +67,7 @@ class Plant:
     def __init__(
         self,
         vehicle: Vehicle,
-        mapping: ServoMapping,
+        mapping: ServoMapping | MotorMapping | SwashServoMapping,
         around: Surroundings,
         *,
         recorder: Recorder | None = None,
@@ -81,6 +83,7 @@ class Plant:
         self.numbers = vehicle.card.values()
         names = vehicle.state_names
         self._rotors = [names.index(each) for each in ("omega_lower", "omega_upper", "omega") if each in names]
+        self._propellers = [k for k, each in enumerate(names) if each.startswith("omega_")] if not self._rotors else []
         self._stepping = Stepping(vehicle, self._rest, self.environment, engine=engine)
         self._recorder, self._spacing = recorder, 1.0 / record_rate
         self.restart()
@@ -152,7 +155,10 @@ class Plant:
         self._stepping.surround(voltage=voltage)
 
     def rotor_speeds(self, held: Motion) -> tuple[float, float]:
-        """Of main and tail rotor, or of both main rotors [rad/s]."""
+        """Of main and tail rotor, or of both main rotors [rad/s]; of a multirotor twice the mean."""
+        if self._propellers:
+            mean = sum(max(0.0, held.states[k]) for k in self._propellers) / len(self._propellers)
+            return mean, mean
         speeds = [max(0.0, held.states[k]) for k in self._rotors]
         if len(speeds) == 2:
             return speeds[0], speeds[1]

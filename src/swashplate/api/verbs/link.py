@@ -11,6 +11,8 @@ from swashplate.api.question import Answer, argument, option, setting
 from swashplate.api.saying import Say, notice, notice_unless_quiet, silent
 from swashplate.errors import SwashError
 
+_PACE = 0.25
+"""Simulated seconds a second of Betaflight's trial, where nothing slower is asked for: it has no lockstep."""
 if TYPE_CHECKING:
     from swashplate.api.acceptance import Acceptance
     from swashplate.api.check_autopilot import AutopilotCheck
@@ -131,10 +133,72 @@ class LinkPx4(Link):
         self.serve(link_px4, listen_tcp)
 
 
-class WriteParameters(Linkable[Path]):
-    """Write ArduPilot's parameters for a vehicle in hover, gains of all loops included, to --out FILE.parm."""
+class LinkBetaflight(InAir[None], Linkable):
+    """Be the physics of Betaflight's SITL: states to UDP 9003, motors from 9001. For multirotors.
 
-    by_name: ClassVar[tuple[str, ...]] = ("vehicle.parm", "vehicle.param")
+    Both run on clocks of their own, without lockstep. It waits until the SITL has opened TCP 5761. The vehicle stands
+    on the ground at first. Ctrl-C ends the program.
+    """
+
+    pace: float = option(default=1.0, help="Simulated seconds per second.", least=0.02, most=1.0)
+    record: Path | None = option(default=None, help="Save the true flights while they are flown: .nc or .csv.")
+    idle_exit: float | None = option(default=None, help="End after so many seconds without motors.", least=0.1)
+    wait: float = option(default=60.0, help="Seconds to wait for the SITL.", least=0.1, most=3600.0)
+    pilot: bool = option(default=False, help="A simulated pilot arms, takes off and hovers.")
+    record_rate: float = setting(default=200.0, help="samples per second kept", unit="Hz", least=1.0, most=2000.0)
+    altitude: float | None = setting(default=0.0, help="altitude in the standard atmosphere", unit="m")
+
+    def answer(self, say: Say = silent) -> None:
+        self.serve(pilot=self.pilot)
+
+    def serve(self, **more: Any) -> None:
+        """Be the physics until it is interrupted."""
+        from swashplate.api.link import check_record
+        from swashplate.api.link_betaflight import link_betaflight
+
+        if self.servos is not None:
+            raise SwashError("is for ArduPilot and PX4.", channel="--servos")
+        check_record(self.record)
+        vehicle = self.whole()
+        link_betaflight(
+            vehicle,
+            environment=self.around(vehicle),
+            record=self.record,
+            record_rate=self.record_rate,
+            idle_exit=self.idle_exit,
+            pace=self.pace,
+            wait=self.wait,
+            notice=notice,
+            say=notice_unless_quiet,
+            **more,
+        )
+
+    def document(self, answer: Any) -> Any:
+        raise SwashError("is not for a link that runs.", channel="--json")
+
+    def text(self, answer: Any, width: int) -> list[Any]:
+        return []
+
+
+class LinkRotorflight(LinkBetaflight):
+    """Be the physics of a SITL of Rotorflight that sends its servos, by Betaflight's packets. For helicopters.
+
+    Rotorflight 4.6 sends none yet: then this says so, and the helicopter stays on the ground.
+    """
+
+    swash: str = option(default="120", help="Type of the swashplate.", choices=("120", "135", "140", "thru"))
+
+    def answer(self, say: Say = silent) -> None:
+        self.serve(swash=self.swash, pilot=self.pilot)
+
+
+class WriteParameters(Linkable[Path]):
+    """Write an autopilot's parameters for a vehicle in hover, gains included, to --out.
+
+    FILE.parm is ArduPilot's; FILE.txt is Betaflight's configuration of a multirotor.
+    """
+
+    by_name: ClassVar[tuple[str, ...]] = ("vehicle.parm", "vehicle.param", "vehicle.txt")
     needs_out: ClassVar[bool] = True
 
     def answer(self, say: Say = silent) -> Any:
@@ -142,10 +206,14 @@ class WriteParameters(Linkable[Path]):
 
     def write(self, answer: Vehicle, folder: Path, names: tuple[str, ...]) -> None:
         from swashplate.api.link import write_ardupilot_parameters
+        from swashplate.api.link_betaflight import write_betaflight_configuration
         from swashplate.simulation.trim import trim
 
         hover = trim(answer)
         for name in names:
+            if name.endswith(".txt"):
+                write_betaflight_configuration(answer, folder / name)
+                continue
             write_ardupilot_parameters(
                 answer, folder / name, name=self.name(), servos=self.servos, trim=hover, notice=notice
             )
@@ -188,10 +256,14 @@ class Accept(InAir["Acceptance"], Linkable):
     waits for the EKF, arms, hovers in STABILIZE, ALT_HOLD and LOITER, sweeps each axis in System ID mode, lands, and
     takes the log through respond and identify. Every line has a verdict; the exit code is 2 if one fails. Needs the
     extra `link`. The binary is ended in every case.
+
+    A multirotor is tried with Betaflight's SITL: configured, armed, hovered in ANGLE mode, its sticks swept from 0.5 to
+    6 Hz (roll, pitch, yaw), and its Blackbox log compared. There is no lockstep, so it flies at a quarter of real time
+    or slower (speedup). Options of modes, parameter files and ports are for ArduPilot.
     """
 
     binary: Path = argument(
-        metavar="BINARY", help="ArduCopter for SITL, e.g. build/sitl/bin/arducopter-heli.", kw_only=True
+        metavar="BINARY", help="ArduCopter's SITL, e.g. build/sitl/bin/arducopter-heli, or Betaflight's.", kw_only=True
     )
     folder: Path = option(
         flag="--out", metavar="DIR", help="New folder for the report, the log and the binary's output."
@@ -221,6 +293,8 @@ class Accept(InAir["Acceptance"], Linkable):
         from swashplate.models.catalogue import vehicle as find
 
         vehicle = self.flying(self.vehicle)
+        if "motor_3" in vehicle.input_names:
+            return self._multirotor(vehicle, say)
         acceptance = accept_autopilot(
             vehicle,
             self.binary,
@@ -244,6 +318,25 @@ class Accept(InAir["Acceptance"], Linkable):
         say("writing the report")
         acceptance.save(self.folder)
         return acceptance
+
+    def _multirotor(self, vehicle: Vehicle, say: Say) -> Acceptance:
+        from swashplate.api.accept_betaflight import accept_betaflight
+        from swashplate.models.catalogue import vehicle as find
+
+        trial = accept_betaflight(
+            vehicle,
+            self.binary,
+            out=self.folder,
+            name=self.name(),
+            truth=find(self.against) if isinstance(self.against, str | Path) else self.against,
+            axes=tuple(axis for axis in strings(self.axes) if axis != "heave"),
+            environment=self.around(vehicle),
+            pace=min(self.speedup, _PACE),
+            timeout=self.timeout,
+            say=say,
+        )
+        trial.save(self.folder)
+        return trial
 
     def text(self, answer: Acceptance, width: int) -> list[Any]:
         return [repr(answer), f"\nReport: {self.folder / 'report.html'}"]

@@ -1,0 +1,218 @@
+"""The verb `accept_betaflight`: a SITL binary of Betaflight started, flown and judged with a multirotor."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from swashplate.api.acceptance import Acceptance
+from swashplate.api.link import link_engine
+from swashplate.api.saying import Say, silent
+from swashplate.api.truth_beside import GAIN, PHASE, SIGMAS, TruthBeside, gain_and_phase_off
+from swashplate.errors import SwashError
+from swashplate.flights.conditioning.uniform_records import uniform_records
+from swashplate.flights.flight import Flight
+from swashplate.flights.readers.read import read
+from swashplate.identification.responses.respond import respond
+from swashplate.links.ardupilot.trial import Background, TrialEndedError, TrialLine
+from swashplate.links.betaflight.binary import BetaflightBinary
+from swashplate.links.betaflight.configuration import configuration
+from swashplate.links.betaflight.gains import AXES, RATES, axis_response, betaflight_gains
+from swashplate.links.betaflight.motors import MotorMapping
+from swashplate.links.betaflight.packets import MOTORS_PORT
+from swashplate.links.betaflight.pilot import pilot_for
+from swashplate.links.betaflight.session import STEP, BetaflightSession, serve
+from swashplate.links.betaflight.trial import BetaflightTrial, StickSweep
+from swashplate.links.notices import Notices
+from swashplate.links.plant import Plant, Surroundings
+from swashplate.links.sensing import Sensing
+from swashplate.links.sockets import listen_udp
+from swashplate.models.surroundings import environment_of
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.environment import Environment
+from swashplate.simulation.linearize import LinearModel, linearize
+from swashplate.simulation.standing import airborne, standing
+from swashplate.simulation.trim import trim
+
+_RATE = 200.0
+"""Hz of the records."""
+_COHERENT, _LEAST_SHARE = 0.8, 0.5
+"""Coherence from which on a line counts, and the share of the band that must have it to be judged."""
+
+
+def accept_betaflight(
+    vehicle: Vehicle,
+    binary: str | Path,
+    *,
+    out: str | Path,
+    name: str | None = None,
+    truth: Vehicle | None = None,
+    axes: Sequence[str] = AXES,
+    band: tuple[float, float] = (0.5, 6.0),
+    seconds: float = 20.0,
+    hover: float = 5.0,
+    height: float = 1.5,
+    gains: Mapping[str, float] | None = None,
+    environment: Environment | None = None,
+    pace: float = 0.25,
+    timeout: float = 15.0,
+    say: Say = silent,
+) -> Acceptance:
+    """Start a SITL binary of Betaflight with a multirotor's configuration, fly it, and put truth beside its log.
+
+    It is configured (motors, modes, gains with margins), started, armed, hovered in ANGLE mode by a pilot of ours, and
+    each stick is swept; then the response of its Blackbox log is held against the vehicle's linearisation. Its clock is
+    not in lockstep with the physics: `pace` says how slow both run, so that a busy machine is not late. The binary is
+    ended in every case.
+
+    Args:
+        vehicle: a multirotor of at most eight motors. binary: Betaflight's SITL.
+        out: folder where it runs: `sitl`, which must not be there yet and keeps its logs.
+        name: as the vehicle is called.
+        truth: whose linearisation the response is held against; the vehicle's own where None.
+        axes: that are swept, of roll, pitch and yaw. band: of the sweeps [Hz]. seconds: of each.
+        hover: s of it. height: of it [m].
+        gains: settings of Betaflight's command line that are flown; those of `betaflight_gains` where None.
+        environment: wind and air.
+        pace: simulated seconds a second.
+        timeout: wall clock until it has loaded its configuration, and opened its ports, each [s].
+        say: told what is being done.
+
+    Raises:
+        SwashError: a binary that is missing, cannot be run or is none of Betaflight; a port that is taken; a vehicle
+            that is no multirotor. What goes wrong later is a line of the result that fails.
+    """
+    if unknown := [axis for axis in axes if axis not in AXES]:
+        raise SwashError(f"'{unknown[0]}' is none of {', '.join(AXES)}.", channel="axes")
+    if not 0.02 <= pace <= 1.0:
+        raise SwashError(f"is {pace:g}, expected 0.02 to 1 simulated seconds a second.", channel="speedup")
+    folder = Path(out) / "sitl"
+    if folder.exists():
+        raise SwashError("is there already.", where=folder, channel="--out", hint="Give another folder, or remove it.")
+    mapping, sitl = MotorMapping(vehicle), BetaflightBinary(binary, folder)
+    around = environment_of(vehicle, environment)
+    with listen_udp("127.0.0.1", MOTORS_PORT) as bound:
+        say("trimming and linearising the vehicle")
+        flying = airborne(vehicle)
+        model = linearize(flying, trim(flying, environment=environment))
+        say("searching gains with margins")
+        settings = dict(gains) if gains is not None else dict(betaflight_gains(model, mapping).settings)
+        say("loading the configuration")
+        sitl.configure(configuration(mapping, settings), timeout=timeout)
+        say("compiling the vehicle")
+        aircraft = standing(vehicle)
+        plant = Plant(aircraft, mapping, Surroundings(around), engine=link_engine(lambda text: say(text)))
+        plant.prepare()
+        pilot = pilot_for(model, plant.standing_depth)
+        session = BetaflightSession(plant, mapping, Sensing(plant), Notices(lambda text: say(text)), sticks=pilot)
+        session.pace = pace
+        sweeps = tuple(StickSweep(axis, *band, seconds) for axis in axes)
+        trial = BetaflightTrial(session, pilot, sitl, height, hover, sweeps)
+        trial.lines.append(TrialLine("configuration", f"{len(settings)} settings", "loaded without an error", True))
+        begun = time.monotonic()
+        with sitl:
+            say("starting the binary")
+            sitl.wait_until_up(timeout)
+            with Background(lambda go_on: serve(bound, session, go_on=go_on)) as physics:
+                try:
+                    trial.fly(say)
+                except TrialEndedError as error:
+                    trial.lines.append(TrialLine("flight", str(error), "to its end", False))
+                if physics.failed:
+                    trial.lines.append(TrialLine("physics", str(physics.failed[0]), "answers to the end", False))
+        told = session.exchanged
+        speed = plant.time / max(time.monotonic() - begun, 1e-9)
+        words = f"{told.states} states, motors for {100.0 * told.answered:.0f} %, {1e3 * told.longest:.0f} ms at most"
+        trial.lines.append(TrialLine("exchanges, no lockstep", f"{words}, {1e3 * told.lost:.0f} ms lost"))
+    say("reading the log")
+    logs = sitl.logs()
+    other = model if truth is None else linearize(airborne(truth), trim(airborne(truth), environment=environment))
+    comparison = _judged(logs, trial, other, mapping) if trial.flown else None
+    called, log = name or vehicle.card.called, logs[-1] if logs else None
+    command = (str(sitl.binary),)
+    return Acceptance(str(binary), _version(sitl), called, command, tuple(trial.lines), comparison, log, folder, speed)
+
+
+def _version(sitl: BetaflightBinary) -> str:
+    logs = sitl.logs()
+    if not logs:
+        return "Betaflight's SITL"
+    head = logs[-1].read_bytes()[:20_000].decode("latin-1")
+    revisions = [line for line in head.splitlines() if line.startswith("H Firmware revision:")]
+    return revisions[0].partition(":")[2].strip() if revisions else "Betaflight's SITL"
+
+
+def _judged(
+    logs: Sequence[Path], trial: BetaflightTrial, model: LinearModel, mapping: MotorMapping
+) -> TruthBeside | None:
+    """The responses of the newest log; lines are added for it and for each axis."""
+    lines = trial.lines
+    if not logs:
+        lines.append(TrialLine("log", "none was written", "a Blackbox log", False))
+        return None
+    try:
+        flight = read(logs[-1])
+    except SwashError as error:
+        lines.append(TrialLine("log", str(error), "read", False))
+        return None
+    damage = "; ".join(flight.provenance.damage)
+    lines.append(TrialLine("log", damage or f"{flight.duration:.0f} s", "read, not damaged", not damage))
+    comparison, longest = TruthBeside(), trial.session.exchanged.longest
+    for axis, (sweep, began) in trial.flown.items():
+        try:
+            lines += _axis(flight, axis, sweep, began, model, mapping, longest, comparison)
+        except SwashError as error:
+            lines.append(TrialLine(f"{axis}: response", str(error), "a response", False))
+    return comparison
+
+
+def _axis(
+    flight: Flight,
+    axis: str,
+    sweep: StickSweep,
+    began: float,
+    model: LinearModel,
+    mapping: MotorMapping,
+    longest: float,
+    comparison: TruthBeside,
+) -> list[TrialLine]:
+    """Truth beside the response from the mixer's command to the rate.
+
+    The truth is not late: a step moves the time that has passed under the newest motors, which is early by what a state
+    waits for its loop. Without lockstep either side may be off by the longest step that there was, so may the phase.
+    """
+    place, command, stick = AXES.index(axis), f"mixer_{axis}", f"stick_{axis}"
+    rate = f"{RATES[place]}_imu" if f"{RATES[place]}_imu" in flight else RATES[place]
+    start = float(flight.time(rate)[0]) + began
+    piece = flight.between(start, start + sweep.seconds)
+    records = uniform_records([piece], (command, rate, stick), rate=_RATE)
+    response = respond(
+        records, inputs=[command], outputs=[rate], references=(stick,), band=(1.25 * sweep.low, 0.75 * sweep.high)
+    )
+    h, coherence, error = response.pair(rate, command)
+    good = np.isfinite(h) & (coherence >= _COHERENT)
+    true = axis_response(model, mapping, place, response.omega)
+    share = float(np.mean(good))
+    comparison.curves[(rate, command)] = {
+        "truth": (response.omega, true),
+        "respond": (response.omega, np.where(good, h, np.nan)),
+    }
+    comparison.remarks += [f"{axis}: {text}" for text in (*response.warnings, *response.problems)]
+    told = f"{100.0 * share:.0f} % of the band"
+    enough = share >= _LEAST_SHARE
+    lines = [TrialLine(f"{axis}: coherent", told, f"{100.0 * _LEAST_SHARE:.0f} % of the band", enough)]
+    if good.any():
+        gain, phase = gain_and_phase_off(h[good], true[good])
+        sigma = np.nan_to_num(error[good])
+        limit = np.minimum(PHASE, np.degrees(response.omega[good] * max(STEP, longest)))
+        right = (gain <= np.maximum(GAIN, SIGMAS * 8.686 * sigma)) & (
+            phase <= np.maximum(limit, SIGMAS * np.degrees(sigma))
+        )
+        words = f"{gain.max():.2f} dB, {phase.max():.1f} deg"
+        expected = f"within {GAIN:g} dB and {limit.min():.1f} to {limit.max():.1f} deg, or {SIGMAS:g} random errors"
+        passed = bool(right.all()) if enough else None
+        lines.append(TrialLine(f"{axis}: response beside truth", words, expected, passed))
+    return lines

@@ -1,0 +1,226 @@
+"""A SITL binary of Betaflight as a process of ours: configured once, then run in a folder of its own.
+
+It is run on a terminal of its own, because what it prints into a file comes out only when it ends. Its ports are fixed
+(`packets`), so one runs on a machine at a time. `--config FILE` loads lines of the command line, writes `eeprom.bin`
+and ends; logs are LOGnnnnn.BFL in the folder.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+from swashplate.errors import LinkError
+from swashplate.links.betaflight.packets import MSP_PORT, STATE_PORT, STICKS_PORT
+from swashplate.systems import end_with_children
+
+_PATIENCE = 2.0
+"""s that it has to end by itself."""
+_CONFIGURED = "EEPROM saved"
+_UP, _SETTLING = f"bind port {MSP_PORT}", 0.5
+"""What it prints once its ports are open, and how long its sensors take from there [s]."""
+_CLOCK = re.compile(rb"\[SITL\] t=(\d+)ms  spd")
+
+
+class BetaflightBinary:
+    """A binary in a folder; used as a context, it is ended whatever happens.
+
+    Args:
+        binary: Betaflight's SITL. folder: where it runs; made where it is missing.
+
+    Raises:
+        LinkError: where the binary is missing or is no program, or one of its ports is taken.
+    """
+
+    def __init__(self, binary: str | Path, folder: Path) -> None:
+        self.binary, self.folder = _runnable(Path(binary)), folder
+        for kind, port in (
+            (socket.SOCK_DGRAM, STATE_PORT),
+            (socket.SOCK_DGRAM, STICKS_PORT),
+            (socket.SOCK_STREAM, MSP_PORT),
+        ):
+            _check_free(kind, port)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._told = bytearray()
+        self._clock: tuple[float, float] | None = None
+
+    def configure(self, text: str, *, timeout: float) -> None:
+        """Let it load lines of its command line.
+
+        Raises:
+            LinkError: where it does not, with what it said.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        (self.folder / "configuration.txt").write_text(text, encoding="utf-8")
+        self._start("--config", "configuration.txt")
+        until = time.monotonic() + timeout
+        while time.monotonic() < until and not self.ended():
+            time.sleep(0.05)
+        over = bool(self.ended(patience=0.2))
+        self.stop()
+        self._heard.join(_PATIENCE)
+        said = self.text()
+        if not over or _CONFIGURED not in said:
+            why = f"within {timeout:g} s" if not over else "and ended"
+            raise LinkError(
+                f"did not load a configuration {why}; its last words: {self.last_words() or 'none'}.",
+                where=self.binary,
+                hint="Is it Betaflight's SITL of 2025.12 or later (--config)?",
+            )
+        if "###ERROR" in said or "INVALID" in said.upper():
+            wrong = next(line for line in said.splitlines() if "ERROR" in line.upper() or "INVALID" in line.upper())
+            raise LinkError(f"refuses a line of its configuration: {wrong.strip()}.", where=self.binary)
+
+    def __enter__(self) -> BetaflightBinary:
+        self._start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+        (self.folder / "sitl.txt").write_bytes(bytes(self._told))
+
+    def _start(self, *arguments: str) -> None:
+        self._told.clear()
+        mine, its = os.openpty()
+        try:
+            self._process = subprocess.Popen(
+                [str(self.binary), *arguments], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=its, stderr=its,
+                start_new_session=True,
+            )  # fmt: skip
+        except OSError as error:
+            os.close(mine)
+            raise LinkError(
+                f"cannot be run: {error.strerror or error}.", where=self.binary, hint="Is it a build for this machine?"
+            ) from None
+        finally:
+            os.close(its)
+        self._heard = threading.Thread(target=self._listen, args=(mine,), daemon=True)
+        self._heard.start()
+
+    def _listen(self, terminal: int) -> None:
+        with contextlib.suppress(OSError):  # the other end is closed when it ends
+            while piece := os.read(terminal, 4096):
+                self._told += piece
+                if times := _CLOCK.findall(piece):
+                    self._clock = time.monotonic(), 1e-3 * float(times[-1])
+        os.close(terminal)
+
+    def stop(self) -> None:
+        """End it and everything that it started."""
+        if self._process is None:
+            return
+        for at_once in (False, True):
+            end_with_children(self._process, at_once=at_once)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(None if at_once else _PATIENCE)
+
+    def ended(self, *, patience: float = 0.0) -> str:
+        """How it ended, with its last words; empty where it still runs after `patience` [s]."""
+        if self._process is None:
+            return ""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(patience)
+        code = self._process.poll()
+        if code is None:
+            return ""
+        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+        return f"the binary ended {how}; its last words: {self.last_words() or 'none'}."
+
+    def text(self) -> str:
+        """All that it printed."""
+        return bytes(self._told).decode("utf-8", "replace")
+
+    def last_words(self, lines: int = 3) -> str:
+        """The end of what it printed, in one line."""
+        said = "".join(letter if letter.isprintable() else "\n" for letter in self.text()[-4000:])
+        kept = [line.strip() for line in said.splitlines() if line.strip() and not line.startswith("[FLASH_Program")]
+        return " / ".join(kept[-lines:])[-400:]
+
+    def wait_until_up(self, timeout: float) -> None:
+        """Until it has opened its ports: a state that comes before ends it.
+
+        Raises:
+            LinkError: where it ends before, or does not get so far in time.
+        """
+        until = time.monotonic() + timeout
+        while time.monotonic() < until:
+            if told := self.ended():
+                raise LinkError(told, where=self.binary)
+            if _UP in self.text():
+                time.sleep(_SETTLING)
+                return
+            time.sleep(0.05)
+        raise LinkError(
+            f"opened no MSP port (TCP {MSP_PORT}) within {timeout:g} s; its last words: {self.last_words() or 'none'}.",
+            where=self.binary,
+            hint="Is it Betaflight's SITL?",
+        )
+
+    def clock(self) -> tuple[float, float] | None:
+        """When it last told the time of its clock, and that [s]; None where it did not yet."""
+        return self._clock
+
+    def refusals(self) -> str:
+        """Why it refuses to be armed, in its own words, as it said last; empty for nothing."""
+        told = [line for line in self.text().splitlines() if "Arming disabled:" in line]
+        return told[-1].partition("Arming disabled:")[2].strip() if told else ""
+
+    def logs(self) -> list[Path]:
+        """Blackbox logs that it wrote, in order."""
+        return sorted(self.folder.glob("LOG*.BFL"))
+
+
+def wait_for_sitl(seconds: float) -> None:
+    """Until somebody on this machine listens on the MSP port, and has had the time to find its sensors.
+
+    Raises:
+        LinkError: where nobody does.
+    """
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("0.0.0.0", MSP_PORT))
+            except OSError:
+                time.sleep(_SETTLING)
+                return
+        time.sleep(0.2)
+    raise LinkError(
+        f"nobody listens on TCP {MSP_PORT} after {seconds:g} s: no SITL of Betaflight runs here.",
+        channel="--wait",
+        hint="Start it in another terminal; its MSP port says that it is up.",
+    )
+
+
+def _runnable(binary: Path) -> Path:
+    path = binary.expanduser().absolute()
+    if not path.exists():
+        raise LinkError("there is no such file.", where=binary, channel="BINARY")
+    if not path.is_file():
+        raise LinkError("is no file, expected Betaflight's SITL binary.", where=binary, channel="BINARY")
+    if not os.access(path, os.X_OK):
+        raise LinkError("is not executable.", where=binary, channel="BINARY", hint=f"chmod +x {binary}")
+    return path
+
+
+def _check_free(kind: socket.SocketKind, port: int) -> None:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        if kind is socket.SOCK_STREAM:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("0.0.0.0", port))
+        except OSError:
+            name = "TCP" if kind is socket.SOCK_STREAM else "UDP"
+            raise LinkError(
+                f"{name} port {port} is in use by another program.",
+                channel="BINARY",
+                hint="Another SITL runs? Stop it: Betaflight's ports cannot be moved.",
+            ) from None

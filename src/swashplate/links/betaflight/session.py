@@ -1,0 +1,187 @@
+"""A vehicle as the physics of Betaflight's SITL: states out and motors in, each side on a clock of its own.
+
+The firmware sets the pace of its clock from the time stamps of the last two states and when they came: on a busy
+machine it rushes by a factor of three. A state with the time stamp of the one before leaves its clock alone. So three
+states set a pace once, slower than the wall clock where a machine is busy, and all others have the same stamp. There is
+no lockstep; how late steps were is told. A build with ENABLE_SIMULATOR_GYROPID_SYNC runs a loop for each state.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from swashplate.links.betaflight.motors import MotorMapping
+from swashplate.links.betaflight.packets import (
+    STATE_PORT,
+    STICKS_PORT,
+    PulseRefusal,
+    pulses_of,
+    state_packet,
+    sticks_packet,
+)
+from swashplate.links.betaflight.servo_outputs import SwashServoMapping
+from swashplate.links.notices import Notices
+from swashplate.links.plant import Plant
+from swashplate.links.sensing import Sensing
+from swashplate.simulation.stepping import Motion
+
+STEP = 0.002
+"""s between two states, if the machine can."""
+LONGEST = 0.02
+"""s that the physics moves at once at most: what a machine stood still longer is lost to it, and told."""
+_TICK = 0.00025
+"""s: moves are whole numbers of it."""
+_STAMP = 0.015
+"""s between the two time stamps that set the pace: 20 ms are no pace for it."""
+STICKS_EVERY = 5
+"""States between two packets of sticks: 100 Hz."""
+_AT_REST = 1000.0
+"""us: motors before the first packet."""
+Sticks = Callable[[float, Motion], list[float] | None]
+"""A pilot: sticks [us] for a time and a motion; None while nobody holds them."""
+
+
+@dataclass
+class Exchanged:
+    """How it goes.
+
+    Attributes:
+        states: sent. motors: packets that came.
+        longest: between two states, and lost: that the physics left out, in simulated time [s].
+    """
+
+    states: int = 0
+    motors: int = 0
+    longest: float = 0.0
+    lost: float = 0.0
+
+    @property
+    def answered(self) -> float:
+        """Share of the states that a motor packet came for."""
+        return self.motors / self.states if self.states else 0.0
+
+
+class BetaflightSession:
+    """A plant under Betaflight, or Rotorflight.
+
+    Args:
+        plant: what flies. mapping: its own. sensing: its sensors. notices: where to say what happens.
+        sticks: the pilot. doubles: of a state; 17 leave the pressure out (Rotorflight).
+
+    Attributes:
+        pulses: the newest outputs [us].
+        pace: simulated seconds a second.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        mapping: MotorMapping | SwashServoMapping,
+        sensing: Sensing,
+        notices: Notices,
+        *,
+        sticks: Sticks = lambda time, moved: None,
+        doubles: int = 18,
+    ) -> None:
+        self.plant, self._sensing, self._notices, self.sticks, self._size = plant, sensing, notices, sticks, 8 * doubles
+        self.pace, self._motors = 1.0, mapping.motors
+        self.pulses = [_AT_REST] * max(plant.mapping.channels)
+        self.exchanged = Exchanged()
+        self._said_broken = False
+
+    def take(self, data: bytes) -> None:
+        """A datagram of the motors' port, whatever it holds."""
+        told = pulses_of(data)
+        if isinstance(told, PulseRefusal):
+            self._notices.tell(told.kind, told.words)
+            return
+        wanted = self._motors
+        if told.motors != wanted:
+            words = f"the firmware drives {told.motors} motors, the vehicle has {wanted}: load its configuration."
+            self._notices.tell("motors", words)
+            return
+        if wanted < len(self.pulses) and not any(told.values[wanted : len(self.pulses)]):
+            self._notices.tell("servos", "the firmware sends no servos behind its motor: the vehicle stays as it is.")
+            return
+        if not self.exchanged.motors:
+            self._notices.always(f"Betaflight drives {told.motors} motors.")
+        self.exchanged.motors += 1
+        self.pulses = list(told.values[: len(self.pulses)])
+
+    def begun(self, stamp: float) -> bytes:
+        """The state where it stands, with a time stamp [s]."""
+        return state_packet(stamp, self._sensing.read(self.plant.moved))[: self._size]
+
+    def step(self, duration: float) -> tuple[bytes, bytes | None]:
+        """Move so long [s] under the newest motors. Returns the state to send, and sticks where they are due."""
+        moved = self.plant.advance(self.pulses, duration)
+        if self.plant.broken and not self._said_broken:
+            self._said_broken = True
+            self._notices.always(f"the vehicle broke at {self.plant.time:.2f} s: {self.plant.broken}. It lies there.")
+        held = self.sticks(self.plant.time, moved)
+        self.exchanged.states += 1
+        state = state_packet(_STAMP, self._sensing.read(moved))[: self._size]
+        due = held is not None and self.exchanged.states % STICKS_EVERY == 0
+        return state, sticks_packet(self.plant.time, held) if due and held is not None else None
+
+
+def serve(
+    bound: socket.socket,
+    session: BetaflightSession,
+    *,
+    go_on: Callable[[], bool] = lambda: True,
+    idle_exit: float | None = None,
+) -> None:
+    """Send states at their pace to this machine, and take what comes on the motors' port.
+
+    Args:
+        bound: a UDP socket on the motors' port; it is not closed.
+        session: what answers.
+        go_on: asked at every step whether to go on.
+        idle_exit: end after so many seconds without a motor packet; None goes on for ever.
+    """
+    bound.setblocking(False)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        for stamp in (0.0, 0.0, _STAMP):  # the second is the first whose time it keeps
+            _send(out, session.begun(stamp), STATE_PORT)
+            time.sleep(_STAMP / session.pace if stamp == 0.0 else 0.0)
+        heard = moved_to = time.monotonic()
+        came = 0
+        while go_on():
+            pace = session.pace
+            while (left := moved_to + STEP / pace - time.monotonic()) > 0.0:
+                time.sleep(left)
+            _receive(bound, session)
+            now = time.monotonic()
+            ticks = int((now - moved_to) * pace / _TICK)
+            moved_to += ticks * _TICK / pace
+            duration = min(LONGEST, ticks * _TICK)
+            told = session.exchanged
+            told.longest, told.lost = max(told.longest, ticks * _TICK), told.lost + ticks * _TICK - duration
+            state, sticks = session.step(duration)
+            _send(out, state, STATE_PORT)
+            if sticks is not None:
+                _send(out, sticks, STICKS_PORT)
+            if told.motors > came:
+                heard, came = now, told.motors
+            if idle_exit is not None and now - heard >= idle_exit:
+                return
+
+
+def _send(out: socket.socket, data: bytes, port: int) -> None:
+    try:
+        out.sendto(data, ("127.0.0.1", port))
+    except OSError:
+        return  # nobody is there yet, or any more
+
+
+def _receive(bound: socket.socket, session: BetaflightSession) -> None:
+    while True:
+        try:
+            data = bound.recv(2048)
+        except (BlockingIOError, ConnectionError):
+            return
+        session.take(data)
