@@ -39,5 +39,5 @@ def test_a_card_that_was_never_identified_is_compared_with_itself_or_the_package
 
 def test_an_earlier_model_that_forgot_its_card_asks_for_it() -> None:
     model = sp.vehicle("raptor50").with_values({"hub_stiffness": 31.0}, status="identified", sigma=0.1, before=None)
-    with pytest.raises(CardError, match=r"from which card it was identified\.\s+Name that card with --published"):
+    with pytest.raises(CardError, match=r"identified\.\s+Name that card with --settings published=CARD"):
         started_from(model)
