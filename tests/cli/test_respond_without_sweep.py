@@ -44,3 +44,12 @@ def test_a_line_without_a_number_is_a_warning_and_the_others_stand(tmp_path: Pat
     assert "no number is given there" in told.out
     for pair in ("p / mixer_roll", "p / mixer_pitch", "q / mixer_roll", "q / mixer_pitch"):
         assert pair in told.out
+
+
+def test_channels_that_nobody_names_are_those_of_the_sweeps(tmp_path: Path) -> None:
+    done = swash("respond", "examples/helicopter_sweeps", "--out", tmp_path / "r", "--json")
+    assert done.code == 0, done.err
+    found = sp.FrequencyResponse.load(tmp_path / "r" / "responses.nc")
+    assert found.inputs == ("mixer_roll", "mixer_pitch")
+    assert found.outputs == ("p", "q")
+    assert "nputs mixer_roll, mixer_pitch, outputs p, q: what the sweeps moved" in done.err

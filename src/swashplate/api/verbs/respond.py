@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from swashplate.api.asking import FromConditioned, called, strings
 from swashplate.api.languages import Band, Logs, Names, Numbers, Renamed
 from swashplate.api.question import argument, option, setting
-from swashplate.api.saying import Say, silent
+from swashplate.api.saying import Say, notice_unless_quiet, silent
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
@@ -35,10 +35,14 @@ class Respond(FromConditioned["FrequencyResponse"]):
     inputs: Renamed = option(
         default=(),
         metavar="NAME,...",
-        help="Input channels, separated by commas: all that moved; NAME=CHANNEL renames.",
+        help="Input channels, separated by commas: all that moved; what the sweeps moved if not given. NAME=CHANNEL "
+        "renames.",
     )
     outputs: Renamed = option(
-        default=(), metavar="NAME,...", help="Output channels, separated by commas; NAME=CHANNEL renames, as az=az_sid."
+        default=(),
+        metavar="NAME,...",
+        help="Output channels, separated by commas; what answers the sweeps if not given. NAME=CHANNEL renames, as "
+        "az=az_sid.",
     )
     references: Names = option(
         default=(), help="Injected excitation, for logs flown in a loop: the joint input-output estimate."
@@ -66,10 +70,11 @@ class Respond(FromConditioned["FrequencyResponse"]):
             raise SwashError(f"'{told}' are not all positive lengths in s.", channel="--windows")
         say("reading logs")
         raw = self.read(self.logs)
-        for names, option_name in ((ins, "--inputs"), (outs, "--outputs")):
-            if not names:
-                self._refuse_unswept(raw)
-                raise SwashError("is missing.", channel=option_name, hint="Name channels, separated by commas.")
+        if not ins or not outs:
+            moved, answering = self._swept_channels(raw)
+            ins, outs = ins or _pairs(moved), outs or _pairs(answering)
+            told = f"inputs {', '.join(ins)}, outputs {', '.join(outs)}"
+            notice_unless_quiet(f"{told}: what the sweeps moved, where --inputs and --outputs name nothing else")
         flights = uniform_records(raw, (*ins, *outs, *references), rate=self.rate, cutoff=self.cutoff, names=ins | outs)
         check_disjoint(flights, called(self.logs))
         say("computing responses")
@@ -83,15 +88,20 @@ class Respond(FromConditioned["FrequencyResponse"]):
             direct=self.direct,
         )
 
-    def _refuse_unswept(self, flights: list[Flight]) -> None:
+    def _swept_channels(self, flights: list[Flight]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """What the logs' sweeps moved, and what answers to that, in the order of the sweeps."""
         from swashplate.flights.maneuvers.sweeps import sweeps
+        from swashplate.links.logs.sweep_channels import channels_of
 
-        if not any(sweeps(flight) for flight in flights):
+        swept = [channels_of(flight, sweep) for flight in flights for sweep in sweeps(flight)]
+        if not swept:
             raise SwashError(
                 "No sweep was found, so no response of the vehicle can be given.",
                 where=", ".join(called(self.logs) or ()) or None,
                 hint="`swash inspect` tells what the flight shows without one, and the sweep to fly next.",
             )
+        inputs, outputs = (tuple(dict.fromkeys(one[place] for one in swept)) for place in (0, 1))
+        return inputs, outputs
 
     def _combined(self) -> FrequencyResponse:
         from swashplate.identification.responses.arithmetic import combine
