@@ -127,7 +127,7 @@ def test_primed_rows_mix_roll_and_yaw_by_the_product_of_inertia() -> None:
 
 
 def test_uncertainty_bounds_hold_the_cards_value_and_repeat() -> None:
-    arguments = ("vehicle", "derivatives", "raptor50", "--uncertainty", "--draws", "10", "--json")
+    arguments = ("vehicle", "derivatives", "raptor50", "--uncertainty", "--settings", "draws=10", "--json")
     first, second = swash(*arguments), swash(*arguments)
     assert first.out == second.out
     document = json.loads(first.out)["tables"][0]

@@ -50,6 +50,7 @@ except ImportError as error:
 from pathlib import Path
 from swashplate.links.logs.app import logs_app
 try:
+    from swashplate.api.open_logs import open_logs
     open_logs("nowhere.bin")
 except sp.SwashError as error:
     assert "there is no such file" in str(error), "the verb itself runs without JAX"

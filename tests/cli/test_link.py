@@ -38,7 +38,7 @@ IDLE = [1500, 1500, 1500, 1500, 1000, 1000]
 )
 def test_what_is_refused(arguments: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert words in one_message(swash("link", *arguments, "--idle-exit", "0.2"))
+    assert words in one_message(swash("link", *arguments, "--settings", "idle_exit=0.2"))
 
 
 @pytest.mark.parametrize(("verb", "kind"), [("ardupilot", socket.SOCK_DGRAM), ("px4", socket.SOCK_STREAM)])
@@ -118,7 +118,9 @@ def test_a_killed_link_loses_nothing_of_what_it_answered(tmp_path: Path) -> None
     left = sp.read(tmp_path / "flown-2.growing")
     assert left.stop == pytest.approx(told["timestamp"], abs=0.006)
     assert left.provenance.damage == ()
-    again = swash("link", "ardupilot", "--vehicle", "coax", "--port", "0", "--idle-exit", "0.1", "--record", record)
+    again = swash(
+        "link", "ardupilot", "--vehicle", "coax", "--port", "0", "--settings", "idle_exit=0.1", "--record", record
+    )
     assert again.code == 0, again.err
     assert "an earlier recording was cut off; its 1.0 s are saved" in " ".join(again.err.split())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["flown-2.nc", "flown.nc"]
@@ -129,7 +131,7 @@ def test_a_killed_link_loses_nothing_of_what_it_answered(tmp_path: Path) -> None
 def test_a_model_file_is_a_vehicle(tmp_path: Path) -> None:
     file = tmp_path / "model.toml"
     sp.vehicle("coax").with_values({"mass": 0.333}, source="test", status="identified").save(file)
-    outcome = swash("link", "ardupilot", "--vehicle", file, "--port", "0", "--idle-exit", "0.1")
+    outcome = swash("link", "ardupilot", "--vehicle", file, "--port", "0", "--settings", "idle_exit=0.1")
     assert outcome.code == 0, outcome.err
     assert "waiting for an autopilot" in outcome.err
 
@@ -142,8 +144,8 @@ def test_listening_beyond_this_machine_is_warned_of() -> None:
         "coax",
         "--port",
         "0",
-        "--idle-exit",
-        "0.1",
+        "--settings",
+        "idle_exit=0.1",
         "--settings",
         saying(listen="0.0.0.0"),
     )

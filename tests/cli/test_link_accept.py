@@ -19,10 +19,18 @@ BINARY = Path(__file__).parents[1] / "sitl_standin.py"
 def test_what_is_refused(tmp_path: Path) -> None:
     command = ["link", "accept", tmp_path / "none", "--vehicle", "raptor50", "--out", tmp_path / "out"]
     assert "there is no such file" in one_message(swash(*command))
-    assert "'0.4' is not LOW-HIGH" in one_message(swash(*command, "--band", "0.4"))
+    assert "'0.4' is not LOW-HIGH" in one_message(swash(*command, "--settings", "band=0.4"))
     assert "'rol' is none of roll, pitch, yaw, heave" in one_message(swash(*command, "--axes", "rol"))
-    given = [*command[:2], BINARY, *command[3:], "--defaults", tmp_path / "no.parm", "--settings", "instance=61"]
-    assert "no.parm: --defaults: there is no such file" in one_message(swash(*given))
+    given = [
+        *command[:2],
+        BINARY,
+        *command[3:],
+        "--settings",
+        f"defaults={tmp_path / 'no.parm'}",
+        "--settings",
+        "instance=61",
+    ]
+    assert "no.parm: defaults: there is no such file" in one_message(swash(*given))
     assert not (tmp_path / "out").exists()
     ended = one_message(swash(*command[:2], "/bin/true", *command[3:], "--settings", "instance=61"))
     assert "/bin/true: the binary ended with exit code 0; it said nothing." in ended

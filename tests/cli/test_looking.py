@@ -44,14 +44,14 @@ def test_rotor_speed_is_measured_from_vibration_and_saved(tmp_path: Path) -> Non
     turning = np.exp(-2j * np.pi * 35.0 * time) + 0.5 * rng.standard_normal(900) + 0.5j * rng.standard_normal(900)
     log, out = tmp_path / "log.nc", tmp_path / "out.nc"
     Flight.from_arrays(time, {"phi": 1e-3 * turning.real, "theta": 1e-3 * turning.imag}).save(log)
-    outcome = swash("inspect", log, "--rotor-speed", "--line", "omega_upper=-40..-30", "--out", out)
+    outcome = swash("inspect", log, "--rotor-speed", "--settings", "line=omega_upper=-40..-30", "--out", out)
     assert outcome.code == 0
     assert "omega_upper: 219." in outcome.out
     assert np.mean(Flight.load(out).values("omega_upper")) == pytest.approx(2 * np.pi * 35.0, abs=0.4)
-    refused = swash("inspect", log, "--rotor-speed", "--line", "omega_lower=30..40")
+    refused = swash("inspect", log, "--rotor-speed", "--settings", "line=omega_lower=30..40")
     assert refused.code != 0
     assert "no line stands out" in refused.err
-    assert "is no line" in swash("inspect", log, "--rotor-speed", "--line", "omega_lower").err
+    assert "is no line" in swash("inspect", log, "--rotor-speed", "--settings", "line=omega_lower").err
 
 
 def test_vehicles_are_listed_with_what_they_are() -> None:

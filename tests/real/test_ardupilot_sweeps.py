@@ -128,7 +128,7 @@ def test_the_injected_sweep_is_offered_and_not_its_frequency(shared_data: Path) 
 def test_given_windows_that_blur_are_said(shared_data: Path) -> None:
     log = flight(shared_data, "heli_sid_coll_mix.BIN", "mixer_collective", "az_sid")
     found = respond(log, inputs=["mixer_collective"], outputs=["az_sid"], band=(0.1, 8.0), windows=[11.5, 5.0, 2.5])
-    assert any("blurred az_sid / mixer_collective" in text and "--windows 28.8" in text for text in found.warnings), (
+    assert any("blurred az_sid / mixer_collective" in text and "windows=28.8" in text for text in found.warnings), (
         found.warnings
     )
 

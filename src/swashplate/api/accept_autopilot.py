@@ -122,7 +122,7 @@ def accept_autopilot(
     files = ["trial.parm", "vehicle.parm", *(f"yours-{k + 1}.parm" for k in range(len(defaults)))]
     for file in defaults:
         if not Path(file).is_file():
-            raise SwashError("there is no such file.", where=file, channel="--defaults")
+            raise SwashError("there is no such file.", where=file, channel="defaults")
     called, around = name or vehicle.card.called, environment_of(vehicle, environment)
     above = standard_altitude(float(around.air_density))
     sitl = Sitl(binary, folder, files, instance=instance, speedup=speedup, altitude=above)

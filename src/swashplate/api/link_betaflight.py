@@ -61,7 +61,7 @@ def link_betaflight(
         SwashError: where the vehicle is no multirotor, the port is taken, or nobody came.
     """
     if not 0.02 <= pace <= 1.0:
-        raise SwashError(f"is {pace:g}, expected 0.02 to 1 simulated seconds a second.", channel="--pace")
+        raise SwashError(f"is {pace:g}, expected 0.02 to 1 simulated seconds a second.", channel="pace")
     flying = airborne(vehicle)
     helicopter = vehicle.traits.servo_layout == "swashplate"
     hover = trim(flying, environment=environment)

@@ -187,7 +187,7 @@ def _refuse_without_rotor(flight: Flight) -> None:
             where=flight.provenance.source or None,
             channel=MAIN,
             hint="A line of something else is measured where you say what it is and where it lies: "
-            "--line NAME=LOW..HIGH.",
+            "--settings line=NAME=LOW..HIGH.",
         )
 
 
@@ -297,7 +297,7 @@ def _refuse_folded(flight: Flight, line: SpectralLine, name: str, rate: float, p
             where=flight.provenance.source or None,
             channel=name,
             hint=f"Log the vibration at {2.0 * highest:.3g} Hz or more, log the rotor's speed (RPM sensor, ESC), or "
-            "give the band in which the line lies: --line NAME=LOW..HIGH.",
+            "give the band in which the line lies: --settings line=NAME=LOW..HIGH.",
         )
 
 

@@ -23,8 +23,8 @@ def lines_of(texts: Sequence[str]) -> dict[str, tuple[float, float]] | None:
         try:
             bands[match["name"]] = (float(match["low"]), float(match["high"]))  # pyrefly: ignore[unsupported-operation]
         except (TypeError, ValueError):
-            hint = "For example --line omega_upper=-40..-30."
-            raise SwashError(f"'{text}' is no line.", channel="--line", hint=hint) from None
+            hint = "For example --settings line=omega_upper=-40..-30."
+            raise SwashError(f"'{text}' is no line.", channel="line", hint=hint) from None
     return bands or None
 
 
@@ -35,7 +35,7 @@ def line_words(lines: Mapping[str, Any]) -> Iterator[str]:
         if told.get("logged"):
             yield (
                 f"{name}: {told['mean']:.4g} rad/s on average, spread {told['spread']:.2g}, from {start:.1f} to "
-                f"{stop:.1f} s, as the log has it. Vibration was not asked; --line asks it."
+                f"{stop:.1f} s, as the log has it. Vibration was not asked; --settings line=... asks it."
             )
         else:
             folded = " or ".join(f"{hertz:+.1f}" for hertz in told["folded_from_hertz"])

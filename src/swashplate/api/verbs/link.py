@@ -45,7 +45,7 @@ class Link(InAir[None], Linkable):
 
     port: int = option(default=9002, help="Port to listen on.", least=0, most=65535)
     record: Path | None = option(default=None, help="Save the true flights while they are flown: .nc or .csv.")
-    idle_exit: float | None = option(default=None, help="End after so many seconds without an autopilot.", least=0.1)
+    idle_exit: float | None = setting(default=None, help="end after so many seconds without an autopilot", least=0.1)
     estimate: Texts = option(
         default=(),
         metavar="NAMES|EQUATION",
@@ -140,10 +140,10 @@ class LinkBetaflight(InAir[None], Linkable):
     on the ground at first. Ctrl-C ends the program.
     """
 
-    pace: float = option(default=1.0, help="Simulated seconds per second.", least=0.02, most=1.0)
+    pace: float = setting(default=1.0, help="simulated seconds per second", least=0.02, most=1.0)
     record: Path | None = option(default=None, help="Save the true flights while they are flown: .nc or .csv.")
-    idle_exit: float | None = option(default=None, help="End after so many seconds without motors.", least=0.1)
-    wait: float = option(default=60.0, help="Seconds to wait for the SITL.", least=0.1, most=3600.0)
+    idle_exit: float | None = setting(default=None, help="end after so many seconds without motors", least=0.1)
+    wait: float = setting(default=60.0, help="seconds to wait for the SITL", least=0.1, most=3600.0)
     pilot: bool = option(default=False, help="A simulated pilot arms, takes off and hovers.")
     record_rate: float = setting(default=200.0, help="samples per second kept", unit="Hz", least=1.0, most=2000.0)
     altitude: float | None = setting(default=0.0, help="altitude in the standard atmosphere", unit="m")
@@ -272,8 +272,8 @@ class Accept(InAir["Acceptance"], Linkable):
         default=None, metavar="MODEL", help="compare the estimates with another vehicle or card."
     )
     axes: Names = option(default=("roll", "pitch", "yaw", "heave"), help="Axes that are swept.")
-    band: Band = option(default=(0.4, 8.0), help="Band of the sweeps [Hz].")
-    defaults: Paths | None = option(default=None, help="An additional parameter file, read last. May be repeated.")
+    band: Band = setting(default=(0.4, 8.0), help="band of the sweeps [Hz]")
+    defaults: Paths | None = setting(default=None, help="an additional parameter file, read last; may be repeated")
     instance: int = setting(
         default=0, help="instance of SITL: adds 10 times this number to every port.", least=0, most=99
     )

@@ -112,10 +112,10 @@ class Inspect(FromLogs[Looked]):
         "keep that one.",
     )
     rotor_speed: bool = option(default=False, help="Tell the rotor speed: as the log has it, else from vibration.")
-    line: Texts | None = option(
+    line: Texts | None = setting(
         default=None,
         metavar="CHANNEL=LOW..HIGH",
-        help="With --rotor-speed: where a rotor's line lies [Hz]; positive turns clockwise from above.",
+        help="with rotor_speed: where a rotor's line lies [Hz]; positive turns clockwise from above",
     )
     per_turn: float = setting(default=1.0, help="with rotor_speed: vibrations per turn that cause the line")
     reconstruct: bool = option(

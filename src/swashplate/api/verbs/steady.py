@@ -190,7 +190,7 @@ class FindDerivatives(Steadily):
     uncertainty: bool = option(
         default=False, help="Also 5 % and 95 % bounds from the tolerances on the card and what such models miss."
     )
-    draws: int = option(default=200, help="Number of samples of the card for --uncertainty.", least=10, most=100_000)
+    draws: int = setting(default=200, help="with uncertainty: samples of the card", least=10, most=100_000)
     seed: int = setting(default=0, help="seed of the samples.", least=0)
     left_out: bool = option(
         default=False, help="Show instead what changes when each one is left out, the least important first."

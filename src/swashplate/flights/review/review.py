@@ -22,6 +22,7 @@ from swashplate.flights.review.stretches import AXES, Interval, LoopAxis, pieces
 from swashplate.flights.review.tracking import Octave, tracking
 from swashplate.shown import Shown
 
+NO_LOOP = "the log has neither a rate's target nor an autopilot's parameters"
 _SHORTEST = 4.1  # s: a window, and what is looked at before and behind it
 
 
@@ -137,7 +138,7 @@ def review(flight: Flight, *, swept: Sequence[Sweep] | None = None) -> FlightRev
     apart = [(each.start, each.stop) for each in (sweeps(flight) if swept is None else swept)]
     loops = tuple(_loop(flight, axis, apart) for axis in AXES if axis.motion in flight)
     chosen, untold = filters(flight)
-    noise, no_noise = gyro_noise(flight, chosen)
+    noise, no_noise = gyro_noise(flight, chosen) if _of_an_autopilot(flight) else ((), NO_LOOP)
     wide = {each.axis: each.step.bandwidth for each in loops if each.step is not None}
     following, about = next_sweeps(
         flight, {axis: None if b is None else b.value for axis, b in wide.items()}, swept=apart
@@ -155,6 +156,11 @@ def review(flight: Flight, *, swept: Sequence[Sweep] | None = None) -> FlightRev
         following,
         about,
     )
+
+
+def _of_an_autopilot(flight: Flight) -> bool:
+    """Whether the log knows a loop: a target, or an autopilot's settings."""
+    return bool(flight.provenance.parameters) or any(axis.target in flight for axis in AXES)
 
 
 def _loop(flight: Flight, axis: LoopAxis, swept: list[Interval]) -> LoopReview:

@@ -67,7 +67,7 @@ def gentle_sweep(
         f"no gentle sweep of {axis} moves an output by {RESOLVED:g} us in the lower half of "
         f"{band[0]:g} to {band[1]:g} Hz: pulses are whole microseconds.",
         channel="--axes",
-        hint="Leave the axis out, sweep higher (--band), or give gains that hold less against it (--defaults).",
+        hint="Leave the axis out, sweep higher (band), or give gains that hold less against it (defaults).",
     )
 
 

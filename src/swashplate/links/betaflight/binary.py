@@ -195,7 +195,7 @@ def wait_for_sitl(seconds: float) -> None:
         time.sleep(0.2)
     raise LinkError(
         f"nobody listens on TCP {MSP_PORT} after {seconds:g} s: no SITL of Betaflight runs here.",
-        channel="--wait",
+        channel="wait",
         hint="Start it in another terminal; its MSP port says that it is up.",
     )
 

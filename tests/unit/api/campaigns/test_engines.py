@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -259,6 +260,8 @@ def test_a_worker_that_joins_late_without_the_package_costs_nothing_but_time(tmp
 @pytest.mark.skipif(not can_compile(), reason="no C compiler here, or no CasADi")
 @pytest.mark.parametrize("there", [False, True])
 def test_a_worker_without_a_compiler_that_compiles_is_another_program(there: bool, tmp_path: Path) -> None:
+    if not there and find_spec("ziglang") is not None:
+        pytest.skip("ziglang is installed: every worker has a compiler")
     if there:  # one without headers
         (tmp_path / "cc").write_text("#!/bin/sh\necho 'fatal error: math.h: No such file or directory' >&2; exit 1\n")
         (tmp_path / "cc").chmod(0o755)
