@@ -120,7 +120,7 @@ def test_a_logged_wind_blows_in_the_prediction(flight: Flight, shown: Replay) ->
 def test_without_a_model_it_is_drawn_as_the_vehicle_of_its_inputs(flight: Flight) -> None:
     assert replay(flight).vehicle.card.title == sp.vehicle("raptor50").card.title
     bare = flight.with_streams({name: data.drop_vars("B1") for name, data in flight.streams.items()})
-    with pytest.raises(FlightError, match=r"Say what flies with --model\."):
+    with pytest.raises(FlightError, match=r"Say what flies: swash live MODEL --replay LOG\."):
         replay(bare)
 
 
