@@ -30,7 +30,7 @@ def exchanges(name: str, *, count: int, repeats: int) -> list[Result]:
     """The best of several runs of `count` exchanges at 1200 frames per second of flight: by the clock and, where the
     system tells it, by the link's own processor time."""
     command = [sys.executable, "-m", "swashplate", "link", "ardupilot", "--vehicle", name, "--port", "0"]
-    with subprocess.Popen([*command, "--idle-exit", "20"], stderr=subprocess.PIPE, text=True) as link:
+    with subprocess.Popen([*command, "--settings", "idle_exit=20"], stderr=subprocess.PIPE, text=True) as link:
         try:
             port = _port(link)
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:  # a link belongs to its sender
