@@ -120,7 +120,7 @@ def test_a_recording_is_a_log(browser: Any, tmp_path: Path) -> None:
     assert np.ptp(flight.values("servo_roll")) > 0.05, "the doublet is in it"
     with (tmp_path / "coax.csv").open(encoding="utf-8") as text:
         assert next(csv.reader(text))[:2] == ["time [s]", "x [m]"]
-    assert "coax.csv is saved" in page.locator("#trouble").text_content()
+    page.get_by_text("coax.csv is saved").wait_for(timeout=90_000)  # with the next turn of the page
     assert not chromium.complaints(said)
 
 
