@@ -19,6 +19,8 @@ from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.world import World
 from swashplate.links.web.libraries import PAGE
+from swashplate.physics.backend import FloatBackend
+from swashplate.physics.frames import Euler, Vector, local_to_body
 
 FLY = """plan => {
   const { connection } = swash, { flight } = connection;
@@ -31,7 +33,8 @@ FLY = """plan => {
     if (k === plan.blow && plan.wind) flight.setting.wind = [1, -0.5, 0];
     flight.step();
   }
-  return { x: [...flight.places[0].x], u: [...flight.places[0].inputs], trouble: flight.trouble };
+  const result = { x: [...flight.places[0].x], u: [...flight.places[0].inputs], trouble: flight.trouble };
+  return { ...result, air: flight.airSpeed() };
 }"""
 MANEUVER, BLOW, MODE = 300, 500, 700
 
@@ -75,6 +78,14 @@ def plan_of(world: World) -> dict[str, Any]:
     return {**known, "sticks": np.stack(waves, axis=1).tolist(), "wind": world.vehicle.traits.wind}
 
 
+def air_speed(world: World) -> float:
+    """Of the craft in the wind of the sliders [m/s], by the package's own rotation."""
+    x = np.array(world.moment().crafts["own"][0])
+    u, v, w, *angles = (float(x[world.vehicle.index(name)]) for name in ("u", "v", "w", "phi", "theta", "psi"))
+    wind = local_to_body(Vector(*world.setting.wind), Euler(*angles), FloatBackend())
+    return float(np.linalg.norm(np.array([u, v, w]) - np.array(wind)))
+
+
 def flown_here(world: World, plan: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     for k, sticks in enumerate(plan["sticks"]):
         world.setting.sticks = dict(zip(STICKS, sticks, strict=True))
@@ -102,6 +113,20 @@ def test_it_flies_as_here_with_the_network_off(browser: Any, name: str, tmp_path
     assert found["trouble"] == world.trouble == ""
     np.testing.assert_allclose(found["x"], x, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(found["u"], u, rtol=1e-9, atol=1e-9)
+    assert found["air"] == pytest.approx(air_speed(world), rel=1e-9)
+    assert not chromium.complaints(said)
+
+
+def test_a_designed_controller_flies_it(browser: Any, tmp_path: Path) -> None:
+    """With the noise of its own sensors, so no two flights are alike: it stays where it is held."""
+    coax = sp.vehicle("coax")
+    controller = sp.design_controller(coax).controller
+    (file,) = sp.export_model(coax, "web", controller=controller).save(tmp_path)
+    page, said = opened(browser, file)
+    plan = {"sticks": [[0.0] * 4] * 1000, "axes": list(STICKS), "wind": False}
+    found = page.evaluate(FLY, plan)
+    assert found["trouble"] == ""
+    assert np.linalg.norm(np.array(found["x"][:3]) - World(coax, controller=controller).trim.state[:3]) < 0.5
     assert not chromium.complaints(said)
 
 

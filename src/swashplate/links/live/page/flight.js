@@ -25,7 +25,7 @@ export class Flight {
     this.places.forEach(({ card }, i) => card.set(i < 2 ? model.card : model.draws[i - 2]));
     this.setting = { mode: model.mode, decoupled: true, ghost: false, wind: [0, 0, 0], gusts: 0, voltage: model.voltage,
       sticks: { roll: 0, pitch: 0, yaw: 0, heave: 0 }, number: 0 };
-    this.place = Object.fromEntries(["x", "y", "z", "u", "v", "phi", "theta", "psi"].map((name) => [name, states.findIndex(([n]) => n === name)]));
+    this.place = Object.fromEntries(["x", "y", "z", "u", "v", "w", "phi", "theta", "psi"].map((name) => [name, states.findIndex(([n]) => n === name)]));
     this.reset();
   }
 
@@ -186,8 +186,17 @@ export class Flight {
     const { setting, model, place, target } = this, { x } = this.places[0], remarks = [];
     const off = Math.hypot(x[place.x] - target[0], x[place.y] - target[1]);
     if (setting.mode === "position" && off > HELD) remarks.push(`The place is not held, it is ${off.toFixed(0)} m away.`);
-    const speed = Math.hypot(x[place.u], x[place.v]);
-    if (model.fastest !== null && speed > model.fastest) remarks.push(`It moves at ${speed.toFixed(1)} m/s: the card may be trusted up to ${model.fastest} m/s.`);
+    const speed = this.airSpeed();
+    if (model.fastest !== null && speed > model.fastest) remarks.push(`Its air speed is ${speed.toFixed(1)} m/s: the card may be trusted up to ${model.fastest} m/s.`);
     return remarks.join(" ");
+  }
+  // Through the wind of the sliders, as `models/doubts.py` has it: velocity in body axes less the wind turned into them.
+  airSpeed() {
+    const { x } = this.places[0], { place } = this, at = (name) => x[place[name]], [n, e, d] = this.setting.wind;
+    const [cf, sf, ct, st, cp, sp] = ["phi", "theta", "psi"].flatMap((name) => [Math.cos(at(name)), Math.sin(at(name))]);
+    const ahead = ct * cp * n + ct * sp * e - st * d;
+    const right = (sf * st * cp - cf * sp) * n + (sf * st * sp + cf * cp) * e + sf * ct * d;
+    const down = (cf * st * cp + sf * sp) * n + (cf * st * sp - sf * cp) * e + cf * ct * d;
+    return Math.hypot(at("u") - ahead, at("v") - right, at("w") - down);
   }
 }
