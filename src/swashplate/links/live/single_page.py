@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
-import hashlib
 import html
-import json
-import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,18 +15,11 @@ from swashplate.links.live.axes import STICKS
 from swashplate.links.live.frame_code import frame_code, web_assembly
 from swashplate.links.live.picture import inputs_of, picture, pose_of
 from swashplate.links.live.world import FAN_SECONDS, World, gust_filters
-from swashplate.links.web.libraries import PAGE, check_page
+from swashplate.links.web.libraries import PAGE
+from swashplate.links.web.single_file import WEB_ASSEMBLY, single_file
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.record import largest_states
 
-_MODULES = (
-    "vendor/three.core.min.js",
-    "vendor/three.module.min.js",
-    "vendor/uPlot.esm.js",
-    *("trail.js", "fan.js", "helicopter.js", "scene.js", "charts.js", "instruments.js", "pace.js", "panel.js"),
-    *("sticks.js", "flight.js", "alone.js", "live.js"),
-)
-"""In an order in which each comes after what it imports."""
 _KINDS = {"sweep": (30.0, (0.3, 5.0)), "doublet": (1.0, None), "3211": (3.5, None)}
 _CARD_HEAD = ("name", "value", "unit", "±", "source")
 
@@ -48,54 +36,14 @@ def single_page(world: World, *, name: str, draws: Sequence[Vehicle] = (), made:
     Raises:
         SwashError: without the page's libraries, ziglang or CasADi, or for equations that become no C.
     """
-    check_page()
-    code = web_assembly(frame_code(world, crafts=2 + len(draws)))
-    modules = [[name.rpartition("/")[2], _module(name)] for name in _MODULES]
-    styles = "".join((PAGE / name).read_text(encoding="utf-8") for name in ("vendor/uPlot.min.css", "style.css"))
-    script = (PAGE / "bundle.js").read_text(encoding="utf-8")
-    allowed = {
-        "default-src": "'none'",
-        "script-src": f"'sha256-{_digest(script)}' blob: 'wasm-unsafe-eval'",
-        "style-src": "'unsafe-inline'",
-        "img-src": "data: blob:",
-        "base-uri": "'none'",
-        "form-action": "'none'",
-    }
-    policy = "; ".join(f"{what} {who}" for what, who in allowed.items())
-    page = (PAGE / "live.html").read_text(encoding="utf-8")
-    page = re.sub(r'<link rel="stylesheet"[^>]*>\n', "", page)
-    page = page.replace(
-        '<meta charset="utf-8">',
-        f'<meta charset="utf-8">\n<meta http-equiv="Content-Security-Policy" content="{html.escape(policy)}">',
+    return single_file(
+        PAGE / "live.html",
+        title=world.vehicle.card.title,
+        documents={"model": _model(world, name, draws)},
+        packed={WEB_ASSEMBLY: web_assembly(frame_code(world, crafts=2 + len(draws)))},
+        instead={"/page/connection.js": "/page/alone.js"},
+        within={'<p id="folder"></p>': f'<p id="folder"></p>\n{_card(world.vehicle)}\n{_origin(made)}'},
     )
-    page = page.replace("<title>swash live</title>", f"<title>{html.escape(world.vehicle.card.title)}</title>")
-    page = page.replace("</head>", f"<style>{styles}</style>\n</head>")
-    page = page.replace('<p id="folder"></p>', f'<p id="folder"></p>\n{_card(world.vehicle)}\n{_origin(made)}')
-    bodies = (
-        f'<script type="application/json" id="model">{_json(_model(world, name, draws))}</script>',
-        f'<script type="text/plain" id="flight">{_packed(code)}</script>',
-        f'<script type="text/plain" id="modules">{_packed(json.dumps(modules).encode())}</script>',
-        f"<script>{script}</script>",
-    )
-    return page.replace('<script type="module" src="/page/live.js"></script>', "\n".join(bodies))
-
-
-def _module(name: str) -> str:
-    text = (PAGE / name).read_text(encoding="utf-8")
-    return text.replace('"./connection.js"', '"./alone.js"') if name == "live.js" else text
-
-
-def _digest(script: str) -> str:
-    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-
-
-def _packed(content: bytes) -> str:
-    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
-
-
-def _json(document: Any) -> str:
-    """JSON that ends no script, whatever a card calls things."""
-    return json.dumps(document, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _model(world: World, name: str, draws: Sequence[Vehicle]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ export class Connection {
   }
 
   async #begin() {
-    const module = await WebAssembly.compile(window.swashBytes);
+    const module = await WebAssembly.compile(window.swashBytes.flight);
     this.flight = new Flight(await WebAssembly.instantiate(module, {}), this.model);
     this.heard({ type: "hello", version: 1, ...this.model.hello });
     this.last = performance.now();
