@@ -48,7 +48,6 @@ CHOICES: dict[str, Choice] = {
     "balanced": Choice("balanced", ((0.25, 1.0), (0.25, 2.0))),
     "asymmetric": Choice("asymmetric", ((0.25, 2.0),)),
     "wind": Choice("balanced", ((0.25, 1.0),), Question(wind=True)),
-    "line": Choice("balanced", ((0.25, 1.0),), Question(rotor_line=34.4)),
 }
 HELD = ("full",)
 """Of these, what only an axis could tell that the flight does not move by itself is held, as by default."""

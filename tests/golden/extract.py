@@ -49,7 +49,6 @@ def of_fit(fit: Any) -> Values:
         found |= {f"{k}.{e.name}": e.value, f"{k}.{e.name}.sigma": e.sigma}
     if fit.noise is not None:
         told = [n for n in fit.noise._fields if n not in _PERHAPS or getattr(fit.noise, n) > 0.0]  # others are shared
-        told = [n for n in told if fit.noise.line_hertz or not n.startswith("line")]  # a line that was not asked for
         found |= apart("noise", (getattr(fit.noise, name) for name in told))
     found["directions"] = [d.sigma for d in fit.directions]
     for k, a in enumerate(fit.details.excitation):

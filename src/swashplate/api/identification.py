@@ -102,7 +102,6 @@ def identify_and_validate(
     iterations: int = 60,
     keep_unexcited: bool = False,
     wind: bool = False,
-    rotor_line: float | None = None,
     leave_out: Sequence[tuple[float, float]] = (),
     horizon: Sequence[float] | None = None,
     residual: bool = False,
@@ -118,7 +117,7 @@ def identify_and_validate(
         flights: conditioned, with their pose tracked.
         hold_out: conditioned flights that the fit never sees.
         free, method, outputs, ties, fixed, priors, prior_card: as of `identify`.
-        iterations, keep_unexcited, wind, rotor_line, leave_out, horizon, residual: as of `identify`.
+        iterations, keep_unexcited, wind, leave_out, horizon, residual: as of `identify`.
         close_loop: as of `validate`.
         posterior: "laplace" or "nuts" for draws of what the fit does not know (`swashplate.posterior`).
             One that did not converge is left out, and `refused` says why.
@@ -163,7 +162,6 @@ def identify_and_validate(
             iterations=iterations,
             keep_unexcited=keep_unexcited,
             wind=wind,
-            rotor_line=rotor_line,
             leave_out=leave_out,
             horizon=horizon,
             residual=residual,

@@ -27,9 +27,6 @@ class Noise(NamedTuple):
     `white_*` [rad/s^2 or m/s^2 per sqrt(Hz)], `gust_*` and `drift_*` [rad/s^3 or m/s^3 per sqrt(Hz)], `wind`
     [m/s^2 per sqrt(Hz)], `tau_*` [s], `sensor_*` per sample [m, rad]. `speed`: root mean square of each horizontal
     velocity that is flown [m/s], for the filter's gain alone. `wind` 0: none, and slopes are those at hover.
-    `line_hertz`: signed frequency of a rotor's line in what is measured, as `inspect --rotor-speed` tells [Hz], or 0.
-    `line_angle`, `line_height`: its root mean square in roll and pitch [rad] and in height [m]; `line_time`: how long
-    its phase lasts [s].
     `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces;
     `sensor_heading` 0: that of all angles.
     `sensor_rate` [rad/s]: of a gyroscope's readings, given and not estimated; 0: none is used.
@@ -56,10 +53,6 @@ class Noise(NamedTuple):
     drift_yaw: Values = 0.0
     tau_gust_vertical: Values = 0.0
     drift_vertical: Values = 0.0
-    line_hertz: Values = 0.0
-    line_angle: Values = 1e-3
-    line_height: Values = 2e-4
-    line_time: Values = 0.3
     sensor_heading: Values = 0.0
     sensor_rate: Values = 0.0
 

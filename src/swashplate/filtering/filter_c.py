@@ -159,10 +159,9 @@ def _following(model: StochasticModel, rates: Statements, steps: Sequence[int]) 
 def sensing(model: StochasticModel) -> Graph:
     """(state, nuisance) to what is measured and its slopes by the state."""
     casadi = require_casadi()
-    xp, n, line = _Symbols(casadi), len(model.vehicle.state_names), model.n_line
-    s, g = casadi.SX.sym("s", n + model.n_gusts + N_DISTURBANCES + line), casadi.SX.sym("g", len(Nuisance._fields))
+    xp, n = _Symbols(casadi), len(model.vehicle.state_names)
+    s, g = casadi.SX.sym("s", n + model.n_gusts + N_DISTURBANCES), casadi.SX.sym("g", len(Nuisance._fields))
     seen = model.measure(s[:n], Nuisance(*casadi.vertsplit(g)), xp)
-    seen = seen + casadi.DM(model.line_seen) @ s[s.size1() - line :] if line else seen
     return casadi.Function("sense", [s, g], [casadi.densify(seen), casadi.jacobian(seen, s)], {"cse": True})
 
 
@@ -182,29 +181,26 @@ class _Symbols(CasadiBackend):
 def correction(model: StochasticModel) -> Graph:
     """(predicted, reading, given) to (innovation, corrected, acting, what of the state goes on by itself).
 
-    `given` is the gain row by row, `Nuisance`, what is left of gusts after a sample, and how the line turns.
+    `given` is the gain row by row, `Nuisance` and what is left of gusts after a sample.
     """
     casadi = require_casadi()
     xp = _Symbols(casadi)
-    n, g, line = len(model.vehicle.state_names), model.n_gusts, model.n_line
-    ends = np.cumsum([n, g, N_DISTURBANCES, line]).tolist()
-    sizes = [ends[-1] * model.n_outputs, len(Nuisance._fields), g, line * line]
+    n, g = len(model.vehicle.state_names), model.n_gusts
+    ends = np.cumsum([n, g, N_DISTURBANCES]).tolist()
+    sizes = [ends[-1] * model.n_outputs, len(Nuisance._fields), g]
     s, y, given = (
         casadi.SX.sym(a, size) for a, size in zip("syg", (ends[-1], model.n_outputs, sum(sizes)), strict=True)
     )
-    rows, nuisance, fade, turn = casadi.vertsplit(given, [0, *np.cumsum(sizes).tolist()])
+    rows, nuisance, fade = casadi.vertsplit(given, [0, *np.cumsum(sizes).tolist()])
     K = casadi.reshape(rows, model.n_outputs, ends[-1]).T
-    x, gust, drift, shaken = casadi.vertsplit(s, [0, *ends])
-    by_state, by_gust, by_drift, by_line = casadi.vertsplit(K, [0, *ends])
-    gain = FilterGain(by_state, by_gust, by_drift, None, by_line)
-    state = FilterState(x, gust, drift, shaken if model.lined else ())
+    by_state, by_gust, by_drift = casadi.vertsplit(K, [0, *ends])
+    x, gust, drift = casadi.vertsplit(s, [0, *ends])
+    gain, state = FilterGain(by_state, by_gust, by_drift, None), FilterState(x, gust, drift)
     after, innovation = model.correct(state, y, gain, Nuisance(*casadi.vertsplit(nuisance)), xp)
-    left = after.line if model.lined else casadi.SX(0, 1)
-    turned = casadi.reshape(turn, line, line).T @ left if model.lined else left
     results = [
         innovation,
-        casadi.vertcat(after.x, after.gust, after.drift, left),
+        casadi.vertcat(*after),
         model.acting(after, xp),
-        casadi.vertcat(fade * after.gust, after.drift, turned),
+        casadi.vertcat(fade * after.gust, after.drift),
     ]
     return casadi.Function("f", [s, y, given], [casadi.densify(result) for result in results], {"cse": True})

@@ -58,9 +58,9 @@ class Following(NamedTuple):
     Attributes:
         states (rows, joined), covariances (rows, joined, joined): predicted for the first sample.
         nuisance: of the record (rows, numbers).
-        fade, turn: what is left of gusts after a sample (rows, gusts), how the line turns (rows, line, line).
+        fade: what is left of gusts after a sample (rows, gusts).
         white: variance of the accelerations' white noise, held over a sample (rows, 6).
-        added: variance that a sample adds to gusts, drifts and the line (rows, all three).
+        added: variance that a sample adds to gusts and drifts (rows, both).
         sensors: variances of the readings (rows, outputs). numbers: of the equations (rows, numbers).
     """
 
@@ -68,7 +68,6 @@ class Following(NamedTuple):
     covariances: Array
     nuisance: Array
     fade: Array
-    turn: Array
     white: Array
     added: Array
     sensors: Array

@@ -38,7 +38,7 @@ _ARGUMENTS = {
     "run_rates": "l" + 4 * "*",
     "rates_and_slopes": "l" + 6 * "*",
 }
-_FOLLOWING = {"run_following": "lld" + 14 * "*"}
+_FOLLOWING = {"run_following": "lld" + 13 * "*"}
 
 
 class FilterLibrary:

@@ -35,8 +35,8 @@ _ARRAYS, _AWAY, _SHARES = ArrayBackend(), np.array(AWAY), np.array(SHARES)
 
 
 class _Air(NamedTuple):
-    """How the air speed ahead and to the right (rows, 2) is made: of the states (2, states), and of the joined gusts,
-    drifts and line (rows, 2, all of them); `turn` takes north and east there."""
+    """How the air speed ahead and to the right (rows, 2) is made: of the states (2, states), and of the joined gusts
+    and drifts (rows, 2, both); `turn` takes north and east there."""
 
     speeds: Array
     wind: Array
@@ -54,33 +54,25 @@ class FollowingRows:
     def __init__(self, model: StochasticModel, code: FilterCode, begin: Following) -> None:
         self._model, self._code, self._given = model, code, begin
         self._n, self._joined = len(model.vehicle.state_names), begin.states.shape[1]
-        self._ends = np.cumsum([self._n, model.n_gusts, N_DISTURBANCES])
+        self._ends = np.cumsum([self._n, model.n_gusts])
         self._nuisance = Nuisance(*begin.nuisance.T)
-        self.state, self.covariance = self._parts(begin.states), begin.covariances
-
-    def _parts(self, rows: Array) -> FilterState:
-        x, gust, drift, line = np.split(rows, self._ends, axis=1)
-        return FilterState(x, gust, drift, line if self._model.lined else ())
+        self.state, self.covariance = FilterState(*np.split(begin.states, self._ends, axis=1)), begin.covariances
 
     def corrected(self, y: Array) -> tuple[Array, Array]:
         """After a reading (NaN: none, which tells nothing): the innovations and their covariances."""
         model, n, P = self._model, self._n, self.covariance
         expected = model.measure(self.state.x.T, self._nuisance, _ARRAYS).T
-        expected = expected + self.state.line @ model.line_seen.T if model.lined else expected
         read = np.isfinite(y)
         nu = np.where(read, y - expected, 0.0)
         C = np.zeros((len(nu), len(y), self._joined))
         C[:, :, :n] = measured_slopes(model, self.state.x, self._nuisance)
-        C[:, :, self._joined - model.n_line :] = model.line_seen
         C *= read[:, None]
         seen = C @ P
         S = seen @ np.swapaxes(C, 1, 2) + diagonal(self._given.sensors)
         K = np.swapaxes(np.linalg.solve(S, seen), 1, 2)
         move = (K @ nu[:, :, None])[:, :, 0]
-        x, gust, drift, line = np.split(move, self._ends, axis=1)
-        state = self.state
-        line = state.line + line if model.lined else ()
-        self.state = FilterState(state.x + x, state.gust + gust, state.drift + drift, line)
+        moved = zip(self.state, np.split(move, self._ends, axis=1), strict=True)
+        self.state = FilterState(*(part + added for part, added in moved))
         self.covariance = P - K @ seen
         return nu, S
 
@@ -113,8 +105,8 @@ class FollowingRows:
         by_x, held = held_series(by_x, model.dt, np.eye(n))
         by_gust = model.dt * held @ by_gust
         after = self._code.step(model.dt, self.state.x, Pushed(driving, acting[:, :d]), numbers)
-        # Disturbances and the line go on by themselves: F is full in the states' rows alone.
-        rows = np.concatenate([by_x, by_gust, by_gust[:, :, :d], np.zeros((len(w), n, model.n_line))], axis=2)
+        # Disturbances go on by themselves: F is full in the states' rows alone.
+        rows = np.concatenate([by_x, by_gust, by_gust[:, :, :d]], axis=2)
         led, kept = rows @ P, self._lasting
         moved = np.empty_like(P)
         moved[:, :n, :n] = led @ np.swapaxes(rows, 1, 2)
@@ -125,17 +117,15 @@ class FollowingRows:
         moved[:, :n, :n] += (push * given.white[:, None]) @ np.swapaxes(push, 1, 2) + np.diag(model.unexcited)
         moved[:, n:, n:] += diagonal(given.added)
         state = self.state
-        line = (given.turn @ state.line[:, :, None])[:, :, 0] if model.lined else ()
-        self.state = FilterState(after + model.dt * apart, given.fade * state.gust, state.drift, line)
+        self.state = FilterState(after + model.dt * apart, given.fade * state.gust, state.drift)
         self.covariance = 0.5 * (moved + np.swapaxes(moved, 1, 2))
 
     @cached_property
     def _lasting(self) -> Array:
-        """How gusts, drifts and the line go on (rows, all three, all three)."""
+        """How gusts and drifts go on (rows, both, both)."""
         given, g = self._given, self._model.n_gusts
         whole = np.tile(np.eye(self._joined - self._n), (len(given.fade), 1, 1))
         whole[:, range(g), range(g)] = given.fade
-        whole[:, g + N_DISTURBANCES :, g + N_DISTURBANCES :] = given.turn
         return whole
 
     @cached_property
@@ -157,7 +147,7 @@ def followed(model: StochasticModel, code: FilterCode, begin: Following, series:
     beside, told = FollowingRows(model, code, begin), []
     for y, w in zip(*series, strict=True):
         nu, S = beside.corrected(y)
-        told.append((nu, S, np.concatenate([part for part in beside.state if not isinstance(part, tuple)], axis=1)))
+        told.append((nu, S, np.concatenate(beside.state, axis=1)))
         beside.predicted(w)
     return Followed(*(np.stack(part, axis=1) for part in zip(*told, strict=True)))
 

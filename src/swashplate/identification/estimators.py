@@ -42,7 +42,7 @@ class Question:
         ties, fixed, priors, prior_card: what holds parameters.
         outputs: measured channels to fit.
         iterations: at most this many.
-        keep_unexcited, wind, rotor_line, leave_out: see `identify`.
+        keep_unexcited, wind, leave_out: see `identify`.
         environment: wind, density and gravity.
         shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
         horizon: seconds ahead, first and last, of the errors that are made small after maximum likelihood.
@@ -59,7 +59,6 @@ class Question:
     iterations: int | None = None
     keep_unexcited: bool = False
     wind: bool = False
-    rotor_line: float | None = None
     leave_out: Sequence[tuple[float, float]] = ()
     environment: Environment | None = None
     shifts: bool | None = None

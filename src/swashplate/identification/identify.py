@@ -31,7 +31,6 @@ def identify(
     iterations: int | None = None,
     keep_unexcited: bool = False,
     wind: bool = False,
-    rotor_line: float | None = None,
     leave_out: Sequence[tuple[float, float]] = (),
     environment: Environment | None = None,
     shifts: bool | None = None,
@@ -63,8 +62,6 @@ def identify(
         keep_unexcited: True also frees parameters of axes that the flights do not move independently.
         wind: True estimates a horizontal wind that acts through the equations (filter error of tracked helicopters
             only): for flights outdoors or in strong gusts.
-        rotor_line: signed frequency [Hz] of a rotor's line in what is measured, as `rotor_speed` tells it: its
-            oscillation, of wandering phase, is then part of the sensors' noise (as `wind`).
         leave_out: stamps (start, stop) [s] of stretches that the filter passes and nothing is learnt from, as where the
             aircraft was touched (`Contact.intervals`; as `wind`).
         environment: wind, density and gravity, for equations of your own.
@@ -106,7 +103,6 @@ def identify(
         iterations=iterations,
         keep_unexcited=keep_unexcited,
         wind=wind,
-        rotor_line=rotor_line,
         leave_out=tuple((float(start), float(stop)) for start, stop in leave_out),
         environment=environment,
         shifts=shifts,

@@ -45,11 +45,10 @@ def _short_exponent(text: str) -> str:
 
 
 def noise_told(noise: Mapping[str, float]) -> dict[str, float]:
-    """A noise model without the wind and the rotor's line that were not asked for."""
+    """A noise model without the wind that was not asked for."""
     calm = () if noise.get("wind", 0.0) > 0.0 else ("wind", "tau_wind", "speed")
-    still = () if noise.get("line_hertz", 0.0) else ("line_hertz", "line_angle", "line_height", "line_time")
     shared = [name for name in SEPARATE if not noise.get(name, 0.0) > 0.0]
-    return {name: float(value) for name, value in noise.items() if name not in (*calm, *still, *shared)}
+    return {name: float(value) for name, value in noise.items() if name not in (*calm, *shared)}
 
 
 def percent(value: float, *, digits: int = 0) -> str:

@@ -142,16 +142,12 @@ def _shown(filtered: Observed, starts: NDArray[np.intp], aside: Array, kicks: Ar
     kicked at every sample (runs, samples, joined)."""
     model, numbers = filtered.model, numbers_and_constants(filtered.model.vehicle, filtered.numbers.parameters)
     noise, nuisance = Noise(*filtered.numbers.noise), Nuisance(*filtered.numbers.nuisance)
-    fade, turn, step = model.fade(noise), model.line_turn(noise), record_filter(model).step
-    state = FilterState(
-        *(np.asarray(part)[starts] if isinstance(part, np.ndarray) else () for part in filtered.filtered)
-    )
+    fade, step = model.fade(noise), record_filter(model).step
+    state = FilterState(*(np.asarray(part)[starts] for part in filtered.filtered))
     state, shown = model.moved(state, aside), []
     for k in range(kicks.shape[1]):
         here = starts + k
         x = step(state.x, state.gust, state.drift, filtered.commands[here], filtered.voltage[here], numbers)
-        line = state.line @ turn.T if model.lined else ()
-        state = model.moved(FilterState(x, fade * state.gust, state.drift, line), kicks[:, k])
-        measured = model.measure(state.x.T, nuisance, _ARRAYS).T
-        shown.append(measured + state.line @ model.line_seen.T if model.lined else measured)
+        state = model.moved(FilterState(x, fade * state.gust, state.drift), kicks[:, k])
+        shown.append(model.measure(state.x.T, nuisance, _ARRAYS).T)
     return np.stack(shown, axis=1)

@@ -67,7 +67,7 @@ def test_trims_and_noise_of_its_own_stand_beside_the_parameters() -> None:
         ("trim_motor_upper", 0.002),
         ("trim_motor_lower", 0.007),
     ]
-    assert set(table.noises) == set(SEPARATE) - {"sensor_heading"}  # which is for a rotor's line
+    assert set(table.noises) == set(SEPARATE) - {"sensor_heading"}  # the cameras' own
     moved = table.identified(table.starts())
     assert moved["k_thrust_lower"] / moved["k_thrust_upper"] == pytest.approx(3.1531e-5 / 2.2607e-5, rel=1e-9)
     with pytest.raises(IdentificationError, match="no parameter is free"):
@@ -79,8 +79,6 @@ def test_trims_and_noise_of_its_own_stand_beside_the_parameters() -> None:
 def test_noise_of_its_own_is_told_and_used() -> None:
     shared = {name: float(value) for name, value in Noise()._asdict().items()}
     assert not set(SEPARATE) & set(noise_told(shared))
-    assert not [name for name in noise_told(shared) if name.startswith("line")]
-    assert "line_angle" in noise_told(shared | {"line_hertz": -34.3})
     own = shared | {"tau_gust_yaw": 2.0}
     assert "tau_gust_yaw" in noise_told(own)
     card = sp.vehicle("coax").card

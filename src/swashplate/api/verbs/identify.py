@@ -88,11 +88,6 @@ class Identify(FromConditioned["Identification | LinearStudy"]):
     )
     keep_unexcited: bool = option(default=False, help="Also fit parameters of axes that no flight moves independently.")
     wind: bool = option(default=False, help="Estimate a horizontal wind too: flights outdoors or in strong gusts.")
-    rotor_line: float | None = setting(
-        default=None,
-        help="model a rotor's line in the measured pose, at the signed frequency that inspect --rotor-speed tells.",
-        unit="Hz",
-    )
     horizon: Numbers | None = option(
         default=None,
         metavar="FIRST,LAST",
@@ -222,7 +217,6 @@ class Identify(FromConditioned["Identification | LinearStudy"]):
             iterations=self.iterations or 60,
             keep_unexcited=self.keep_unexcited,
             wind=self.wind,
-            rotor_line=self.rotor_line,
             leave_out=self.leave_out,
             horizon=self.horizon,
             residual=self.residual,
@@ -359,7 +353,7 @@ _ALWAYS = frozenset(
     ("hold_out", "outputs", "fix", "rate", "cutoff", "mapping", "units", "drop_bad_stamps", "as_logged")
 )
 _VEHICLE = frozenset(
-    ("vehicle", "flight", "free", "method", "tie", "prior", "keep_unexcited", "wind", "rotor_line", "horizon",
+    ("vehicle", "flight", "free", "method", "tie", "prior", "keep_unexcited", "wind", "horizon",
      "residual", "close_loop", "posterior", "iterations", "leave_out")
 )  # fmt: skip
 _TRANSFER = frozenset(("responses", "input", "form", "margins", "gains", "band", "coherence", "rename"))

@@ -1,6 +1,6 @@
 
 /* ---- a gain that follows what is flown, for wind ---- */
-enum { L = S - N, K = L - A - 6, SV = (S + V - 1) / V, NV = (N + V - 1) / V, U = @AHEAD@, H = @HEADING@,
+enum { L = S - N, SV = (S + V - 1) / V, NV = (N + V - 1) / V, U = @AHEAD@, H = @HEADING@,
        Q = @NUISANCES@, CA = @STILL_AIR@ };
 static const double unexcited[N] = {@UNEXCITED@};
 static const double away[4] = {@AWAY@}, shares[4] = {@SHARES@};
@@ -95,8 +95,8 @@ static double variance(vec P[S][SV], const int *at, const double *a, int count) 
   return sum;
 }
 
-/* One sample later, averaged over what is not known of the air speed. fade (A), turn (K, K), white (6), added (L). */
-static void predicted(double *s, vec P[S][SV], const double *drives, double dt, const double *fade, const double *turn,
+/* One sample later, averaged over what is not known of the air speed. fade (A), white (6), added (L). */
+static void predicted(double *s, vec P[S][SV], const double *drives, double dt, const double *fade,
                       const double *white, const double *added, const double *p, const double *cp) {
   const double co = cos(s[H]), si = sin(s[H]), north[2] = {co, -si}, east[2] = {si, co};
   double acting[A], w[W], here[N], there[N], apart[N] = {0}, by_x[N * N], by_wind[N * 2], more[N][2], root[4][R], ca[CA];
@@ -154,7 +154,7 @@ static void predicted(double *s, vec P[S][SV], const double *drives, double dt, 
     for (int k = 0; k < N; ++k) f_turned[k][i / V][i % V] = f[i][k / V][k % V];
     for (int j = 0; j < A; ++j) g_turned[j][i / V][i % V] = g[i][j];
   }
-  /* led: the rows of the states, of all of them; disturbances and the line go on by themselves. */
+  /* led: the rows of the states, of all of them; disturbances go on by themselves. */
   for (int j = 0; j < A; ++j)
     for (int v = 0; v < SV; ++v) both[j][v] = j < 6 ? P[N + j][v] + P[N + A + j][v] : P[N + j][v];
   memset(led, 0, sizeof led);
@@ -164,7 +164,7 @@ static void predicted(double *s, vec P[S][SV], const double *drives, double dt, 
   }
   for (int j = 0; j < SV * V; ++j) scale[j / V][j % V] = j >= N && j < N + A ? fade[j - N] : 1;
   for (int i = 0; i < S; ++i) {
-    vec row[SV], old[SV];
+    vec row[SV];
     for (int v = 0; v < SV; ++v) row[v] = i < N ? led[i][v] : P[i][v];
     if (i >= N && i < N + A)
       for (int v = 0; v < SV; ++v) row[v] *= fade[i - N];
@@ -179,22 +179,8 @@ static void predicted(double *s, vec P[S][SV], const double *drives, double dt, 
       state[i / V][i % V] += unexcited[i];
       for (int j = 0; j < N; ++j) row[j / V][j % V] = state[j / V][j % V];
     }
-    for (int v = 0; v < SV; ++v) old[v] = row[v] *= scale[v];
-    for (int j = 0; j < K; ++j) {
-      const int to = S - K + j;
-      row[to / V][to % V] = 0;
-      for (int q = 0; q < K; ++q) row[to / V][to % V] += turn[j * K + q] * old[(S - K + q) / V][(S - K + q) % V];
-    }
+    for (int v = 0; v < SV; ++v) row[v] *= scale[v];
     memcpy(P[i], row, sizeof row);
-  }
-  for (int j = 0; K && j < S; ++j) {  /* the line's rows turn too */
-    double old[K + 1];
-    for (int q = 0; q < K; ++q) old[q] = P[S - K + q][j / V][j % V];
-    for (int i = 0; j >= N && i < K; ++i) {
-      double sum = 0;
-      for (int q = 0; q < K; ++q) sum += turn[i * K + q] * old[q];
-      P[S - K + i][j / V][j % V] = sum;
-    }
   }
   for (int i = 0; i < L; ++i) P[N + i][(N + i) / V][(N + i) % V] += added[i];
   for (int i = 0; i < S; ++i)
@@ -205,22 +191,16 @@ static void predicted(double *s, vec P[S][SV], const double *drives, double dt, 
   step(s, w, w, acting, p, cp, dt, root);
   for (int i = 0; i < N; ++i) s[i] += dt * apart[i];
   for (int j = 0; j < A; ++j) s[N + j] *= fade[j];
-  double line[K + 1];
-  memcpy(line, s + S - K, K * sizeof *line);
-  for (int i = 0; i < K; ++i) {
-    s[S - K + i] = 0;
-    for (int q = 0; q < K; ++q) s[S - K + i] += turn[i * K + q] * line[q];
-  }
 }
 
 void run_following(long rows, long n, double dt, const double *starts, const double *covariances, const double *nuisance,
-                   const double *fade, const double *turn, const double *white, const double *added,
+                   const double *fade, const double *white, const double *added,
                    const double *sensors, const double *p, const double *readings, const double *drives,
                    double *innovations, double *spreads, double *states);
 
 /* Rows of filters of one record: innovations (rows, n, Y), their covariances (rows, n, Y, Y), corrected states. */
 void run_following(long rows, long n, double dt, const double *starts, const double *covariances, const double *nuisance,
-                   const double *fade, const double *turn, const double *white, const double *added,
+                   const double *fade, const double *white, const double *added,
                    const double *sensors, const double *p, const double *readings, const double *drives,
                    double *innovations, double *spreads, double *states) {
   for (long r = 0; r < rows; ++r) {
@@ -236,7 +216,7 @@ void run_following(long rows, long n, double dt, const double *starts, const dou
       corrected(s, covariance, readings + t * Y, nuisance + r * Q, sensors + r * Y, innovations + at * Y,
                 spreads + at * Y * Y);
       memcpy(states + at * S, s, sizeof s);
-      predicted(s, covariance, drives + at * W, dt, fade + r * A, turn + r * K * K, white + r * 6,
+      predicted(s, covariance, drives + at * W, dt, fade + r * A, white + r * 6,
                 added + r * L, p + r * P, cp);
     }
   }

@@ -94,18 +94,3 @@ def noise_too_small(noise: Noise | None, flights: Sequence[Flight]) -> list[str]
         for name, (least, unit) in _TOO_GOOD.items()
         if float(getattr(noise, name)) < least
     ]
-
-
-def coloured_by_resampling(flights: Iterable[Flight]) -> list[str]:
-    """In words, flights that were brought to a lower rate: beside a rotor's line, their noise has a colour."""
-    told = []
-    for flight in flights:
-        for step in flight.history:
-            native = float(step.details.get("native_rate") or 0.0)
-            if step.operation == "resample" and step.details.get("anti_alias") and native > 0.0:
-                told.append(
-                    f"rotor_line: {flight.provenance.source or 'the flight'} was brought from {native:.0f} to "
-                    f"{step.details['rate']:g} Hz, which colours its noise. Beside a line such a colour is taken for "
-                    f"motion, most of all in yaw: condition with --rate {native:.0f}."
-                )
-    return told

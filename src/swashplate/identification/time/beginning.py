@@ -112,9 +112,7 @@ def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> 
 
 def first_state(model: StochasticModel, x: Any, nuisance: Array) -> FilterState:
     """State rows (..., states) with nothing known of the air yet, and drifts where the records' numbers have them."""
-    front = x.shape[:-1]
-    line = np.zeros((*front, model.n_line)) if model.lined else ()
-    return FilterState(x, np.zeros((*front, model.n_gusts)), nuisance[..., _PUSHES], line)
+    return FilterState(x, np.zeros((*x.shape[:-1], model.n_gusts)), nuisance[..., _PUSHES])
 
 
 def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:

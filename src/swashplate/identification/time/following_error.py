@@ -195,11 +195,10 @@ def following_from(model: StochasticModel, numbers: FilterNumbers, seen: FirstMo
     covariances[:, here, here] += diagonal(added[:, : model.n_gusts] / (1.0 - fade**2))
     state = first_state(model, starting_rows(model, numbers, seen), numbers.nuisance)
     return Following(
-        states=np.concatenate([part for part in state if not isinstance(part, tuple)], axis=1),
+        states=np.concatenate(state, axis=1),
         covariances=covariances,
         nuisance=numbers.nuisance,
         fade=fade,
-        turn=model.line_turn(noise),
         white=model.white(noise) ** 2 / model.dt,
         added=added,
         sensors=model.sensor_variances(noise),

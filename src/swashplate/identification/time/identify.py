@@ -17,7 +17,6 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core import accuracy, stopping
 from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.low_passed import (
-    coloured_by_resampling,
     noise_too_small,
     refuse_lowpassed,
     smoothed_outputs,
@@ -44,7 +43,7 @@ from swashplate.identification.time.linear_residual import (
     beside_physics,
     moved,
 )
-from swashplate.identification.time.noise_entries import in_wind, with_line
+from swashplate.identification.time.noise_entries import in_wind
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.record_fit import LAGS
 from swashplate.identification.time.residual_fit import fit_residual
@@ -126,7 +125,6 @@ def identify_flight(
         apart = unrelated(lambda others: by.likelihood_of(best.table, others, question).constant.cost(row), pieces)
         problems += [apart] if apart else []
         notes += [told] if (told := moving_air(noise)) else []
-        notes += [] if question.rotor_line is None else coloured_by_resampling(flights)
     notes += [
         f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
         for e in parameters
@@ -195,7 +193,6 @@ def identify_flight(
             **settings,
             "outputs": list(pieces[0].output_names),
             "wind": question.wind,
-            **({} if question.rotor_line is None else {"rotor line": question.rotor_line}),
             **({"left out": [list(part) for part in question.leave_out]} if question.leave_out else {}),
             "rate": 1.0 / pieces[0].dt,
             "records": [piece.name for piece in pieces],
@@ -236,9 +233,7 @@ class FlightEstimator(Generic[L]):
 
 
 def _filter_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> FilterError:
-    noise = in_wind(pieces) if question.wind else Noise()
-    noise = noise if question.rotor_line is None else with_line(noise, question.rotor_line, pieces)
-    return FollowingError(table, pieces, noise=noise) if question.wind else FilterError(table, pieces, noise=noise)
+    return FollowingError(table, pieces, noise=in_wind(pieces)) if question.wind else FilterError(table, pieces)
 
 
 def _output_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> OutputError:
@@ -310,7 +305,7 @@ def _found_ahead(
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
 FILTER_ERROR = FlightEstimator(
     "filter-error",
-    _TAKES | {"keep_unexcited", "wind", "rotor_line", "leave_out", "horizon", "residual"},
+    _TAKES | {"keep_unexcited", "wind", "leave_out", "horizon", "residual"},
     _filter_error,
     _scoring,
     _found_ahead,

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import GYROSCOPE, SEPARATE, Noise
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.flights.schema import RATES
@@ -24,34 +23,14 @@ _SPREAD = {
 """Width of the prior on the logarithm of each noise number; the others get 2 (a factor of 7)."""
 
 _WIND = ("wind", "tau_wind")
-_LINE = ("line_angle", "line_height", "line_time")
 
-_ADDED = ("white", "gust", "wind", "sensor", "line_angle", "line_height")
+_ADDED = ("white", "gust", "wind", "sensor")
 """How the noise numbers begin whose squares add to the innovations' variance; drifts and times act by ratios."""
 
 
 def in_wind(pieces: Sequence[Record]) -> Noise:
     """First guesses of the noise for flights in horizontal wind, with the speed that the records were flown at."""
     return Noise(wind=0.1, speed=_typical_speed(pieces))
-
-
-def with_line(noise: Noise, hertz: float, pieces: Sequence[Record]) -> Noise:
-    """First guesses of the noise with a rotor's line at a signed frequency [Hz].
-
-    The heading, which the line does not shake, then has a white noise of its own.
-
-    Raises:
-        IdentificationError: where the records' rate cannot show it.
-    """
-    half = 0.5 / pieces[0].dt
-    if not 0.0 < abs(hertz) < half:
-        raise IdentificationError(
-            f"a line at {hertz:g} Hz, expected between 0 and {half:g} Hz, half the sample rate.",
-            where=pieces[0].name,
-            channel="rotor_line",
-            hint="Take what `inspect --rotor-speed` says of the flight, and condition to a higher rate if needed.",
-        )
-    return noise._replace(line_hertz=float(hertz), sensor_heading=SEPARATE["sensor_heading"][1])
 
 
 def _typical_speed(pieces: Sequence[Record]) -> float:
@@ -71,14 +50,14 @@ def with_first_guesses(noise: Noise, separate: Sequence[str], outputs: Sequence[
 
 
 def estimated_noises(model: StochasticModel, guess: Noise) -> tuple[str, ...]:
-    """The noise numbers that are estimated: the speed, a line's frequency and a gyroscope's noise are given,
-    the wind's, the line's and the separate ones only where wanted.
+    """The noise numbers that are estimated: the speed and a gyroscope's noise are given, the wind's and the separate
+    ones only where wanted.
 
     Tracked angles err for tenths of a second on end. To the likelihood such errors look like motion, and it would call
     the gyroscope wrong that does not show them (found on flights of a Crazyflie: 0.17 rad/s instead of 0.04, and delays
     and inertias to go with it).
     """
-    left = {"speed", "sensor_rate", "line_hertz", *(() if model.windy else _WIND), *(() if model.lined else _LINE)}
+    left = {"speed", "sensor_rate", *(() if model.windy else _WIND)}
     left |= {name for name in SEPARATE if not getattr(guess, name) > 0.0}
     return tuple(name for name in Noise._fields if name not in left)
 

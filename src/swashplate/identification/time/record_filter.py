@@ -56,7 +56,7 @@ class RecordFilter:
         self.model = model
         self._code = filter_code(model)
         self._n = len(model.vehicle.state_names)
-        self._ends = np.cumsum([self._n, model.n_gusts, N_DISTURBANCES])
+        self._ends = np.cumsum([self._n, model.n_gusts])
 
     @property
     def compiled_by(self) -> str:
@@ -166,32 +166,24 @@ class RecordFilter:
         return np.stack(reached, axis=1), np.stack(moved, axis=2)
 
     def _fixed(self, begin: Begun, numbers: FilterNumbers) -> Fixed:
-        given = np.concatenate([_gain(begin.gain).ravel(), numbers.nuisance, self._lasting(numbers.noise)])
+        fade = self.model.fade(Noise(*numbers.noise))
+        given = np.concatenate([_gain(begin.gain).ravel(), numbers.nuisance, fade])
         start = _row(first_state(self.model, begin.x, numbers.nuisance))
         return Fixed(start, given, numbers_and_constants(self.model.vehicle, numbers.parameters))
 
     def _state(self, rows: Array) -> FilterState:
-        x, gust, drift, line = np.split(rows, self._ends, axis=-1)
-        return FilterState(x, gust, drift, line if self.model.lined else ())
+        return FilterState(*np.split(rows, self._ends, axis=-1))
 
     def _given_moved(self, gain: FilterGain, numbers: FilterNumbers, directions: FilterNumbers) -> Array:
         rows, count = _gain(gain), len(directions.noise)
-        lasting = np.imag(self._lasting(numbers.noise + 1j * IMAGINARY * directions.noise)) / IMAGINARY
-        return np.concatenate([rows.reshape(count, -1), directions.nuisance, lasting], axis=1)
+        fading = self._fading(numbers.noise, directions.noise)[1]
+        return np.concatenate([rows.reshape(count, -1), directions.nuisance, fading], axis=1)
 
     def _fading(self, noise: Array, directions: Array) -> tuple[Array, Array]:
         """What is left of gusts after a sample, and its slopes along directions of the noise."""
         fade = self.model.fade(Noise(*noise))
         moved = self.model.fade(Noise(*(noise + 1j * IMAGINARY * directions).T))
         return fade, np.imag(moved) / IMAGINARY
-
-    def _lasting(self, noise: Array) -> Array:
-        """What is left of gusts after a sample, and how the line turns (..., numbers)."""
-        named = Noise(*np.moveaxis(noise, -1, 0))
-        parts = [self.model.fade(named)]
-        if self.model.lined:
-            parts.append(self.model.line_turn(named).reshape(*noise.shape[:-1], -1))
-        return np.concatenate(parts, axis=-1)
 
 
 def _pushed(gust: Array, drift: Array, commands: Array, voltage: Array) -> Pushed:
@@ -202,13 +194,12 @@ def _pushed(gust: Array, drift: Array, commands: Array, voltage: Array) -> Pushe
 
 
 def _row(state: FilterState) -> Array:
-    return np.concatenate([np.asarray(part) for part in state if not isinstance(part, tuple)], axis=-1)
+    return np.concatenate(state, axis=-1)
 
 
 def _gain(gain: FilterGain) -> Array:
     """The joined gain (..., joined, outputs)."""
-    parts = (gain.state, gain.gust, gain.drift, gain.line)
-    return np.concatenate([np.asarray(part) for part in parts if not isinstance(part, tuple)], axis=-2)
+    return np.concatenate([gain.state, gain.gust, gain.drift], axis=-2)
 
 
 @lru_cache(maxsize=16)

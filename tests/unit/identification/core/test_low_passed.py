@@ -19,7 +19,6 @@ from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.low_passed import (
-    coloured_by_resampling,
     noise_too_small,
     refuse_lowpassed,
     smoothed_outputs,
@@ -110,10 +109,3 @@ def test_noise_that_no_sensor_has_is_said() -> None:
     assert len(found) == 2
     assert "sensor_position = 1e-07 m per sample: no sensor is that good" in found[0]
     assert noise_too_small(Noise(sensor_position=1e-7), [ten_seconds()]) == []  # a simulation may have none
-
-
-def test_a_flight_at_a_lower_rate_than_its_own_has_coloured_noise_and_one_at_its_own_has_not() -> None:
-    (told,) = coloured_by_resampling([ten_seconds().condition(rate=100.0, cutoff=0.0)])
-    assert "was brought from 200 to 100 Hz" in told
-    assert told.endswith("condition with --rate 200.")
-    assert coloured_by_resampling([ten_seconds().condition(rate=200.0, cutoff=0.0)]) == []

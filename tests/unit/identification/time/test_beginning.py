@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.filtering.riccati import steady_gain
 from swashplate.identification.core.records import POSE
 from swashplate.identification.time.beginning import (
     Begun,
@@ -17,7 +15,6 @@ from swashplate.identification.time.beginning import (
     FirstMotion,
     begun,
     begun_moved,
-    joined_at,
     steady_rows,
 )
 from swashplate.models.catalogue import vehicle as load_vehicle
@@ -47,56 +44,6 @@ def test_where_nothing_settles_the_gain_is_not_a_number() -> None:
     lost = at._replace(parameters=np.where(np.array(vehicle.parameter_names) == "mass", np.nan, at.parameters))
     found = begun(stochastic_model(vehicle, POSE, 0.01), lost, _seen((0.0, 0.0, 0.0)))
     assert np.isnan(found.gain.state).all()
-
-
-_LINE = Noise(line_hertz=34.4, line_angle=1.4e-3, line_height=2e-4, line_time=0.2)
-
-
-def _hover(noise: Noise) -> tuple[Array, Array, Array, Array]:
-    at, _ = _numbers("coax")
-    rows = FilterNumbers(*(row[None] for row in at._replace(noise=np.array(noise, dtype=np.float64))))
-    model = stochastic_model(load_vehicle("coax"), POSE, 0.01, noise=noise)
-    A, C, Q, R = (part[0] for part in joined_at(model, rows, _seen((0.0, 0.0, 0.0))))
-    return A, C, Q, R
-
-
-def test_a_rotors_line_turns_at_its_frequency_and_keeps_its_size() -> None:
-    A, C, Q, _ = _hover(_LINE)
-    line = slice(len(A) - 4, None)
-    turn, size = A[line, line], np.diag([1.4e-3, 1.4e-3, 2e-4, 2e-4]) ** 2
-    np.testing.assert_allclose(turn @ size @ turn.T + Q[line, line], size, atol=1e-18)
-    roll_and_pitch = (np.linalg.matrix_power(turn, 7) @ [1.0, 0.0, 0.0, 0.0])[:2]
-    wanted = np.exp(2j * np.pi * 34.4 * 0.07 - 0.07 / 0.2)  # a rotor that turns clockwise: roll + i pitch
-    np.testing.assert_allclose(C[3:5, line] @ [*roll_and_pitch, 0.0, 0.0], [wanted.real, wanted.imag], atol=1e-12)
-    backwards, _, _, _ = _hover(_LINE._replace(line_hertz=-34.4))
-    np.testing.assert_allclose(backwards[line, line], turn.T, atol=1e-15)
-
-
-def test_a_filter_that_knows_of_the_line_has_white_innovations_and_one_that_does_not_has_not() -> None:
-    """Twenty seconds of the linear system with a line, through the gain with it and through that of its white like."""
-    A, C, Q, R = _hover(_LINE)
-    rng = np.random.default_rng(1)
-    roots = [np.diag(np.sqrt(np.diag(part))) for part in (R,)] + [np.linalg.cholesky(Q + 1e-18 * np.eye(len(Q)))]
-    x, seen = np.zeros(len(A)), []
-    for _ in range(2000):
-        seen.append(C @ x + roots[0] @ rng.standard_normal(len(R)))
-        x = A @ x + roots[1] @ rng.standard_normal(len(A))
-    white = Noise(sensor_angle=float(np.hypot(Noise().sensor_angle, _LINE.line_angle)), sensor_position=3.6e-4)
-
-    def related(matrices: tuple[Array, Array, Array, Array]) -> Array:
-        """Correlation with what came three samples before, by channel: 34.4 Hz is nearly a third of 100 Hz."""
-        A, C, _, _ = matrices
-        K, _, _ = steady_gain(*matrices)
-        x, errors = np.zeros(len(A)), []
-        for y in seen:
-            errors.append(y - C @ x)
-            x = A @ (x + K @ errors[-1])
-        e = np.array(errors)[200:]
-        return np.asarray(np.sum(e[3:] * e[:-3], axis=0) / np.sum(e**2, axis=0))
-
-    knows, does_not = related((A, C, Q, R)), related(_hover(white))
-    assert np.abs(knows).max() < 3.0 / np.sqrt(1800.0)
-    assert np.all(does_not[[2, 3, 4]] > 0.2)  # z, phi, theta
 
 
 @pytest.mark.parametrize(("name", "speed"), [("coax", 0.0), ("crazyflie", 0.0), ("raptor50", 0.0), ("raptor50", 10.0)])

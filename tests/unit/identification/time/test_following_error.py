@@ -33,7 +33,7 @@ from swashplate.identification.time.start_states import slopes_ahead
 @lru_cache(maxsize=1)
 def _likelihood() -> FollowingError:
     (record,) = records(ten_seconds().condition(rate=100.0, cutoff=0.0), sp.vehicle("coax"))
-    noise = Noise(wind=0.1, speed=0.2, line_hertz=-34.4, sensor_heading=1e-3)
+    noise = Noise(wind=0.1, speed=0.2, sensor_heading=1e-3)
     return FollowingError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [first_part(record, 2.5)], noise=noise)
 
 
@@ -58,14 +58,13 @@ def test_a_step_carries_the_covariance_by_the_slopes_of_the_equations() -> None:
     """With next to nothing unknown, P+ - Q = F P F', F by differences of whole steps instead of from the rates."""
     likelihood, rng = _likelihood(), np.random.default_rng(3)
     model, run = likelihood.model, likelihood._runs[0]
-    n, d, k = np.cumsum([len(model.vehicle.state_names), model.n_gusts, N_DISTURBANCES])
-    joined = int(k) + model.n_line
+    n, d, joined = np.cumsum([len(model.vehicle.state_names), model.n_gusts, N_DISTURBANCES]).tolist()
     drives = driving_rows(run.inputs[100:101], run.voltage[100:101])[0]
     whole = np.concatenate([_beside().state.x[0], 0.3 * rng.standard_normal(joined - n)])
 
     def after(states: np.ndarray, P: np.ndarray) -> FollowingRows:
         beside = _beside(len(states))
-        beside.state = FilterState(*np.split(states, [n, d, k], axis=1))
+        beside.state = FilterState(*np.split(states, [n, d], axis=1))
         beside.covariance = np.broadcast_to(P, (len(states), joined, joined))
         beside.predicted(np.broadcast_to(drives, (len(states), len(drives))))
         return beside
@@ -152,7 +151,7 @@ def test_a_record_that_begins_in_a_maneuver_says_how_far_off_its_states_may_be()
     assert not np.any(_off(likelihood.table.vehicle, piece, run, lost))
 
 
-@pytest.mark.parametrize("name", [*FREE, "wind", "line_angle"])
+@pytest.mark.parametrize("name", [*FREE, "wind", "sensor_heading"])
 def test_scores_are_slopes_of_the_cost_whatever_the_filter(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Innovations and covariances that bend with all numbers, in the place of the filter's own."""
     likelihood = FollowingError(_likelihood().table, _likelihood().pieces, noise=_likelihood().noise)

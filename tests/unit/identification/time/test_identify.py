@@ -134,9 +134,3 @@ def test_a_stretch_that_is_nowhere_and_one_that_leaves_nothing_are_refused() -> 
         sp.identify(coax, _flight(), free=FREE, leave_out=[(1.0, 7.0)])
     with pytest.raises(IdentificationError, match="'output-error' does not know it"):
         sp.identify(coax, _flight(), free=FREE, method="output-error", leave_out=[(1.0, 2.0)])
-
-
-def test_a_line_that_the_rate_cannot_show_is_refused() -> None:
-    for hertz in (0.0, 60.0, float("nan")):
-        with pytest.raises(IdentificationError, match="expected between 0 and 50 Hz, half the sample rate"):
-            sp.identify(sp.vehicle("coax"), _flight(), free=FREE, rotor_line=hertz)

@@ -37,7 +37,7 @@ _FREE = {
     "xcell60": ["mass", "bar_gain"],
     "x8": ["mass"],
 }
-_EVERYTHING = Noise(wind=0.5, line_hertz=34.4, line_angle=1.4e-3, line_height=2e-4, line_time=0.2)
+_EVERYTHING = Noise(wind=0.5)
 
 
 def _record(vehicle: Vehicle, n: int = 250) -> Record:
