@@ -228,27 +228,7 @@ time = {column = "t", unit = "ms"}
 phi = {column = "roll", unit = "deg", factor = -1.0}
 x = {column = 3, unit = "mm"}
 """
-RECORDER = """
-[recorder]
-rate = 50
-range = [0, 5]
-[filter]
-order = 2
-cutoff = 6.0
-zero_phase = true
-[channels.phi]
-column = "AI1"
-unit = "deg"
-points = [[0.5, -60], [2.5, 0], [4.5, 30]]
-[channels.servo_pitch]
-column = 2
-unit = "1"
-range = [-5, 5]
-zero = 0.12
-gain = 0.25
-"""
 TABLE = "\n".join(["t,roll,x", *(f"{20 * k},{np.sin(k)},{k % 7}" for k in range(100))])
-VOLTS = "\n".join(["AI1,AI2", *(f"{2.5 + np.sin(k)},{np.cos(k)}" for k in range(100))])
 VICON_ROWS = [f"{k},0,{0.01 * k},0,0,{k},1,1" for k in range(1, 60)]
 MOTIVE_ROWS = [f"{k},{0.01 * k:.2f},0,0,0,1,{0.1 * k},2,3,0,0,0,0" for k in range(60)]
 MANEUVERS = (b"sweep:pitch,0.5-8Hz,34s", b"multisine:roll+pitch,0.4-4Hz,8s,0.1", b"doublet:roll,1s,0.1", b"3211:yaw,1s")
@@ -295,7 +275,6 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     "CSV": _logs(_tables, ".csv"),
     "bench record": _logs(_bench, ".csv"),
     "CSV map": _documents("toml", lambda: (MAPPING.encode(),), _with_flight("table.csv", TABLE)),
-    "recorder calibration": _documents("toml", lambda: (RECORDER.encode(),), _with_flight("volts.csv", VOLTS)),
     "frequency responses": lambda: Target(".nc", (_responses(),), by_hdf5, _use_responses),
     "card of a coaxial": _documents("toml", lambda: _packaged("models/data", "coax.toml"), _vehicle),
     "card of a helicopter": _documents("toml", lambda: _packaged("models/data", "raptor50.toml"), _vehicle),

@@ -14,7 +14,6 @@ from swashplate.reporting.case_parts import bode_overlay
 from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import parameter_table
 from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table
-from swashplate.reporting.versions import date, versions
 from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
@@ -134,7 +133,6 @@ class Acceptance(Shown):
             ),
             picture=None,
             sections=tuple(sections),
-            made=f"swashplate {versions()['swashplate']}, {date()}",
         )
 
     def __repr__(self) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 
 from swashplate.reporting.case_parts import CaseParts
 from swashplate.reporting.structure import Block, Points, Report, Section
-from swashplate.reporting.versions import date, versions
 from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
@@ -42,7 +41,6 @@ class CaseComparison(Shown):
             summary=(("Cases", ", ".join(self.names), "plain"), ("Against", self.names[0], "plain")),
             picture=None,
             sections=(*remarks, Section("cases", "Side by side", blocks)),
-            made=f"swashplate {versions()['swashplate']}, {date()}",
         )
 
     def __repr__(self) -> str:

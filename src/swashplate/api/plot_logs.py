@@ -19,7 +19,6 @@ from swashplate.reporting.figures.of_flight import label, over_time, spectrogram
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Figure, Points, Report, Section
-from swashplate.reporting.versions import date, versions
 
 SUFFIXES = (".pdf", ".svg", ".png", ".html")
 Kind = Literal["time", "spectrum", "spectrogram"]
@@ -149,7 +148,6 @@ def _write(
             summary=(),
             picture=None,
             sections=(Section("logs", "Channels", (drawn, *told)),),
-            made=f"swashplate {versions()['swashplate']}, {date()}",
         )
         write_page(path, page)
         return

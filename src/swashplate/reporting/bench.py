@@ -10,14 +10,12 @@ from typing import Any
 
 from swashplate.bench.result import Bench, BenchCheck, BenchResult, Curve
 from swashplate.reporting.html import write_page
-from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
+from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Text, tabulate
 from swashplate.reporting.terms import first_screen
-from swashplate.reporting.theme import BLACK, GREEN, GREY, MODEL, PUBLISHED, axis, base_layout, packed, unit_words
-from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.reporting.theme import BLACK, GREY, axis, base_layout, dots, line, style, unit_words
+from swashplate.reporting.versions import card_hash, versions
 from swashplate.reporting.words import counted, listed, sigma_words, value_words
 
-_COLORS = (MODEL, PUBLISHED, GREEN)
-_DASHES = ("solid", "dash", "dot")
 _HEIGHT = 300
 _MANY = 200  # samples, from which a line is clearer than markers
 
@@ -64,7 +62,6 @@ def compose_bench(bench: Bench) -> Report:
         summary=summary,
         picture=picture,
         sections=sections,
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -84,12 +81,12 @@ def _card(bench: Bench) -> Section:
         change = (new.value - old.value) / new.sigma if measured and new.sigma else None
         rows.append(
             (
-                Cell(name),
-                Cell(unit_words(new.unit)),
-                Cell(value_words(old.value), number=True),
+                name,
+                unit_words(new.unit),
+                value_words(old.value),
                 Cell(value_words(new.value, new.sigma) if measured else "–", number=True, strong=measured),
-                Cell(sigma_words(new.sigma) if measured else "–", number=True),
-                Cell(f"{change:+.1f}" if change is not None else "–", number=True),
+                sigma_words(new.sigma) if measured else "–",
+                f"{change:+.1f}" if change is not None else "–",
                 Cell(source, tone="plain" if measured else "quiet"),
             )
         )
@@ -99,7 +96,7 @@ def _card(bench: Bench) -> Section:
         "Correlations are on the card."
     )
     columns = ("parameter", "unit", "published", "measured", "σ", "change / σ", "source")
-    return Section("card", "The card", (Table("Published and measured values", columns, tuple(rows), note=note),))
+    return Section("card", "The card", (tabulate("Published and measured values", columns, rows, note=note),))
 
 
 def _procedure(result: BenchResult, bench: Bench) -> Section:
@@ -107,21 +104,18 @@ def _procedure(result: BenchResult, bench: Bench) -> Section:
     blocks += _figures(result)
     units = {n: unit_words(bench.model.card.parameters[n].unit) for n in result.names}
     rows = [
-        (Cell(n), Cell(units[n]), Cell(value_words(float(v), float(s)), number=True),
-         Cell(sigma_words(float(s)), number=True))
+        (n, units[n], value_words(float(v), float(s)),
+         sigma_words(float(s)))
         for n, v, s in zip(result.names, result.values, result.sigma, strict=True)
     ]  # fmt: skip
     rows += [
-        (Cell(f"{f.name} (not on the card)"), Cell(unit_words(f.unit)),
-         Cell(value_words(f.value, f.sigma), number=True), Cell(sigma_words(f.sigma), number=True))
+        (f"{f.name} (not on the card)", unit_words(f.unit),
+         value_words(f.value, f.sigma), sigma_words(f.sigma))
         for f in result.findings
     ]  # fmt: skip
     if rows:
-        blocks.append(Table(f"{result.title}: result", ("quantity", "unit", "value", "σ"), tuple(rows)))
-    blocks += [
-        Table(rows.title, rows.columns, tuple(tuple(Cell(text, number=True) for text in row) for row in rows.rows))
-        for rows in result.tables
-    ]
+        blocks.append(tabulate(f"{result.title}: result", ("quantity", "unit", "value", "σ"), rows))
+    blocks += [tabulate(rows.title, rows.columns, rows.rows) for rows in result.tables]
     doubts = [check.words for check in result.checks if not check.good]
     if doubts:
         blocks += [Text(text, tone="caution") for text in doubts]
@@ -146,40 +140,24 @@ def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
     if len(curves) == 1:
         keys.append(Key("measured", *((GREY, "solid") if first.x.size > _MANY else (BLACK, "circle"))))
     for number, curve in enumerate(curves):
-        color, dash = _COLORS[number % len(_COLORS)], _DASHES[number % len(_DASHES)]
+        color, dash = style(number)
         name = curve.name or "fit"
-        many = curve.x.size > _MANY
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines" if many else "markers",
-                "x": packed(curve.x),
-                "y": packed(curve.y),
-                "marker": {"color": color if len(curves) > 1 else BLACK, "size": 6},
-                "line": {"color": GREY, "width": 1.0},
-                "name": f"{name}, measured",
-            }
-        )
+        if curve.x.size > _MANY:
+            traces.append(line(curve.x, curve.y, name=f"{name}, measured", color=GREY, width=1.0))
+        else:
+            marker = {"color": color if len(curves) > 1 else BLACK, "size": 6}
+            traces.append(dots(curve.x, curve.y, marker, name=f"{name}, measured"))
         if curve.line_x.size:
-            line = {"color": color, "dash": dash, "width": 1.8}
-            traces.append(
-                {"type": "scatter", "mode": "lines", "x": packed(curve.line_x), "y": packed(curve.line_y), "line": line,
-                 "name": name}
-            )  # fmt: skip
+            traces.append(line(curve.line_x, curve.line_y, name=name, color=color, dash=dash, width=1.8))
             keys.append(Key(name, color, dash))
         if curve.out_x.size:
-            marker = {"color": GREY, "symbol": "x", "size": 8}
-            traces.append(
-                {"type": "scatter", "mode": "markers", "x": packed(curve.out_x), "y": packed(curve.out_y),
-                 "marker": marker, "name": "left out"}
-            )  # fmt: skip
+            traces.append(dots(curve.out_x, curve.out_y, {"color": GREY, "symbol": "x", "size": 8}, name="left out"))
             keys.append(Key("left out", GREY, "x"))
     layout = base_layout(_HEIGHT)
     layout["xaxis"], layout["yaxis"] = axis(first.x_title), axis(first.y_title)
     return Figure(
         identifier=identifier,
         spec={"data": traces, "layout": layout},
-        height=_HEIGHT,
         caption=f"{first.title}: measured (markers or thin grey) and fitted.",
         alt=f"{first.title}: {first.y_title} against {first.x_title}, measured and fitted.",
         keys=tuple(keys),

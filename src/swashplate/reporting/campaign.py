@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text
-from swashplate.reporting.theme import FLIGHT, MODEL, VERMILION, grid, line
-from swashplate.reporting.versions import date, versions
+from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text, tabulate
+from swashplate.reporting.theme import FLIGHT, MODEL, VERMILION, axis_number, grid, line
 from swashplate.reporting.words import counted
 
 _BINS = 40
@@ -101,7 +100,6 @@ def compose_campaign(
         summary=(("Standing", standing, "plain"), (f"{rows.capitalize()}s", f"{count:,}", "plain"), *summary),
         picture=None,
         sections=tuple(sections),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -110,7 +108,7 @@ def _label(shape: Shape) -> str:
 
 
 def _text_table(caption: str, head: tuple[str, ...], cells: tuple[tuple[str, ...], ...]) -> Block:
-    return Table(
+    return tabulate(
         caption,
         head,
         tuple(tuple(Cell(text, number=k > 0 and text[:1] in _DIGITS) for k, text in enumerate(row)) for row in cells),
@@ -120,12 +118,12 @@ def _text_table(caption: str, head: tuple[str, ...], cells: tuple[tuple[str, ...
 def _quantiles(shapes: Sequence[Shape], shares: Sequence[float], rows: str) -> Table:
     cells = []
     for shape in shapes:
-        row = [Cell(_label(shape))]
+        row = [_label(shape)]
         for at, low, high in shape.quantiles:
-            row += [Cell(f"{at:.4g}", True), Cell(f"{low:.4g} to {high:.4g}", True, "quiet")]
+            row += [f"{at:.4g}", Cell(f"{low:.4g} to {high:.4g}", True, "quiet")]
         cells.append(tuple(row))
     names = tuple(heading for share in shares for heading in (f"{100 * share:g} %", "95 % interval"))
-    return Table(
+    return tabulate(
         f"Quantiles over all {rows}s, each with its interval.",
         ("figure", *names),
         tuple(cells),
@@ -141,7 +139,7 @@ def _spread(shapes: Sequence[Shape], rows: str) -> Figure:
     traces: list[dict[str, Any]] = []
     diverged = 0
     for k, shape in enumerate(shapes):
-        axis = "" if k == 0 else str(k + 1)
+        axis = axis_number(k)
         finite = shape.values[np.isfinite(shape.values)]
         diverged = max(diverged, int(np.sum(np.isinf(shape.values))))
         counts, edges = np.histogram(finite, bins=_BINS) if finite.size else (np.zeros(1, int), np.array([0.0, 1.0]))
@@ -155,7 +153,6 @@ def _spread(shapes: Sequence[Shape], rows: str) -> Figure:
     return Figure(
         "campaign-spread",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         f"Number of {rows}s over the value.{left_out}",
         f"Histograms of {', '.join(shape.name for shape in shapes)} over all {rows}s.",
         keys=(Key(f"{rows}s", MODEL), Key("quantiles of the table", VERMILION, "dash")),
@@ -170,7 +167,7 @@ def _convergence(shapes: Sequence[Shape], shares: Sequence[float], rows: str) ->
         layout[name] = {**layout[name], "type": "log"}
     traces: list[dict[str, Any]] = []
     for k, shape in enumerate(shapes):
-        axis = "" if k == 0 else str(k + 1)
+        axis = axis_number(k)
         values = shape.values[~np.isnan(shape.values)]
         if not values.size:
             continue
@@ -186,7 +183,6 @@ def _convergence(shapes: Sequence[Shape], shares: Sequence[float], rows: str) ->
     return Figure(
         "campaign-convergence",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         f"Quantiles of the first {rows}s, by their number: while a line still moves, more are needed. The bar at its "
         "end is the 95 % interval of all.",
         f"Running quantiles over the number of {rows}s.",
@@ -195,16 +191,8 @@ def _convergence(shapes: Sequence[Shape], shares: Sequence[float], rows: str) ->
 
 
 def _worst(worst: Sequence[WorstRow], rows: str, by: str) -> Table:
-    cells = tuple(
-        (
-            Cell(str(row.number)),
-            Cell(f"{row.value:.5g}", True),
-            Cell(str(row.seed), True),
-            Cell(row.command),
-        )
-        for row in worst
-    )
-    return Table(
+    cells = tuple((str(row.number), f"{row.value:.5g}", str(row.seed), row.command) for row in worst)
+    return tabulate(
         f"The {rows}s to look at first.",
         ("number", by, "seed of its task", "to see it again"),
         cells,
@@ -217,15 +205,15 @@ def _failed(failed: Sequence[FailedTask], folder: str) -> Block:
         return Text("None.")
     cells = tuple(
         (
-            Cell(f"{task.first} to {task.first + task.count - 1}" if task.count > 1 else str(task.first)),
-            Cell(str(task.seed), True),
-            Cell(task.of),
-            Cell(str(len(task.tries)), True),
-            Cell(task.tries[-1] if task.tries else ""),
+            f"{task.first} to {task.first + task.count - 1}" if task.count > 1 else str(task.first),
+            str(task.seed),
+            task.of,
+            str(len(task.tries)),
+            task.tries[-1] if task.tries else "",
         )
         for task in failed
     )
-    return Table(
+    return tabulate(
         "Tasks that were given up.",
         ("rows", "seed", "of", "tries", "the last said"),
         cells,

@@ -80,7 +80,6 @@ def bode_overlay(pairs: Mapping[tuple[str, str], Mapping[str, Curve]], *, whose:
     return Figure(
         "overlay",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         f"{whose or f'Responses of {len(names)} cases'} over each other.{more}",
         f"Bode diagrams of {', '.join(f'{o} over {i}' for o, i in shown)} for {', '.join(names)}.",
         keys=tuple(Key(n, *STYLES[k % len(STYLES)]) for k, n in enumerate(names)),

@@ -12,7 +12,7 @@ from swashplate.identification.responses.frequency_response import TWO_PI
 from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.usual_axes import usual_axes
 from swashplate.reporting.case_parts import CaseParts, bode_overlay, common
-from swashplate.reporting.structure import Cell, Table
+from swashplate.reporting.structure import tabulate
 
 BAND = np.geomspace(0.1, 5.0, 60) * TWO_PI
 """rad/s."""
@@ -31,25 +31,25 @@ def compare_modes(cases: Mapping[str, LinearResponse]) -> CaseParts:
     rows, entries = [], []
     for k, value in enumerate(first):
         mine = {name: None if (j := places[k]) is None else by_case[name][j] for name, places in matched.items()}
-        cells = [Cell(_shown(value))]
+        cells = [_shown(value)]
         for name in names[1:]:
             other = mine[name]
-            cells += [Cell("-"), Cell("-")] if other is None else [
-                Cell(_shown(other)), Cell(f"{100.0 * abs(other - value) / abs(value):.1f}", number=True)
+            cells += ["-", "-"] if other is None else [
+                _shown(other), f"{100.0 * abs(other - value) / abs(value):.1f}"
             ]  # fmt: skip
         rows.append((*cells,))
         entries.append({name: None if v is None else [float(v.real), float(v.imag)] for name, v in mine.items()})
     for name in names[1:]:
         for j in sorted(set(range(len(by_case[name]))) - {j for j in matched[name] if j is not None}):
             value = by_case[name][j]
-            cells = [Cell("-")]
+            cells = ["-"]
             for column in names[1:]:
-                cells += [Cell(_shown(value)), Cell("")] if column == name else [Cell("-"), Cell("-")]
+                cells += [_shown(value), ""] if column == name else ["-", "-"]
             rows.append((*cells,))
             entries.append({n: [float(value.real), float(value.imag)] if n == name else None for n in names})
     head = (names[0], *(title for name in names[1:] for title in (name, "away [%]")))
     note = f"Eigenvalues [1/s] (natural frequency [rad/s], damping); the nearest within {100 * _SAME:.0f} %, '-' none."
-    return CaseParts((Table("Modes", head, tuple(rows), note=note),), document={"modes": entries})
+    return CaseParts((tabulate("Modes", head, rows, note=note),), document={"modes": entries})
 
 
 def eigenvalues(model: LinearResponse) -> list[complex]:
@@ -102,15 +102,12 @@ def compare_answers(cases: Mapping[str, LinearResponse]) -> CaseParts:
         wanted = Target(o, i, BAND, mine[names[0]], np.ones(BAND.size))
         costs = {n: cost_of(mine[n], wanted) if np.all(mine[n] != 0.0) and np.all(wanted.measured != 0.0) else np.inf
                  for n in names[1:]}  # fmt: skip
-        rows.append((Cell(f"{o} / {i}"), *(Cell(f"{c:.1f}", number=True) for c in costs.values())))
+        rows.append((f"{o} / {i}", *(f"{c:.1f}" for c in costs.values())))
         document[f"{o}/{i}"] = {n: c if np.isfinite(c) else None for n, c in costs.items()}
     if not curves:
         return CaseParts(told=("No output of the models answers an input.",))
-    caption, note = (
-        "Mismatch J of responses",
-        f"Against {names[0]}, from 0.1 to 5 Hz; a good model has 100 at most.",
-    )
-    table = Table(caption, ("output / input", *names[1:]), tuple(rows), note=note)
+    caption, note = ("Mismatch J of responses", f"Against {names[0]}, from 0.1 to 5 Hz; a good model has 100 at most.")
+    table = tabulate(caption, ("output / input", *names[1:]), rows, note=note)
     return CaseParts((table,), (bode_overlay(curves),), document={"responses": document})
 
 

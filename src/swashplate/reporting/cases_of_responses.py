@@ -11,7 +11,7 @@ from swashplate.errors import SwashError
 from swashplate.identification.frequency.response_cost import cost_of, target
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 from swashplate.reporting.case_parts import CaseParts, bode_overlay, common
-from swashplate.reporting.structure import Cell, Table
+from swashplate.reporting.structure import Cell, tabulate
 
 _LARGE = 100.0
 """J of a good model is below it (Tischler and Remple 2012, ch. 11)."""
@@ -49,7 +49,7 @@ def compare_responses(cases: Mapping[str, FrequencyResponse]) -> CaseParts:
             ]  # fmt: skip
             tone = "caution" if far is not None and far["J"] > _LARGE else "plain"
             numbers = (Cell(cell, number=True, tone=tone) for cell in cells)
-            rows.append((Cell(f"{pair[0]} / {pair[1]}"), Cell(name), Cell(ends), *numbers))
+            rows.append((f"{pair[0]} / {pair[1]}", name, ends, *numbers))
             if far is not None and far["J"] > _LARGE:
                 remarks.append(f"{pair[0]} / {pair[1]}: {name} differs from {names[0]} by J = {far['J']:.0f}.")
         document[f"{pair[0]}/{pair[1]}"] = entry
@@ -61,7 +61,7 @@ def compare_responses(cases: Mapping[str, FrequencyResponse]) -> CaseParts:
         raise SwashError("no pair is coherent in any case.", channel="cases")
     head = ("output / input", "case", "coherent band [Hz]", "magnitude [dB]", "phase [deg]", "J", "sigmas")
     note = f"Against {names[0]}, root mean squares over the lines where both are coherent (above {LEAST_COHERENCE:g})."
-    table = Table("Responses", head, tuple(rows), note=note)
+    table = tabulate("Responses", head, rows, note=note)
     return CaseParts((table,), (bode_overlay(curves),), tuple(remarks), {"responses": document})
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from swashplate.identification.core.result import APART, Estimate, Result
 from swashplate.reporting.case_parts import CaseParts
-from swashplate.reporting.structure import Cell, Table
+from swashplate.reporting.structure import Cell, tabulate
 
 
 def compare_estimates(cases: Mapping[str, Result[Any, Any]]) -> CaseParts:
@@ -28,7 +28,7 @@ def compare_estimates(cases: Mapping[str, Result[Any, Any]]) -> CaseParts:
         first = by_case[names[0]]
         unit = next(e.unit for e in by_case.values() if e is not None)
         entry: dict[str, Any] = {"unit": unit}
-        cells = [Cell(parameter), Cell(unit)]
+        cells = [parameter, unit]
         for name, e in by_case.items():
             cells += _of(e)
             sigma = float("nan") if e is None or not e.free else e.best_sigma
@@ -52,7 +52,7 @@ def compare_estimates(cases: Mapping[str, Result[Any, Any]]) -> CaseParts:
     for name in names:
         head += [name, "CR [%]"] + (["sigmas away"] if name != names[0] else [])
     note = f"Sigmas away: difference from {names[0]} over that of independent fits; beyond {APART:g} they disagree."
-    table = Table("Parameters", tuple(head), tuple(rows), note=note)
+    table = tabulate("Parameters", head, rows, note=note)
     return CaseParts((table,), told=tuple(remarks), document={"parameters": document})
 
 
@@ -64,13 +64,13 @@ def distance(first: Estimate | None, other: Estimate | None) -> float:
     return (other.value - first.value) / spread if spread > 0.0 else float("nan")
 
 
-def _of(e: Estimate | None) -> list[Cell]:
+def _of(e: Estimate | None) -> list[Cell | str]:
     if e is None:
-        return [Cell("-", number=True), Cell("")]
+        return ["-", ""]
     known = e.free and np.isfinite(e.best_sigma) and e.value
     sigma = f"{100.0 * e.best_sigma / abs(e.value):.1f}" if known else "fixed" if e.fixed else ""
     percent = f"= {e.tie}" if e.tie else sigma
-    return [Cell(f"{e.value:.5g}", number=True), Cell(percent, number=True)]
+    return [f"{e.value:.5g}", percent]
 
 
 def _finite(value: float) -> float | None:

@@ -16,7 +16,6 @@ from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.summary import banners, summary
 from swashplate.reporting.terms import with_terms
-from swashplate.reporting.versions import date, versions
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.modes import Mode
 from swashplate.validation.validation import Validation
@@ -72,7 +71,6 @@ def compose(
         summary=tuple(sorted(lines, key=lambda line: _FIRST.get(line[0], 2))),
         picture=_picture(fit, validation),
         sections=with_terms(sections, lines),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
         verdict=sections_validation.verdict_in_short(validation) if validation else None,
     )
 

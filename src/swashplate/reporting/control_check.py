@@ -21,10 +21,10 @@ from swashplate.control.analysis.requirements import (
 from swashplate.flights.schema import channel
 from swashplate.identification.frequency.handling import delay_words
 from swashplate.reporting import figures_control as figures
-from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table, Text
+from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Text, tabulate
 from swashplate.reporting.terms import first_screen
 from swashplate.reporting.theme import unit_words
-from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.reporting.versions import card_hash, versions
 from swashplate.reporting.words import counted, listed, mode_words, value_words
 
 _TONES = {1: "good", 2: "caution", 3: "bad"}
@@ -58,7 +58,6 @@ def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:
         summary=lines,
         picture=picture,
         sections=folded,
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -146,8 +145,8 @@ def _loops(check: ControlCheck) -> Section:
             good = _axis_level(a, check) == 1
             judgement = (f"meets {least}", "good") if good else (f"below one of {least}", "caution")
             rows.append(
-                (Cell(a.name), _number(_decibel(a.gain_down), ".1f"), _number(_decibel(a.gain), "+.1f"),
-                 _number(math.degrees(a.phase), ".0f"), _number(a.crossover), Cell(delay_words(a.delay), number=True),
+                (a.name, _number(_decibel(a.gain_down), ".1f"), _number(_decibel(a.gain), "+.1f"),
+                 _number(math.degrees(a.phase), ".0f"), _number(a.crossover), delay_words(a.delay),
                  _number(a.disc.alpha, ".2f"),
                  _number(_decibel(a.sensitivity), ".1f"),
                  Cell(judgement[0], tone=judgement[1]))
@@ -170,7 +169,7 @@ def _loops(check: ControlCheck) -> Section:
             "the disc by the diagonally scaled upper bound of the structured singular "
             "value: it never promises more than there is. Disc margins: Seiler, Packard and Gahinet (2020)."
         )
-        blocks.append(Table("Margins at the inputs, one loop opened at a time", columns, tuple(rows), note=note))
+        blocks.append(tabulate("Margins at the inputs, one loop opened at a time", columns, rows, note=note))
     blocks += [Text(note, tone="caution") for note in check.notes]
     blocks += [figures.loops_figure(check)] if check.omega.size else []
     blocks.append(figures.modes_figure(check))
@@ -181,7 +180,7 @@ def _rejection(check: ControlCheck) -> Section | None:
     if not check.rejections:
         return None
     rows = tuple(
-        (Cell(r.state), _number(r.bandwidth), _level(r.level), _number(r.peak, ".1f"), _level(r.peak_level),
+        (r.state, _number(r.bandwidth), _level(r.level), _number(r.peak, ".1f"), _level(r.peak_level),
          _number(r.peak_frequency))
         for r in check.rejections
     )  # fmt: skip
@@ -190,7 +189,7 @@ def _rejection(check: ControlCheck) -> Section | None:
         "Bandwidth: the lowest frequency at which a disturbance added to the measured state is reduced by 3 dB. "
         "Where the place is held, the attitude follows slow disturbances: its bandwidth begins above them."
     )
-    table = Table("Disturbance rejection", columns, rows, note=note)
+    table = tabulate("Disturbance rejection", columns, rows, note=note)
     return Section(
         "rejection", "How well are disturbances rejected?", (table, figures.rejection_figure(check)), folded=True
     )
@@ -205,19 +204,19 @@ def _handling(check: ControlCheck) -> Section | None:
         remark = a.problem or ("6 dB bandwidth lower or none: a pilot may oscillate" if a.oscillates else "")
         numbers = (h.bandwidth_phase, h.bandwidth_gain, h.bandwidth, h.phase_delay) if h else (None,) * 4
         rows.append(
-            (Cell(f"{a.state} of {a.reference}"), Cell(a.kind if h else "–"),
+            (f"{a.state} of {a.reference}", a.kind if h else "–",
              *(_number(math.nan if n is None else n.value) for n in numbers),
-             _number(check.boundary(a.state).scaled(check.scale)[0]), _level(a.level), Cell(remark))
+             _number(check.boundary(a.state).scaled(check.scale)[0]), _level(a.level), remark)
         )  # fmt: skip
     columns = (
         "response", "type", "45° [rad/s]", "6 dB [rad/s]", "bandwidth [rad/s]", "phase delay [s]",
-        "Level 1 from [rad/s]", "", "remark",
+        "Level 1 from [rad/s]", "", "remark"
     )  # fmt: skip
     note = (
         "ADS-33E-PRF: the bandwidth of an attitude response is the one by phase, that of a rate response the lower of "
         "the two. If the type was not given, the phase at a tenth of the bandwidth decides it."
     )
-    blocks: list[Block] = [Table("Bandwidth and phase delay", columns, tuple(rows), note=note)]
+    blocks: list[Block] = [tabulate("Bandwidth and phase delay", columns, rows, note=note)]
     if any(a.handling and np.isfinite(a.handling.bandwidth.value) for a in check.attitudes):
         blocks.append(figures.bandwidth_chart(check))
     blocks.append(figures.attitude_figure(check))
@@ -231,22 +230,22 @@ def _steps(check: ControlCheck) -> Section | None:
     for s in check.steps:
         known, m = channel(s.state), s.metrics
         rows.append(
-            (Cell(s.reference), Cell(s.state), _number(m.peak * known.shown_factor), Cell(unit_words(known.shown_unit)),
+            (s.reference, s.state, _number(m.peak * known.shown_factor), unit_words(known.shown_unit),
              _number(m.rise), _number(100.0 * m.overshoot, ".0f"), _number(m.settling), _number(m.quickness),
              _number(100.0 * m.error, ".1f"))
         )  # fmt: skip
     columns = (
         "step of", "answer", "largest", "unit", "rise [s]", "overshoot [%]", "settled [s]", "quickness [1/s]",
-        "left [%]",
+        "left [%]"
     )  # fmt: skip
     note = "Rise from 10 to 90 %, settled within 5 %; quickness: largest rate over largest change."
-    couplings = Table(
+    couplings = tabulate(
         "What other axes do within 4 s of the step",
         ("coupling", "largest over largest", "unit", ""),
-        tuple((Cell(c.name), _number(c.value), Cell(c.unit), _level(c.level)) for c in check.couplings),
+        tuple((c.name, _number(c.value), c.unit, _level(c.level)) for c in check.couplings),
         note="On the nonlinear vehicle. ADS-33E-PRF takes the on-axis attitude at 4 s, here it is the largest so far.",
     )
-    steps = Table("Steps", columns, tuple(rows), note=note)
+    steps = tabulate("Steps", columns, rows, note=note)
     return Section(
         "steps",
         "What does a step do, also to the other axes?",
@@ -260,7 +259,7 @@ def _gusts(check: ControlCheck) -> Section | None:
     if blown is None:
         return None
     rows = tuple(
-        (Cell(name), _number(factor * value), Cell(unit))
+        (name, _number(factor * value), unit)
         for name, value, factor, unit in (
             ("place, level", blown.place, 1e3, "mm"),
             ("speed, level", blown.speed, 1.0, "m/s"),
@@ -275,7 +274,7 @@ def _gusts(check: ControlCheck) -> Section | None:
         f"{counted(blown.flights, 'flight')} of {blown.duration:g} s on the nonlinear vehicle in Dryden turbulence of "
         f"{along:.2g}, {across:.2g} and {down:.2g} m/s (along, across, down; no mean wind), the first 2 s left out."
     )
-    table = Table("Root mean square of what it strays by", ("of", "RMS", "unit"), rows, note=note)
+    table = tabulate("Root mean square of what it strays by", ("of", "RMS", "unit"), rows, note=note)
     return Section("gusts", "How far does it stray in gusts?", (table,), folded=True)
 
 
@@ -291,8 +290,8 @@ def _boundaries(check: ControlCheck) -> Section:
     for b in used:
         first, second = b.scaled(check.scale)
         rows.append(
-            (Cell(b.name), Cell("at least" if b.least else "at most"), _number(b.level1), _number(first),
-             _number(second), Cell("yes", tone="good") if b.checked else Cell("no", tone="caution"), Cell(b.source))
+            (b.name, "at least" if b.least else "at most", _number(b.level1), _number(first),
+             _number(second), Cell("yes", tone="good") if b.checked else Cell("no", tone="caution"), b.source)
         )  # fmt: skip
     columns = ("quantity", "", "Level 1, full size", "scaled", "Level 2, scaled", "checked", "source")
     boundary_note = (
@@ -302,7 +301,7 @@ def _boundaries(check: ControlCheck) -> Section:
     note = (
         "checked: whether the number was compared with the standard's text. Where it says no, treat it as provisional."
     )
-    table = Table("Boundaries that were used", columns, tuple(rows), note=note)
+    table = tabulate("Boundaries that were used", columns, rows, note=note)
     return Section("boundaries", "Where do the limits come from?", (Text(boundary_note), table), folded=True)
 
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from swashplate.control.lqg.analysis import Analysis
 from swashplate.control.lqg.controller import Lqg
-from swashplate.reporting.structure import Cell, Points, Report, Section, Table
-from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.reporting.structure import Points, Report, Section, Table, tabulate
+from swashplate.reporting.versions import card_hash
 from swashplate.reporting.words import mode_words
 
 
@@ -54,7 +54,6 @@ def compose_design(
             Section("spread", "In gusts as assumed", (_spread(speeds[0], spread),)),
             Section("made", "Made from", (Points((f"model: {card.title} ({card_hash(card)})",)),)),
         ),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -67,11 +66,11 @@ def _margins(speeds: Sequence[float], analyses: Sequence[Analysis]) -> Table:
     for speed, analysis in zip(speeds, analyses, strict=True):
         for a in analysis.margins.axes:
             cells = (f"{a.gain:.3g}", f"{math.degrees(a.phase):.3g}", f"{a.crossover:.3g}", _milliseconds(a.delay))
-            rows.append((Cell(f"{a.name} at {speed:g} m/s"), *(Cell(cell, True) for cell in cells)))
+            rows.append((f"{a.name} at {speed:g} m/s", *cells))
     columns = ("loop at", "gain", "phase [deg]", "crossover [rad/s]", "delay")
-    return Table("Margins of each loop with the others closed.", columns, tuple(rows))
+    return tabulate("Margins of each loop with the others closed.", columns, rows)
 
 
 def _spread(speed: float, rows: Sequence[tuple[str, str, str]]) -> Table:
-    cells = tuple((Cell(name), Cell(strays, True), Cell(known, True)) for name, strays, known in rows)
-    return Table(f"Standard deviations at {speed:g} m/s.", ("state", "strays", "known to"), cells)
+    cells = tuple((name, strays, known) for name, strays, known in rows)
+    return tabulate(f"Standard deviations at {speed:g} m/s.", ("state", "strays", "known to"), cells)

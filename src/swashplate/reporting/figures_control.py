@@ -11,31 +11,23 @@ from swashplate.flights.schema import channel
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (
     BLACK,
-    GREEN,
     GREY,
     MODEL,
-    ORANGE,
     PUBLISHED,
-    PURPLE,
-    SKY,
     VERMILION,
     axis,
+    axis_number,
     axis_title,
     base_layout,
+    dots,
     grid,
     line,
     over_frequency,
-    packed,
+    shade,
+    style,
 )
 
-_COLORS = (MODEL, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
-_DASHES = ("solid", "dash", "dot", "dashdot")
 ATTITUDE_WORDS = {"phi": "roll", "theta": "pitch", "psi": "yaw"}
-
-
-def style(i: int) -> tuple[str, str]:
-    """Colour and line style number i."""
-    return _COLORS[i % len(_COLORS)], _DASHES[i % len(_DASHES)]
 
 
 def loops_figure(check: ControlCheck) -> Figure:
@@ -64,7 +56,6 @@ def loops_figure(check: ControlCheck) -> Figure:
     return Figure(
         identifier="loops-bode",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption="One loop opened at its input, the others closed. The margins are read where the gain is 0 dB and "
         "where the phase is -180 degrees.",
         alt="Bode diagram of each broken loop.",
@@ -89,7 +80,6 @@ def rejection_figure(check: ControlCheck) -> Figure:
     return Figure(
         identifier="rejection-curves",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption="What the closed loop leaves of a disturbance added to a measured state. Far below 0 dB it is "
         "rejected, above 0 dB the loop makes it larger.",
         alt="Sensitivity of each held state over frequency.",
@@ -119,11 +109,8 @@ def attitude_figure(check: ControlCheck) -> Figure:
             bandwidth = a.handling.bandwidth.value
             lag = float(np.interp(bandwidth, a.omega, phase))
             marker = {"color": color, "size": 9, "symbol": "circle"}
-            traces.append(
-                {"type": "scatter", "mode": "markers", "x": [bandwidth], "y": [lag],
-                 "xaxis": "x2", "yaxis": "y2", "marker": marker, "name": "bandwidth",
-                 "hovertemplate": f"bandwidth {a.state}<br>%{{x:.3g}} rad/s<extra></extra>"}
-            )  # fmt: skip
+            hover = f"bandwidth {a.state}<br>%{{x:.3g}} rad/s"
+            traces.append(dots([bandwidth], [lag], marker, name="bandwidth", hover=hover, axis="2"))
     keys.append(Key("bandwidth", GREY, "circle"))
     for level in (-135.0, -180.0):
         ends = check.omega[[0, -1]]
@@ -131,7 +118,6 @@ def attitude_figure(check: ControlCheck) -> Figure:
     return Figure(
         identifier="attitude-bode",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption="Attitude over the pilot's command, all loops closed; -135 and -180 degrees are dotted.",
         alt="Bode diagram of the attitude responses with their bandwidths.",
         keys=tuple(keys),
@@ -150,7 +136,7 @@ def bandwidth_chart(check: ControlCheck) -> Figure:
     traces: list[dict[str, Any]] = []
     for i, a in enumerate(judged):
         assert a.handling is not None
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         bandwidth, delay = a.handling.bandwidth.value, a.handling.phase_delay.value
         first, second = check.boundary(a.state).scaled(check.scale)
         right = 1.3 * max(bandwidth, first)
@@ -160,23 +146,19 @@ def bandwidth_chart(check: ControlCheck) -> Figure:
             (0.0, second, "rgba(213,94,0,0.18)", "Level 3"),
         ):
             around = ([low, high, high, low, low], [0.0, 0.0, highest, highest, 0.0])
-            box = line(*around, name=label, color=GREY, width=1.0, axis=number)
-            traces.append({**box, "fill": "toself", "fillcolor": color, "hoverinfo": "skip", "hovertemplate": None})
+            box = shade(*around, name=label, color=color, axis=number)
+            traces.append({**box, "line": {"color": GREY, "width": 1.0}})
             layout["annotations"].append(
                 {"text": label, "x": 0.5 * (low + high), "y": 0.93 * highest, "xref": f"x{number}",
                  "yref": f"y{number}", "showarrow": False, "font": {"size": 10}}
             )  # fmt: skip
-        traces.append(
-            {"type": "scatter", "mode": "markers", "x": [bandwidth], "y": packed([delay]), "xaxis": f"x{number}",
-             "yaxis": f"y{number}", "marker": {"color": BLACK, "size": 11, "symbol": "circle"}, "name": a.state,
-             "hovertemplate": "%{x:.3g} rad/s, %{y:.3g} s<extra></extra>"}
-        )  # fmt: skip
+        marker, hover = {"color": BLACK, "size": 11, "symbol": "circle"}, "%{x:.3g} rad/s, %{y:.3g} s"
+        traces.append(dots([bandwidth], [delay], marker, name=a.state, hover=hover, axis=number))
         layout[f"xaxis{number}"]["range"] = [0.0, right]
         layout[f"yaxis{number}"]["range"] = [0.0, highest]
     return Figure(
         identifier="bandwidth-chart",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption=f"ADS-33E-PRF bandwidth and phase delay, boundaries scaled for N = {check.scale:.3g}. Only the "
         "vertical part of the boundaries is drawn, and their numbers were not checked against the standard's text.",
         alt="Bandwidth and phase delay of each axis against the boundaries of Levels 1 and 2.",
@@ -191,7 +173,7 @@ def steps_figure(check: ControlCheck) -> Figure:
     layout = grid(titles, columns=2, height=190, x_title="time [s]")
     traces = []
     for i, s in enumerate(check.steps):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         factor = channel(s.state).shown_factor
         t, values = s.flight.time(s.state), s.flight.values(s.state) * factor
         every = max(1, t.size // 1500)
@@ -202,7 +184,6 @@ def steps_figure(check: ControlCheck) -> Figure:
     return Figure(
         identifier="step-responses",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption="Steps flown on the nonlinear vehicle, half a second after the start. Roll and pitch are a pilot's "
         "step of a tenth of the stick, which outer loops cancel where they hold speed or place.",
         alt="Time histories of the responses to steps.",
@@ -217,15 +198,19 @@ def modes_figure(check: ControlCheck) -> Figure:
     bad = [complex(m) for m in check.modes if m.real > 1e-6]
     good = [complex(m) for m in check.modes if m.real <= 1e-6]
     traces = [
-        {"type": "scatter", "mode": "markers", "x": [m.real for m in group], "y": [m.imag for m in group],
-         "name": label, "marker": {"color": color, "symbol": "x", "size": 8},
-         "hovertemplate": "%{x:.3g} %{y:+.3g}j 1/s<extra></extra>"}
-        for group, label, color in ((good, "dies out", MODEL), (bad, "grows", VERMILION)) if group
-    ]  # fmt: skip
+        dots(
+            [m.real for m in group],
+            [m.imag for m in group],
+            {"color": color, "symbol": "x", "size": 8},
+            name=label,
+            hover="%{x:.3g} %{y:+.3g}j 1/s",
+        )
+        for group, label, color in ((good, "dies out", MODEL), (bad, "grows", VERMILION))
+        if group
+    ]
     return Figure(
         identifier="modes-plane",
         spec={"data": traces, "layout": layout},
-        height=300,
         caption="Modes of the closed loop including the controller's sampling.",
         alt=f"{len(check.modes)} modes in the complex plane, {len(bad)} of them growing.",
         keys=(Key("dies out", MODEL, "x"), *((Key("grows", VERMILION, "x"),) if bad else ())),

@@ -18,10 +18,13 @@ from swashplate.reporting.theme import (
     MODEL,
     PUBLISHED,
     axis,
+    axis_number,
     base_layout,
+    dots,
     grid,
     line,
     numbers,
+    shade,
     stacked,
     unit_words,
 )
@@ -65,27 +68,18 @@ def residual_time(pieces: Mapping[str, Sequence[tuple[Array, Array]]], sigma: Ma
     traces: list[dict[str, Any]] = []
     finely = {name: _finely(name, sigma[name]) for name in names}
     for i, name in enumerate(names):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         factor = finely[name][0]
         time, values = joined([(t, factor * r) for t, r in pieces[name]])
         places = kept(values)
         bound = 2.0 * sigma[name] * factor
         ends = [time[0], time[-1], time[-1], time[0]]
-        traces.append(
-            {
-                **line(ends, [bound, bound, -bound, -bound], name="±2σ", color=BAND, width=0, axis=number),
-                "fill": "toself",
-                "fillcolor": BAND,
-                "hoverinfo": "skip",
-                "hovertemplate": None,
-            }
-        )
+        traces.append(shade(ends, [bound, bound, -bound, -bound], name="±2σ", color=BAND, axis=number))
         traces.append(line(time[places], values[places], name=name, color=BLACK, width=0.9, axis=number))
     layout = stacked([f"{name} [{finely[name][1]}]" for name in names], height=96)
     return Figure(
         identifier="residual-time",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption="Residuals, flight minus model. Where they leave the shaded band for long, the model misses something "
         "that its noise does not cover.",
         alt=f"Residuals of {', '.join(names)} against time with their two-sigma bands.",
@@ -100,21 +94,11 @@ def residual_correlation(pieces: Mapping[str, Sequence[Array]], dt: float) -> Fi
     traces: list[dict[str, Any]] = []
     outside = {}
     for i, name in enumerate(names):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         rows, bound = autocorrelation(pieces[name])
         lag = np.arange(rows.size) * dt
         outside[name] = float(np.mean(np.abs(rows[1:]) > bound))
-        traces.append(
-            {
-                **line(
-                    [0, lag[-1], lag[-1], 0], [bound, bound, -bound, -bound], name="", color=BAND, width=0, axis=number
-                ),
-                "fill": "toself",
-                "fillcolor": BAND,
-                "hoverinfo": "skip",
-                "hovertemplate": None,
-            }
-        )
+        traces.append(shade([0, lag[-1], lag[-1], 0], [bound, bound, -bound, -bound], name="", color=BAND, axis=number))
         traces.append(
             {
                 "type": "bar",
@@ -132,7 +116,6 @@ def residual_correlation(pieces: Mapping[str, Sequence[Array]], dt: float) -> Fi
     return Figure(
         identifier="residual-correlation",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption="Autocorrelation of the residuals. White noise stays inside the band at 95 % of the lags; the worst "
         f"here is {worst}, with {100.0 * outside[worst]:.0f} % of its lags outside. Coloured residuals make plain "
         "bounds too small, which is why the corrected bound is the one to use.",
@@ -178,7 +161,6 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
     return Figure(
         identifier="correlation",
         spec={"data": [heat], "layout": layout},
-        height=size,
         caption=f"Correlation of the estimates. {strongest}",
         alt=f"Correlation matrix of {n} parameters. {strongest}",
         min_width=size + 40,
@@ -209,7 +191,6 @@ def cost_history(history: Sequence[float]) -> Figure:
     return Figure(
         identifier="cost",
         spec={"data": [trace], "layout": layout},
-        height=220,
         caption="Negative log-likelihood, priors included, after each iteration.",
         alt=f"Cost over {rows.size} iterations, from {rows[0]:.6g} to {rows[-1]:.6g}.",
     )
@@ -230,24 +211,15 @@ def eigenvalues(modes: Mapping[str, Sequence[Mode]]) -> Figure:
         color, symbol, size = _MARKS.get(label, (GREY, "diamond", 8))
         points = [p for m in group for p in {m.eigenvalue, m.eigenvalue.conjugate()}]
         points.sort(key=lambda p: (p.real, p.imag))
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "x": numbers([p.real for p in points]),
-                "y": numbers([p.imag for p in points]),
-                "name": label,
-                "marker": {"color": color, "symbol": symbol, "size": size, "line": {"width": 2, "color": color}},
-                "hovertemplate": f"{label}<br>%{{x:.3f}} %{{y:+.3f}}j<extra></extra>",
-            }
-        )
+        marker = {"color": color, "symbol": symbol, "size": size, "line": {"width": 2, "color": color}}
+        hover = f"{label}<br>%{{x:.3f}} %{{y:+.3f}}j"
+        traces.append(dots([p.real for p in points], [p.imag for p in points], marker, name=label, hover=hover))
         keys.append(Key(label, color, symbol))
     unstable = {label: sum(m.eigenvalue.real > 1e-6 for m in group) for label, group in modes.items()}
     counts = ", ".join(f"{label} {count}" for label, count in unstable.items())
     return Figure(
         identifier="eigenvalues",
         spec={"data": traces, "layout": layout},
-        height=380,
         caption=f"Eigenvalues at hover. Right of the vertical line a motion grows (growing motions: {counts}).",
         alt=f"Eigenvalues in the complex plane for {' and '.join(modes)}; growing motions: {counts}.",
         keys=tuple(keys),

@@ -18,10 +18,11 @@ from swashplate.reporting.theme import (
     INPUT_COLORS,
     MODEL,
     axis_title,
+    dots,
     inputs_title,
     line,
     numbers,
-    packed,
+    shade,
     shown,
     stacked,
     unit_words,
@@ -114,7 +115,6 @@ def time_figures(
             Figure(
                 identifier=f"{identifier}-{group}",
                 spec={"data": traces, "layout": layout},
-                height=int(layout["height"]),
                 caption=f"{title}, {source}. {'Inputs on top; a' if rows else 'A'}ll panels zoom in time together.",
                 alt=f"{title} of {source} against time: {', '.join(present)}, {flight_words} and {model_words}"
                 + (f", under the commands {', '.join(input_names[row] for row in rows)}." if rows else "."),
@@ -179,7 +179,8 @@ def _prediction_traces(pieces: Sequence[Prediction], name: str, *, axis: str) ->
     time, values = joined([(t, m) for t, m, _ in drawn])
     places = kept(values)
     label = f"{name}, predicted"
-    starts = [(t[0], m[0]) for t, m, _ in drawn]
+    starts = [t[0] for t, _, _ in drawn], [m[0] for _, m, _ in drawn]
+    marked = dots(*starts, {"size": 6, "color": MODEL}, name="start", axis=axis)
     return [
         _band(drawn, axis=axis),
         line(
@@ -192,13 +193,7 @@ def _prediction_traces(pieces: Sequence[Prediction], name: str, *, axis: str) ->
             axis=axis,
             hover=_hover(label),
         ),
-        {
-            **line([t for t, _ in starts], [m for _, m in starts], name="start", color=MODEL, axis=axis),
-            "mode": "markers",
-            "marker": {"size": 6, "color": MODEL},
-            "hoverinfo": "skip",
-            "hovertemplate": None,
-        },
+        {**marked, "hoverinfo": "skip", "hovertemplate": None},
     ]
 
 
@@ -218,19 +213,7 @@ def _band(pieces: Sequence[tuple[Array, Array, Array]], *, axis: str) -> dict[st
         spread = 2.0 * sigma[places]
         xs += [*numbers(time[places]), *numbers(time[places][::-1]), None]
         ys += [*numbers(values[places] + spread), *numbers((values[places] - spread)[::-1]), None]
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": packed(xs),
-        "y": packed(ys),
-        "fill": "toself",
-        "fillcolor": BAND,
-        "line": {"width": 0, "color": BAND},
-        "hoverinfo": "skip",
-        "name": "±2σ",
-        "xaxis": f"x{axis}",
-        "yaxis": f"y{axis}",
-    }
+    return shade(xs, ys, name="±2σ", color=BAND, axis=axis)
 
 
 def _unbroken(time: Array, values: Array, sigma: Array) -> list[tuple[Array, Array, Array]]:

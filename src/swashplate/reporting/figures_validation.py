@@ -10,6 +10,7 @@ from swashplate.reporting.theme import (
     PREDICTOR_STYLE,
     PREDICTOR_WORDS,
     axis,
+    axis_number,
     base_layout,
     grid,
     line,
@@ -85,7 +86,6 @@ def key_picture(validation: Validation) -> Figure:
     return Figure(
         identifier="key-picture",
         spec={"data": traces, "layout": layout},
-        height=height,
         caption=f"Prediction of {_sources(validation)}, {horizon:g} s ahead. 100 % is perfect, 0 % is as good as "
         f"holding the last value; triangles on the left edge lie below {_FLOOR:g} %. The model is best in "
         f"{len(best)} of {len(names)} channels{': ' + ', '.join(best) if best else ''}.",
@@ -112,7 +112,7 @@ def fit_over_horizon(validation: Validation) -> Figure:
     layout = grid(names, columns=3, height=118, x_title="ahead [s]", y_title="fit [%]")
     traces: list[dict[str, Any]] = []
     for i, name in enumerate(names):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         for predictor in reversed(PREDICTORS):
             rows = sorted(_of(validation.scores, name, predictor), key=lambda s: s.horizon)
             color, dash, _ = PREDICTOR_STYLE[predictor]
@@ -133,7 +133,6 @@ def fit_over_horizon(validation: Validation) -> Figure:
     return Figure(
         identifier="fit-over-horizon",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption=f"Fit [%] against how far ahead the prediction looks. Lines that leave a panel below {_FLOOR:g} % "
         "are worse than useless there.",
         alt=f"Fit in percent against horizon for {', '.join(names)} and each predictor; the tables below have "

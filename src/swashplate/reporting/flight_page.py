@@ -14,8 +14,7 @@ from swashplate.physics.rigid_body import RigidBody
 from swashplate.reporting.downsample import kept
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Figure, Points, Report, Section
-from swashplate.reporting.theme import BLUE, line, quantity, stacked
-from swashplate.reporting.versions import date, versions
+from swashplate.reporting.theme import BLUE, axis_number, line, quantity, stacked
 
 _PANEL = 118
 """Height of one panel [px]."""
@@ -62,7 +61,6 @@ def compose_flight(
         summary=(("Where to trust it", vehicle.card.trust or "the card does not say", "plain"),),
         picture=None,
         sections=tuple(sections),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -75,12 +73,11 @@ def flight_panels(flight: Flight, names: Sequence[str], *, identifier: str, capt
         values = factor * flight.values(name)
         places = kept(values)
         hover = f"{name}<br>%{{x:.2f}} s, %{{y:.4g}} {unit}".rstrip()
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         traces.append(line(flight.time(name)[places], values[places], name=name, color=BLUE, axis=number, hover=hover))
     return Figure(
         f"flight-{identifier}",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         caption,
         f"{', '.join(names)} against time, one panel each.",
     )

@@ -15,10 +15,8 @@ from swashplate.control.laws.linear_decoupling import (
     step_answers,
     unmixed,
 )
-from swashplate.reporting.figures_control import style
-from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text
-from swashplate.reporting.theme import line, over_frequency, stacked
-from swashplate.reporting.versions import date, versions
+from swashplate.reporting.structure import Block, Figure, Key, Report, Section, Text, tabulate
+from swashplate.reporting.theme import axis_number, line, over_frequency, stacked, style
 
 _WORDS = {"bare": "bare inputs", "matrix": "constant matrix", "filter": "filter"}
 _LOW, _HIGH, _POINTS = 0.3, 60.0, 120
@@ -63,11 +61,10 @@ def compose_linear_decoupling(
             ("Axes", ", ".join(f"{i} moves {o}" for i, o in zip(inputs, outputs, strict=True)), "plain"),
             ("Coupling", f"largest off-axis over on-axis response at {frequency:g} rad/s: {summary}.", "plain"),
             ("Judged", "on its own model, where the filter is exact; flown, it is as good as that model.",
-             "caution"),
+             "caution")
         ),
         picture=_ratio_figure(w, ratios, pairs, outputs),
-        sections=(_steps(model, decouplings, axes), _numbers(decouplings, axes, frequency)),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
+        sections=(_steps(model, decouplings, axes), _numbers(decouplings, axes, frequency))
     )  # fmt: skip
 
 
@@ -86,12 +83,11 @@ def _ratio_figure(
             color, dash = style(number)
             shown = 100.0 * np.maximum(ratio[i, k], 1e-5)  # an exact filter leaves rounding
             hover = f"{_WORDS[name]}<br>%{{x:.3g}} rad/s, %{{y:.3g}} %"
-            axis = "" if panel == 0 else str(panel + 1)
+            axis = axis_number(panel)
             traces.append(line(w, shown, name=name, color=color, dash=dash, hover=hover, axis=axis))
     return Figure(
         identifier="key-picture",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption="Off-axis over on-axis response; 100 %: as much motion on the other axis as on its own.",
         alt="Off-axis over on-axis response against frequency, bare, with the matrix and with the filter.",
         keys=_keys(list(ratios)),
@@ -115,12 +111,11 @@ def _steps(
             answer = answer / max(abs(float(largest)), 1e-12) * np.sign(largest)
             for i in range(len(outputs)):
                 panel = k * len(outputs) + i
-                axis = "" if panel == 0 else str(panel + 1)
+                axis = axis_number(panel)
                 traces.append(line(time, answer[i], name=titles[panel], color=color, dash=dash, axis=axis))
     figure = Figure(
         identifier="decoupled-steps",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption=f"A step of each axis for {_STEP:g} s, in units of the largest on-axis answer.",
         alt="Answers of all outputs to a step of each axis.",
         keys=_keys(list(decouplings)),
@@ -135,20 +130,15 @@ def _numbers(
     matrix, filtered = decouplings["matrix"], decouplings.get("filter")
     if matrix is not None:
         rows = tuple(
-            (Cell(name), *(Cell(f"{value:+.4f}", number=True) for value in row))
-            for name, row in zip(axes["inputs"], matrix.matrix, strict=True)
+            (name, *(f"{value:+.4f}" for value in row)) for name, row in zip(axes["inputs"], matrix.matrix, strict=True)
         )
         title = f"The matrix, made at {frequency:g} rad/s"
-        blocks.append(Table(title, ("input", *(f"{o}'s axis" for o in axes["outputs"])), rows))
+        blocks.append(tabulate(title, ("input", *(f"{o}'s axis" for o in axes["outputs"])), rows))
     if filtered is not None:
         modes = np.linalg.eigvals(filtered.system.A)
         modes = modes[np.argsort(-modes.real)]
-        rows = tuple(
-            (Cell(f"{m.real:+.3f}", number=True), Cell(f"±{m.imag:.3f}" if m.imag > 0.0 else "0", number=True))
-            for m in modes
-            if m.imag >= 0.0
-        )
-        blocks.append(Table("The filter's modes", ("real part [1/s]", "imaginary part [1/s]"), rows))
+        rows = tuple((f"{m.real:+.3f}", f"±{m.imag:.3f}" if m.imag > 0.0 else "0") for m in modes if m.imag >= 0.0)
+        blocks.append(tabulate("The filter's modes", ("real part [1/s]", "imaginary part [1/s]"), rows))
     blocks.append(
         Text("The matrix's columns leave the on-axis gains as they were. Falb and Wolovich (1967) for the filter.")
     )

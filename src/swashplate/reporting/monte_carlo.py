@@ -14,9 +14,9 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.flight_page import flight_panels
-from swashplate.reporting.structure import Cell, Figure, Key, Points, Report, Section, Table, Text
-from swashplate.reporting.theme import MODEL, VERMILION, grid, line
-from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.reporting.structure import Cell, Figure, Key, Points, Report, Row, Section, Table, Text, tabulate
+from swashplate.reporting.theme import MODEL, VERMILION, axis_number, grid, line
+from swashplate.reporting.versions import card_hash
 from swashplate.reporting.words import counted
 
 _BINS = 24
@@ -70,7 +70,6 @@ def compose_monte_carlo(
             ),
             Section("made", "Made from", (Points((f"model: {vehicle.card.title} ({card_hash(vehicle.card)})",)),)),
         ),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -83,7 +82,7 @@ def _by(spread: Spread) -> str:
 
 def _table(spread: Spread) -> Table:
     limits, figures, counts = asdict(spread.limits), spread.figures, spread.lost_by
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for name, values in figures.items():
         key = name.split(",")[0]
         judged = name != "place, rms [m]"
@@ -91,13 +90,13 @@ def _table(spread: Spread) -> Table:
         beyond = counts[key] if judged else 0
         rows.append(
             (
-                Cell(name),
+                name,
                 *(Cell(f"{v:.4g}", True, "bad" if v > bound else "plain") for v in values),
-                Cell(f"{bound:.4g}" if math.isfinite(bound) else "none", True),
+                f"{bound:.4g}" if math.isfinite(bound) else "none",
                 Cell(str(beyond) if judged else "", True, "bad" if beyond else "plain"),
             )
         )
-    return Table(
+    return tabulate(
         "Percentiles over all flights, lost ones too; beyond its limit a flight is lost.",
         ("figure", *(f"{p:g} %" for p in spread.percentiles), "limit", "flights beyond"),
         tuple(rows),
@@ -117,7 +116,7 @@ def _figure(spread: Spread) -> Figure:
     )
     traces: list[dict[str, Any]] = []
     for i, (name, (_, factor)) in enumerate(SHOWN.items()):
-        axis = "" if i == 0 else str(i + 1)
+        axis = axis_number(i)
         values, bound = factor * spread.values[name], factor * limits[name]
         finite = values[np.isfinite(values)]
         counts, edges = np.histogram(finite, bins=_BINS) if finite.size else (np.zeros(1, int), np.array([0.0, 1.0]))
@@ -131,7 +130,6 @@ def _figure(spread: Spread) -> Figure:
     return Figure(
         "flights-spread",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         f"Number of flights over the largest that each reached.{left_out}",
         "Histograms of the largest lean, rate, distance, height error and heading error of every flight.",
         keys=(Key("flights", MODEL), Key("limit", VERMILION, "dash")),

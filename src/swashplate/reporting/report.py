@@ -22,7 +22,6 @@ from swashplate.reporting.html import write_page
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.structure import Report
-from swashplate.reporting.versions import date, versions
 from swashplate.shown import Shown
 from swashplate.simulation.modes import Mode
 from swashplate.validation.validation import Validation
@@ -105,8 +104,7 @@ def _of_one(shown: object, title: str | None) -> Report:
     section = own_section(shown)
     if section is None:
         raise SwashError("has nothing that a page could show.", channel=type(shown).__name__, hint="Print it.")
-    version = f"swashplate {versions()['swashplate']}, {date()}"
-    return Report(title or section.title, (), (), None, (replace(section, identifier="shown"),), version)
+    return Report(title or section.title, (), (), None, (replace(section, identifier="shown"),))
 
 
 def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:

@@ -15,7 +15,6 @@ from swashplate.reporting.sections_search import search_section
 from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Report
 from swashplate.reporting.terms import first_screen
-from swashplate.reporting.versions import date, versions
 from swashplate.reporting.words import listed
 
 
@@ -54,7 +53,6 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
         summary=lines,
         picture=picture,
         sections=sections,
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
-from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
+from swashplate.reporting.structure import Block, Cell, Points, Section, Text, tabulate
 from swashplate.reporting.versions import card_hash, date, result_hash, versions
 from swashplate.reporting.words import counted, listed, noise_told, plain_words, span_words, step_words
 from swashplate.validation.validation import Validation
@@ -42,9 +42,9 @@ def asked(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[
     if validation:
         noise = validation.settings.get("noise")
         rows.append(("validation", {**validation.settings, **({"noise": noise_told(noise)} if noise else {})}))
-    cells = tuple((Cell(_setting(k)), Cell(part), Cell(plain_words(v))) for part, s in rows for k, v in s.items())
+    cells = tuple((_setting(k), part, plain_words(v)) for part, s in rows for k, v in s.items())
     if cells:
-        blocks.append(Table("Settings", ("setting", "of", "value"), cells))
+        blocks.append(tabulate("Settings", ("setting", "of", "value"), cells))
     return tuple(blocks)
 
 
@@ -92,20 +92,17 @@ def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section
             roles.append((role, flight))
     rows = tuple(
         (
-            Cell(flight.name or "unnamed"),
-            Cell(role),
-            Cell(
-                "simulated" if flight.simulated else "flown",
-                tone="caution" if flight.simulated else "plain",
-            ),
-            Cell(span_words(flight)),
-            Cell(f"{flight.reader} {flight.reader_version}".strip() or "–"),
-            Cell(flight.sha256[:12] or "–"),
+            flight.name or "unnamed",
+            role,
+            Cell("simulated" if flight.simulated else "flown", tone="caution" if flight.simulated else "plain"),
+            span_words(flight),
+            f"{flight.reader} {flight.reader_version}".strip() or "–",
+            flight.sha256[:12] or "–",
         )
         for role, flight in roles
     )
     blocks: list[Block] = [
-        Table(
+        tabulate(
             "Flights",
             ("flight", "role", "origin", "length", "reader", "SHA-256 (first 12)"),
             rows,
@@ -132,7 +129,7 @@ def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section
 
 def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[Block, ...]:
     """Versions and hashes: enough to know whether two reports say the same about the same data."""
-    rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
+    rows = tuple((name, number) for name, number in versions().items())
     hashes: list[tuple[str, str]] = []
     named: set[str] = set()
     for flight in (*(fit.data if fit else ()), *(validation.data if validation else ())):
@@ -147,11 +144,11 @@ def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> tu
     hashes += [(f"numbers of the {label}", result_hash(result)) for label, result in results]
     return (
         Text(f"Written on {date()}."),
-        Table("Versions", ("package", "version"), rows),
-        Table(
+        tabulate("Versions", ("package", "version"), rows),
+        tabulate(
             "SHA-256",
             ("of", "hash"),
-            tuple((Cell(name), Cell(value, tone="quiet")) for name, value in hashes),
+            tuple((name, Cell(value, tone="quiet")) for name, value in hashes),
             note="Flights: of the file's bytes. Cards: of their text. Numbers: of all results rounded to six digits, "
             "wall time left out. None depends on the machine or on where files lie.",
         ),

@@ -17,7 +17,7 @@ from swashplate.identification.one_step import in_words, not_judged, one_step_ef
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.reporting.figures_fit import residual_correlation, residual_time
 from swashplate.reporting.figures_time import Series, flight_name, time_figures
-from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
+from swashplate.reporting.structure import Block, Cell, Points, Row, Section, Table, Text, tabulate
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.words import noise_told, sigma_words, value_words
 
@@ -35,7 +35,7 @@ def parameters(fit: Result[Any, Any]) -> Section:
     if asked_for:
         blocks.append(Text(f"Structure: the flights say that the model {asked_for} {not_judged(fit)}".rstrip()))
     blocks.append(
-        Table(
+        tabulate(
             "Parameters before and after the fit",
             (
                 "parameter",
@@ -58,16 +58,16 @@ def parameters(fit: Result[Any, Any]) -> Section:
     )
     if fit.constants:
         blocks.append(
-            Table(
+            tabulate(
                 "What belongs to the flights and not to the vehicle",
                 ("quantity", "flight", "unit", "estimate", "±σ"),
                 tuple(
                     (
                         Cell(e.name, link=f"meaning-{e.name}"),
-                        Cell(e.record),
-                        Cell(unit_words(e.unit)),
-                        Cell(value_words(e.value, e.sigma), number=True),
-                        Cell(sigma_words(e.sigma), number=True),
+                        e.record,
+                        unit_words(e.unit),
+                        value_words(e.value, e.sigma),
+                        sigma_words(e.sigma),
                     )
                     for e in fit.constants
                 ),
@@ -81,30 +81,30 @@ def noise(fit: Result[Any, Any]) -> Table | None:
     if fit.noise is None:
         return None
     intensities = noise_told({name: float(value) for name, value in fit.noise._asdict().items()})
-    return Table(
+    return tabulate(
         "Noise that the method assumed or estimated",
         ("intensity", "value"),
-        tuple((Cell(name), Cell(value_words(value), number=True)) for name, value in intensities.items()),
+        tuple((name, value_words(value)) for name, value in intensities.items()),
         note="white_*: rad/s² or m/s² per √Hz; gust_* and drift_*: rad/s³ or m/s³ per √Hz; tau_*: s; sensor_*: "
         "standard deviation per sample in m or rad"
         + ("; wind: m/s² per √Hz; speed: horizontal, flown, rms in m/s." if "wind" in intensities else "."),
     )
 
 
-def _row(fit: Result[Any, Any], e: Estimate) -> tuple[Cell, ...]:
+def _row(fit: Result[Any, Any], e: Estimate) -> Row:
     change = e.value - e.start
     relative = _relative(change, e.start)
     sigmas = f"{change / e.sigma_corrected:+.1f}" if e.sigma_corrected > 0.0 else "–"
     return (
         Cell(e.name, link=f"meaning-{e.name}"),
-        Cell(unit_words(e.unit)),
-        Cell(value_words(e.start), number=True),
+        unit_words(e.unit),
+        value_words(e.start),
         Cell(value_words(e.value, e.sigma_corrected), number=True, strong=True),
-        Cell(sigma_words(e.sigma), number=True),
-        Cell(sigma_words(e.sigma_corrected), number=True),
-        *([Cell(value_words(fit.truth[e.name]) if e.name in fit.truth else "–", number=True)] if fit.truth else []),
-        Cell(relative, number=True),
-        Cell(sigmas, number=True),
+        sigma_words(e.sigma),
+        sigma_words(e.sigma_corrected),
+        *([value_words(fit.truth[e.name]) if e.name in fit.truth else "–"] if fit.truth else []),
+        relative,
+        sigmas,
         Cell(f"{100.0 * e.prior_share:.0f} %", number=True, tone="caution" if e.prior_share > PRIOR_HEAVY else "plain"),
         Cell(*_remarks(fit, e)),
     )
@@ -221,24 +221,19 @@ def meanings(fit: Result[Any, Any], glossary: Mapping[str, str]) -> Section:
     rows = [
         (
             Cell(e.name, anchor=f"meaning-{e.name}"),
-            Cell(glossary.get(e.name, "") or "–"),
-            Cell(f"{published[e.name].source} ({published[e.name].status})"),
-            Cell(f"{_limit(published[e.name].lower)} to {_limit(published[e.name].upper)}"),
+            glossary.get(e.name, "") or "–",
+            f"{published[e.name].source} ({published[e.name].status})",
+            f"{_limit(published[e.name].lower)} to {_limit(published[e.name].upper)}",
         )
         for e in fit.estimates
         if e.name in published
     ]
     rows += [
-        (
-            Cell(name, anchor=f"meaning-{name}"),
-            Cell(glossary.get(name, "") or "–"),
-            Cell("estimated for each flight"),
-            Cell("–"),
-        )
+        (Cell(name, anchor=f"meaning-{name}"), glossary.get(name, "") or "–", "estimated for each flight", "–")
         for name in dict.fromkeys(e.name for e in fit.constants)
     ]
     columns = ("parameter", "meaning [symbol of the paper]", "source of the published value", "physics allows")
-    table = Table("Meaning and source of each parameter", columns, tuple(rows))
+    table = tabulate("Meaning and source of each parameter", columns, rows)
     return Section("meanings", "What does each number mean, and where does it come from?", (table,), folded=True)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from swashplate.identification.core.parameters import FROM_CARD
 from swashplate.identification.core.result import APART, Estimate, Result
-from swashplate.reporting.structure import Block, Cell, Section, Table, Text
+from swashplate.reporting.structure import Block, Cell, Row, Section, Text, tabulate
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.words import listed, percent, sigma_words, value_words
 
@@ -31,7 +31,7 @@ def prior(fit: Result[Any, Any]) -> Section | None:
     blocks: list[Block] = [Text(verdict, tone="bad" if apart else "good" if comparable else "plain")]
     if estimates:
         blocks.append(
-            Table(
+            tabulate(
                 "What the prior said, what the flight says alone, and both together",
                 (
                     "parameter",
@@ -55,33 +55,33 @@ def prior(fit: Result[Any, Any]) -> Section | None:
         card = fit.model.card.parameters
         rows = tuple(
             (
-                Cell(name),
-                Cell(unit_words(card[name].unit)),
-                Cell(value_words(fit.start.card.parameters[name].value), number=True),
-                Cell(value_words(card[name].value, card[name].sigma), number=True),
-                Cell(sigma_words(card[name].sigma), number=True),
-                Cell(card[name].source),
+                name,
+                unit_words(card[name].unit),
+                value_words(fit.start.card.parameters[name].value),
+                value_words(card[name].value, card[name].sigma),
+                sigma_words(card[name].sigma),
+                card[name].source,
             )
             for name in held
         )
         blocks.append(
-            Table("Held at the prior card", ("parameter", "unit", "published", "held at", "±σ", "from"), rows)
+            tabulate("Held at the prior card", ("parameter", "unit", "published", "held at", "±σ", "from"), rows)
         )
     return Section("prior", "Do prior and flight agree?", tuple(blocks), folded=True)
 
 
-def _row(e: Estimate) -> tuple[Cell, ...]:
+def _row(e: Estimate) -> Row:
     apart = math.isfinite(e.disagreement) and abs(e.disagreement) > APART
     return (
         Cell(e.name, link=f"meaning-{e.name}"),
-        Cell(unit_words(e.unit)),
-        Cell(value_words(e.prior_mean, e.prior_sigma), number=True),
-        Cell(sigma_words(e.prior_sigma), number=True),
-        Cell(value_words(e.alone, e.prior_sigma), number=True),
+        unit_words(e.unit),
+        value_words(e.prior_mean, e.prior_sigma),
+        sigma_words(e.prior_sigma),
+        value_words(e.alone, e.prior_sigma),
         Cell(value_words(e.value, e.sigma_corrected), number=True, strong=True),
-        Cell(sigma_words(e.sigma_corrected), number=True),
-        Cell(f"{percent(100.0 * e.prior_share)} %", number=True),
+        sigma_words(e.sigma_corrected),
+        f"{percent(100.0 * e.prior_share)} %",
         Cell(f"{e.disagreement:+.1f}" if math.isfinite(e.disagreement) else "–", number=True,
              tone="bad" if apart else "plain"),
-        Cell(e.prior_source.removeprefix(FROM_CARD)),
+        e.prior_source.removeprefix(FROM_CARD)
     )  # fmt: skip

@@ -21,14 +21,13 @@ from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
 from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit
 from swashplate.identification.frequency.transfer_function_forms import TriedStructure
-from swashplate.identification.frequency.unnoticeable_dynamics import mismatch
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.time.record_fit import TimeDetails
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.reporting.figures.bode_matrix import of_fit, of_responses
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
-from swashplate.reporting.figures_responses import excitation, mismatch_figure, rate_steps_figure
-from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
+from swashplate.reporting.figures_responses import excitation, rate_steps_figure
+from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text, tabulate
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
 from swashplate.reporting.words import value_words
@@ -87,16 +86,16 @@ def parameter_table(parameters: Sequence[Estimate]) -> Table:
         remark = f"= {p.tie}" if p.tie else "held" if p.fixed else "at its bound" if p.at_bound else ""
         rows.append(
             (
-                Cell(p.name),
-                Cell(unit_words(p.unit)),
-                Cell(value_words(p.start), number=True),
+                p.name,
+                unit_words(p.unit),
+                value_words(p.start),
                 Cell(value_words(p.value, p.sigma if moving else None), number=True, strong=True),
-                _percent(p.sigma_percent, CR_TARGET) if moving else Cell("", number=True),
-                _percent(p.insensitivity_percent, I_TARGET) if moving else Cell("", number=True),
+                _percent(p.sigma_percent, CR_TARGET) if moving else "",
+                _percent(p.insensitivity_percent, I_TARGET) if moving else "",
                 Cell(remark, tone="bad" if p.at_bound else "plain"),
             )
         )
-    return Table(
+    return tabulate(
         "Parameters",
         ("parameter", "unit", "start", "identified", "σ", "insensitivity", "remarks"),
         tuple(rows),
@@ -117,18 +116,18 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
         blocks.append(Text("Structure reduction: nothing to take out, every parameter is within its targets."))
     if fit.details.reduction:
         blocks.append(
-            Table(
+            tabulate(
                 "Structure reduction",
                 ("parameter", "why", "J_ave before", "J_ave after", "verdict", "why not", "modes"),
                 tuple(
                     (
-                        Cell(s.dropped),
-                        Cell(s.reason),
-                        Cell(f"{s.before:.1f}", number=True),
-                        Cell(f"{s.after:.1f}", number=True),
+                        s.dropped,
+                        s.reason,
+                        f"{s.before:.1f}",
+                        f"{s.after:.1f}",
                         Cell("dropped" if s.kept else "put back", tone="plain" if s.kept else "quiet"),
-                        Cell(s.veto or ("" if s.kept else "J_ave grows too much")),
-                        Cell(s.modes.removeprefix("modes: ")),
+                        s.veto or ("" if s.kept else "J_ave grows too much"),
+                        s.modes.removeprefix("modes: "),
                     )
                     for s in fit.details.reduction
                 ),
@@ -147,16 +146,16 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
 
 
 def _mode_table(modes: Sequence[ModeAccuracy]) -> Table:
-    return Table(
+    return tabulate(
         "Modes of the identified model",
         ("eigenvalue [1/s]", "frequency [rad/s]", "σ %", "damping", "σ", ""),
         tuple(
             (
-                Cell(f"{m.eigenvalue.real:.4g}" + (f" ± {m.eigenvalue.imag:.4g} j" if m.eigenvalue.imag else "")),
-                Cell(f"{m.frequency:.4g}", number=True),
+                f"{m.eigenvalue.real:.4g}" + (f" ± {m.eigenvalue.imag:.4g} j" if m.eigenvalue.imag else ""),
+                f"{m.frequency:.4g}",
                 _percent(m.frequency_percent, CR_TARGET),
-                Cell(f"{m.damping:.3f}", number=True),
-                Cell(f"{m.damping_bound:.3f}", number=True),
+                f"{m.damping:.3f}",
+                f"{m.damping_bound:.3f}",
                 Cell("" if m.inside else "below the band", tone="plain" if m.inside else "caution"),
             )
             for m in modes
@@ -169,9 +168,9 @@ def time_fit_section(fit: Result[StateSpaceModel, TimeDetails]) -> Section:
     """Parameters with their standard deviations, and the modes."""
     rows = tuple(
         (
-            Cell(p.name),
-            Cell(unit_words(p.unit)),
-            Cell(value_words(p.start), number=True),
+            p.name,
+            unit_words(p.unit),
+            value_words(p.start),
             Cell(value_words(p.value, p.best_sigma), number=True, strong=True),
             _percent(p.sigma_percent, CR_TARGET),
             Cell("at its bound" if p.at_bound else "", tone="bad" if p.at_bound else "plain"),
@@ -180,7 +179,7 @@ def time_fit_section(fit: Result[StateSpaceModel, TimeDetails]) -> Section:
     )
     blocks: list[Block] = [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
     blocks.append(
-        Table(
+        tabulate(
             "Parameters",
             ("parameter", "unit", "start", "identified", "standard deviation", "remarks"),
             rows,
@@ -201,13 +200,13 @@ def _modes(values: Complex) -> tuple[Mode, ...]:
 
 
 def _cost_table(targets: Sequence[Target], costs: Sequence[float]) -> Table:
-    return Table(
+    return tabulate(
         "Cost of each response",
         ("response", "band [Hz]", "J"),
         tuple(
             (
-                Cell(t.name),
-                Cell(f"{t.omega[0] / TWO_PI:.3g} to {t.omega[-1] / TWO_PI:.3g}", number=True),
+                t.name,
+                f"{t.omega[0] / TWO_PI:.3g} to {t.omega[-1] / TWO_PI:.3g}",
                 Cell(f"{cost:.1f}", number=True, tone=tone(cost)),
             )
             for t, cost in zip(targets, costs, strict=True)
@@ -217,11 +216,8 @@ def _cost_table(targets: Sequence[Target], costs: Sequence[float]) -> Table:
 
 
 def fit_costs_section(fit: StateSpaceFit) -> Section:
-    """J of each response, and the mismatch within what a pilot would not notice."""
-    pairs = [(fit.solution.outputs.index(t.output), fit.solution.inputs.index(t.input), t.omega) for t in fit.targets]
-    answers = [fit.solution.response(omega)[:, o, i] for o, i, omega in pairs]
-    misses = [mismatch(h, t) for h, t in zip(answers, fit.targets, strict=True)]
-    blocks: list[Block] = [_cost_table(fit.targets, fit.costs), of_fit(fit), mismatch_figure(misses)]
+    """J of each response, and the model beside it."""
+    blocks: list[Block] = [_cost_table(fit.targets, fit.costs), of_fit(fit)]
     if fit.details.left_out:
         blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.details.left_out)}."))
     return Section("costs", "How well does the model follow each response?", tuple(blocks), folded=True)
@@ -234,21 +230,18 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
         blocks += [Text(f"{model!r}") for model in fit.solution]
         blocks += [_cost_table(fit.targets, fit.costs), parameter_table(fit.estimates)]
         blocks += [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
-        misses = [mismatch(model.response(t.omega), t) for model, t in zip(fit.solution, fit.targets, strict=True)]
-        suffix = "" if k == 0 else f"-{k + 1}"
-        blocks += [
-            replace(one, identifier=f"{one.identifier}{suffix}") for one in (of_fit(fit), mismatch_figure(misses))
-        ]
+        figure = of_fit(fit)
+        blocks.append(replace(figure, identifier=f"{figure.identifier}{'' if k == 0 else f'-{k + 1}'}"))
     if m.trials:
         chosen = m.transfer_functions[0].details.form if m.transfer_functions else None
         blocks.append(
-            Table(
+            tabulate(
                 "Structures tried",
                 ("zeros / poles (+ integrators)", "parameters", "J", "why not"),
                 tuple(
                     (
                         Cell(t.form.text, tone="good" if t.form == chosen else "plain"),
-                        Cell(str(t.parameters), number=True),
+                        str(t.parameters),
                         Cell(f"{t.cost:.1f}", number=True, tone=tone(t.cost), strong=t.form == chosen),
                         Cell(t.unsound, tone="quiet"),
                     )
@@ -273,11 +266,11 @@ def bodes_section(m: ResponseMaterial) -> Section:
         level = np.nan if coherences.size == 0 else np.max(coherences) if band is None else np.median(coherences)
         rows.append(
             (
-                Cell(f"{output} / {name}"),
-                Cell("none", tone="caution") if band is None else Cell(f"{_hz(band[0])} to {_hz(band[1])} Hz"),
-                Cell(value_words(float(level)) if band is None else f"{level:.2f}", number=True),
-                Cell("–" if band is None else f"{20 * np.log10(1 + np.median(error[inside])):.2f}", number=True),
-                Cell(_zero_words(r, output, name)),
+                f"{output} / {name}",
+                Cell("none", tone="caution") if band is None else f"{_hz(band[0])} to {_hz(band[1])} Hz",
+                value_words(float(level)) if band is None else f"{level:.2f}",
+                "–" if band is None else f"{20 * np.log10(1 + np.median(error[inside])):.2f}",
+                _zero_words(r, output, name),
             )
         )
     shown = {(t.output, t.input) for fit in m.fits for t in fit.targets}
@@ -285,7 +278,7 @@ def bodes_section(m: ResponseMaterial) -> Section:
     blocks: list[Block] = [Text(text, tone="bad") for text in r.problems]
     blocks += [Points(r.warnings, title="What to beware of")] if r.warnings else []
     columns = ("response", "coherent band", "coherence", "error [dB]", "0 dB")
-    blocks.append(Table("Where the responses may be used", columns, tuple(rows)))
+    blocks.append(tabulate("Where the responses may be used", columns, rows))
     blocks += [of_responses(r, without=shown)] if left or not shown else []
     return Section("responses", "Where may the responses be used?", tuple(blocks), folded=True)
 
@@ -312,19 +305,15 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
     """Suggested rate-loop gains in the firmware's names beside the flown ones, and the margins of both."""
     rows = tuple(
         (
-            Cell(name),
+            name,
             Cell(gain_text(name, g.parameters[name]) if name in g.parameters else "–", number=True, strong=True),
-            Cell(gain_text(name, g.flown[name]) if name in g.flown else "not logged", number=True),
+            gain_text(name, g.flown[name]) if name in g.flown else "not logged",
         )
         for g in gains
         for name in g.parameters or g.flown
     )
     judged = tuple(
-        (
-            Cell(g.axis),
-            Cell(what),
-            *(Cell(text.replace("+-", "±"), number=True) for text in (suggested, logged)),
-        )
+        (g.axis, what, *(text.replace("+-", "±") for text in (suggested, logged)))
         for g in gains
         if np.isfinite(g.peak) or np.isfinite(g.flown_peak)
         for what, suggested, logged in g.table()
@@ -337,8 +326,8 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
         for w in said
     )
     tables = (
-        Table(f"Gains ({firmware})", ("parameter", "suggested", "flown"), rows),
-        Table(
+        tabulate(f"Gains ({firmware})", ("parameter", "suggested", "flown"), rows),
+        tabulate(
             "The rate loop on the identified model",
             ("axis", "", "suggested", "flown"),
             judged,
@@ -362,8 +351,8 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
 
 def made_section() -> Section:
     """Versions of what made the report."""
-    rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
-    return Section("versions", "How was this made?", (Table("Versions", ("package", "version"), rows),), folded=True)
+    rows = tuple((name, number) for name, number in versions().items())
+    return Section("versions", "How was this made?", (tabulate("Versions", ("package", "version"), rows),), folded=True)
 
 
 def handling_section(m: ResponseMaterial) -> Section | None:
@@ -377,16 +366,16 @@ def handling_section(m: ResponseMaterial) -> Section | None:
         cells = (read.bandwidth, read.omega_180, read.phase_delay_line) if isinstance(read, Handling) else ()
         rows.append(
             (
-                Cell(line.response),
-                Cell(line.source),
-                *(Cell(repr(c).replace("+-", "±"), number=True) for c in cells),
-                *(Cell("–", number=True) for _ in range(3 - len(cells))),
-                Cell(line.problem),
+                line.response,
+                line.source,
+                *(repr(c).replace("+-", "±") for c in cells),
+                *("–" for _ in range(3 - len(cells))),
+                line.problem,
             )
         )
     if not rows:
         return None
-    table = Table(
+    table = tabulate(
         "Attitude responses (rates over jω)",
         ("response", "from", "bandwidth [rad/s]", "ω180 [rad/s]", "phase delay [s]", "remark"),
         tuple(rows),

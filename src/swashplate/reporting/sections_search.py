@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from swashplate.identification.frequency.search_result import StructureSearch
-from swashplate.reporting.structure import Cell, Points, Section, Table
+from swashplate.reporting.structure import Cell, Points, Section, tabulate
 
 
 def search_section(search: StructureSearch) -> Section:
@@ -18,5 +18,5 @@ def search_section(search: StructureSearch) -> Section:
     )
     why = Points(tuple(text.strip() for text in search.reasons), title="Why this one")
     return Section(
-        "structures", "Which structures were tried?", (why, Table("Structures", tuple(head), cells)), folded=True
+        "structures", "Which structures were tried?", (why, tabulate("Structures", head, cells)), folded=True
     )

@@ -9,7 +9,7 @@ from typing import Any
 from swashplate.identification.core.result import Result
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.reporting.figures_fit import correlation_matrix, eigenvalues
-from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
+from swashplate.reporting.structure import Block, Cell, Points, Row, Section, Table, Text, tabulate
 from swashplate.reporting.words import value_words
 from swashplate.simulation.modes import Mode
 
@@ -40,22 +40,22 @@ def _excitation(axes: Sequence[AxisExcitation]) -> Table:
     columns = ("axis", "verdict", "finding", "command", "explained", "coherence", "phase", "power")
     rows = tuple(
         (
-            Cell(a.axis),
+            a.axis,
             Cell(
                 "independent excitation" if a.identifiable else "not identifiable",
                 tone="good" if a.identifiable else "bad",
             ),
-            Cell(a.words),
-            Cell(a.command),
-            Cell(_share(a.explained), number=True),
-            Cell(value_words(round(a.coherence, 2)), number=True),
-            Cell(f"{math.degrees(a.phase):.0f}°" if math.isfinite(a.phase) else "–", number=True),
-            Cell(value_words(float(f"{a.power:.2g}")), number=True),
-            *((Cell(a.record),) if len(records) > 1 else ()),
+            a.words,
+            a.command,
+            _share(a.explained),
+            value_words(round(a.coherence, 2)),
+            f"{math.degrees(a.phase):.0f}°" if math.isfinite(a.phase) else "–",
+            value_words(float(f"{a.power:.2g}")),
+            *((a.record,) if len(records) > 1 else ()),
         )
         for a in axes
     )
-    return Table(
+    return tabulate(
         "Excitation and feedback per axis",
         (*columns, "record") if len(records) > 1 else columns,
         rows,
@@ -80,7 +80,7 @@ def hover(modes: Mapping[str, Sequence[Mode]], problems: Sequence[str] = ()) -> 
     if modes:
         blocks.append(eigenvalues(modes))
         blocks.append(
-            Table(
+            tabulate(
                 "Modes at hover",
                 (
                     "mode",
@@ -105,17 +105,17 @@ def hover(modes: Mapping[str, Sequence[Mode]], problems: Sequence[str] = ()) -> 
     return Section("hover", "Which motions of its own has it at hover?", tuple(blocks), folded=True) if blocks else None
 
 
-def _row(mode: Mode, label: str, place: int) -> tuple[Cell, ...]:
+def _row(mode: Mode, label: str, place: int) -> Row:
     value = mode.eigenvalue
     text = f"{value.real:+.3f}" + (f" ± {value.imag:.3f}j" if value.imag > 0.0 else "")
     grows = value.real > _SLOW
     return (
-        Cell(f"{place}. {', '.join(name for name, share in mode.states if share > 0.1) or mode.states[0][0]}"),
-        Cell(label),
-        Cell(text, number=True),
-        Cell(f"{mode.frequency:.2f}", number=True),
-        Cell(f"{mode.frequency / (2.0 * math.pi):.2f}", number=True),
-        Cell(f"{mode.damping:+.3f}", number=True),
-        Cell(f"{mode.time_constant:.3g}" if math.isfinite(mode.time_constant) else "–", number=True),
+        f"{place}. {', '.join(name for name, share in mode.states if share > 0.1) or mode.states[0][0]}",
+        label,
+        text,
+        f"{mode.frequency:.2f}",
+        f"{mode.frequency / (2.0 * math.pi):.2f}",
+        f"{mode.damping:+.3f}",
+        f"{mode.time_constant:.3g}" if math.isfinite(mode.time_constant) else "–",
         Cell("grows" if grows else "dies out", tone="bad" if grows else "plain"),
     )

@@ -16,7 +16,7 @@ from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.reporting.figures_time import Prediction, Series, flight_name, time_figures
 from swashplate.reporting.figures_validation import JUDGED, fit_over_horizon, horizons
 from swashplate.reporting.glossary import meaning
-from swashplate.reporting.structure import Block, Cell, Section, Table, Text
+from swashplate.reporting.structure import Block, Cell, Row, Section, Table, Text, tabulate
 from swashplate.reporting.theme import PREDICTOR_WORDS, unit_words
 from swashplate.reporting.words import percent, sigma_words, value_words
 from swashplate.validation.bands import NEAR, pairs
@@ -33,12 +33,12 @@ _HONEST = (0.5, 2.0)
 
 def verdict(validation: Validation) -> Section:
     """Why each axis has its verdict, with the thresholds behind the words."""
-    rows = tuple((*_axis_cells(v), Cell(v.words)) for v in validation.verdict)
+    rows = tuple((*_axis_cells(v), v.words) for v in validation.verdict)
     limits = ", ".join(
         f"{k.replace('_', ' ')} from {value_words(float(v))} %" for k, v in validation.thresholds.items()
     )
     note = f"Every channel of an axis must reach the fit and beat every rival: {limits}. " if limits else ""
-    table = Table("Verdict per axis", ("axis", "verdict", "why"), rows, note=f"{note}{_FIT}")
+    table = tabulate("Verdict per axis", ("axis", "verdict", "why"), rows, note=f"{note}{_FIT}")
     return Section("verdict", "Why this verdict?", (table,), folded=True)
 
 
@@ -46,12 +46,12 @@ def verdict_in_short(validation: Validation) -> Table | None:
     """One line per axis for the first screen: verdict, fits, and the best rival's."""
     if not validation.verdict:
         return None
-    rows = tuple((*_axis_cells(v), Cell(_numbers(v.words))) for v in validation.verdict)
-    return Table("Verdict per axis", ("axis", "verdict", "fit (best rival)"), rows)
+    rows = tuple((*_axis_cells(v), _numbers(v.words)) for v in validation.verdict)
+    return tabulate("Verdict per axis", ("axis", "verdict", "fit (best rival)"), rows)
 
 
-def _axis_cells(judged: AxisVerdict) -> tuple[Cell, Cell]:
-    return Cell(judged.axis), Cell(judged.level, tone=LEVEL_TONE.get(judged.level, "quiet"), strong=True)
+def _axis_cells(judged: AxisVerdict) -> Row:
+    return judged.axis, Cell(judged.level, tone=LEVEL_TONE.get(judged.level, "quiet"), strong=True)
 
 
 def _numbers(verdict_text: str) -> str:
@@ -126,12 +126,12 @@ def _bands(validation: Validation) -> Table | None:
     if not halves:
         return None
     drawn = bool(validation.settings.get("draws"))
-    return Table(
+    return tabulate(
         "Do the bands hold what they promise?",
         ("channel", "ahead [s]", *(heading for heading, _ in BAND_ROWS)),
         tuple(
             (
-                Cell(half.channel),
+                half.channel,
                 _cell(f"{half.horizon:g}", False),
                 *(_band_cell(heading, cell(half, most[half.channel, half.horizon])) for heading, cell in BAND_ROWS),
             )
@@ -157,14 +157,14 @@ def _calibrated_constants(validation: Validation) -> tuple[Block, ...]:
         return ()
     seconds = float(validation.settings["calibration"])
     return (
-        Table(
+        tabulate(
             "What belongs to the predicted flights and not to the vehicle",
             ("quantity", "meaning", "unit", *(record.name for record in validation.records)),
             tuple(
                 (
-                    Cell(name),
-                    Cell(meaning(name)),
-                    Cell(unit_words(record_unit(name))),
+                    name,
+                    meaning(name),
+                    unit_words(record_unit(name)),
                     *(_cell(f"{float(getattr(one, name)):.3f}", False) for one in calibrated),
                 )
                 for name in names
@@ -226,10 +226,10 @@ def _fits(validation: Validation) -> Table | None:
 
     starts = {s.horizon: s.starts for s in validation.scores}
     counts = ", ".join(f"{starts[h]} at {h:g} s" for h in there)
-    return Table(
+    return tabulate(
         "Fit [%] of every predictor",
         ("channel", *(f"{h:g} s" for _ in shown for h in there)),
-        tuple((Cell(name), *(cell(name, p, h) for p in shown for h in there)) for name in names),
+        tuple((name, *(cell(name, p, h) for p in shown for h in there)) for name in names),
         groups=(("", 1), *((PREDICTOR_WORDS[p], len(there)) for p in shown)),
         note=f"{_FIT} Bold: the best at that horizon. Start points: {counts}. Errors in units and Theil's coefficient "
         "are in validation.json.",
@@ -243,10 +243,10 @@ def _without_contact(validation: Validation) -> Table | None:
         all_starts = validation.score(without.channel, without.horizon)
         cells = [_cell(text, False) for text in (f"{without.horizon:g}", percent(all_starts.fit), percent(without.fit))]
         counts = [_cell(str(count), False) for count in (all_starts.starts, without.starts)]
-        rows.append((Cell(without.channel), *cells, *counts))
+        rows.append((without.channel, *cells, *counts))
     if not rows:
         return None
-    return Table(
+    return tabulate(
         "With and without the suspected contact",
         ("channel", "ahead [s]", "fit [%]", "without [%]", "starts", "starts without"),
         tuple(rows),
@@ -260,11 +260,11 @@ def _loop_closed(validation: Validation) -> Table | None:
     if not rows:
         return None
     closed = " and ".join(dict.fromkeys(law.axis for law in validation.laws))
-    return Table(
+    return tabulate(
         f"With the {closed} controller in the place of its recorded command",
         ("channel", "ahead [s]", *(f"{text} [%]" for text, _ in CLOSED_ROWS)),
         tuple(
-            (Cell(f.channel), *(_cell(text, False) for text in (f"{f.horizon:g}", *(c(f) for _, c in CLOSED_ROWS))))
+            (f.channel, *(_cell(text, False) for text in (f"{f.horizon:g}", *(c(f) for _, c in CLOSED_ROWS))))
             for f in rows
         ),
         note="Recorded commands answer gusts that no prediction knows. Gain: points that closing the loop adds; "
@@ -289,9 +289,9 @@ def _beside(validation: Validation) -> Table | None:
         )
         rows.append(
             (
-                Cell(f.channel),
+                f.channel,
                 *(_cell(text, False) for text in texts),
-                Cell(unit_words(unit.shown_unit)),
+                unit_words(unit.shown_unit),
                 _cell(percent(f.expected), False),
                 _cell(percent(f.past), False),
                 Cell(
@@ -303,7 +303,7 @@ def _beside(validation: Validation) -> Table | None:
         )
     if not rows:
         return None
-    return Table(
+    return tabulate(
         "Is the model poor, or the flight? What the judged fits stand beside",
         (
             "channel",
@@ -339,26 +339,24 @@ def innovations(validation: Validation) -> Section:
         white = check.whiteness <= check.whiteness_bound
         rows.append(
             (
-                Cell(check.channel),
-                Cell(unit_words(unit.shown_unit)),
-                Cell(sigma_words(check.rms * unit.shown_factor), number=True),
-                Cell(sigma_words(check.expected * unit.shown_factor), number=True),
+                check.channel,
+                unit_words(unit.shown_unit),
+                sigma_words(check.rms * unit.shown_factor),
+                sigma_words(check.expected * unit.shown_factor),
                 Cell(f"{check.consistency:.2f}", number=True, tone="plain" if honest else "caution"),
-                Cell(
-                    "as promised"
-                    if honest
-                    else ("larger than promised" if check.consistency > 1 else "smaller than promised")
-                ),
+                "as promised"
+                if honest
+                else ("larger than promised" if check.consistency > 1 else "smaller than promised"),
                 Cell(
                     f"{check.whiteness:.2f} (bound {check.whiteness_bound:.2f})",
                     number=True,
                     tone="plain" if white else "caution",
                 ),
-                Cell("white" if white else "coloured"),
+                "white" if white else "coloured",
             )
         )
     blocks: list[Block] = [
-        Table(
+        tabulate(
             "One-step prediction errors",
             ("channel", "unit", "RMS", "promised σ", "consistency", "size", "largest autocorrelation", "colour"),
             tuple(rows),
@@ -368,10 +366,10 @@ def innovations(validation: Validation) -> Section:
     ]
     if validation.log_likelihood:
         blocks.append(
-            Table(
+            tabulate(
                 "Log-likelihood per sample",
                 ("predictor", "log-likelihood"),
-                tuple((Cell(k), Cell(f"{v:.3f}", number=True)) for k, v in validation.log_likelihood.items()),
+                tuple((k, f"{v:.3f}") for k, v in validation.log_likelihood.items()),
                 note="Larger is better; a difference of 1 per sample is large.",
             )
         )

@@ -6,7 +6,7 @@ import numpy as np
 
 from swashplate.flights.schema import channel
 from swashplate.reporting.figures_responses import verification_figure
-from swashplate.reporting.structure import Block, Cell, Section, Table, Text
+from swashplate.reporting.structure import Block, Cell, Section, Text, tabulate
 from swashplate.reporting.theme import shown, unit_words
 from swashplate.reporting.words import value_words
 from swashplate.validation.refutation import REFUTED
@@ -19,11 +19,11 @@ _TRACES = 4
 def verification_section(v: Verification, rival: Verification | None = None) -> Section:
     rows = tuple(
         (
-            Cell(o.output),
-            Cell(unit_words(channel(o.output).shown_unit or o.unit)),
-            Cell(value_words(float(shown(o.output, np.array(o.rms)))), number=True),
+            o.output,
+            unit_words(channel(o.output).shown_unit or o.unit),
+            value_words(float(shown(o.output, np.array(o.rms)))),
             Cell(f"{o.theil:.2f}", number=True, tone="good" if o.theil <= GOOD_TIC else "caution"),
-            Cell(f"{o.fit:.0f}", number=True),
+            f"{o.fit:.0f}",
         )
         for o in v.outputs
     )
@@ -40,7 +40,7 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
             )
         )
     blocks.append(
-        Table(
+        tabulate(
             "Along records of the fit"
             if any("NOT A HOLD-OUT" in text for text in v.warnings)
             else "Along unseen records",
@@ -52,13 +52,10 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
     )
     blocks += [Text(f"{f.channel}: fit {f.fit:.0f} %, {f.scatter}{f.summary_text}", tone="quiet") for f in v.floors]
     if rival is not None:
-        theirs = tuple(
-            (Cell(o.output), Cell(f"{o.theil:.2f}", number=True), Cell(f"{o.fit:.0f}", number=True))
-            for o in rival.outputs
-        )
+        theirs = tuple((o.output, f"{o.theil:.2f}", f"{o.fit:.0f}") for o in rival.outputs)
         rival_summary = f"{rival.model.name}: {rival.verdict}; J_rms = {rival.cost:.2f}, {rival.constants} constants."
         blocks.append(Text(rival_summary))
-        blocks.append(Table(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
+        blocks.append(tabulate(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
         if not {t.source for t in rival.traces} & {t.source for t in v.traces}:
             blocks.append(Text(f"{rival.model.name} is not drawn: it was flown in other stretches.", tone="quiet"))
     outputs = tuple(o.output for o in v.outputs)

@@ -17,13 +17,13 @@ from swashplate.reporting.theme import (
     PURPLE,
     VERMILION,
     axis,
+    axis_number,
     base_layout,
     grid,
     line,
     numbers,
     unit_words,
 )
-from swashplate.reporting.versions import date, versions
 from swashplate.simulation.derivatives_over_speed import Derivatives
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.modes import Mode
@@ -84,7 +84,6 @@ def compose_speeds(over_speed: TrimCurve | Derivatives, *, title: str | None = N
         summary=(("Where to trust it", vehicle.card.trust or "the card does not say", "plain"),),
         picture=None,
         sections=tuple(sections),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -96,7 +95,7 @@ def controls(curve: TrimCurve) -> Figure:
     layout = grid(list(columns), columns=3, height=170, x_title="speed [m/s]")
     traces = []
     for i, (title, values) in enumerate(columns.items()):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         hover = f"{title}<br>%{{x:.1f}} m/s, %{{y:.3f}}"
         middle = 0.5 * (min(values) + max(values))
         least = max(_STILL * abs(middle), _NOTHING)
@@ -106,7 +105,6 @@ def controls(curve: TrimCurve) -> Figure:
     return Figure(
         "trim-curves",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         f"Controls, attitude and power that hold each speed.{_PITCHES if flapping else ''}",
         f"Trim curves of {', '.join(columns)} from {speeds[0]:g} to {speeds[-1]:g} m/s.",
     )
@@ -152,9 +150,7 @@ def _locus(modes: Sequence[tuple[float, Mode]], identifier: str, caption: str, o
         },
         "hovertemplate": "%{x:.3f} %{y:+.3f}j at %{marker.color:.1f} m/s<br>%{text}<extra></extra>",
     }
-    return Figure(
-        identifier, {"data": [trace], "layout": layout}, 420, caption, f"Root locus {over} in the complex plane."
-    )
+    return Figure(identifier, {"data": [trace], "layout": layout}, caption, f"Root locus {over} in the complex plane.")
 
 
 def _mode_words(mode: Mode) -> str:
@@ -180,7 +176,7 @@ def by_contributor(derivatives: Derivatives, row: str) -> Figure:
     for i, name in enumerate(names):
         place = split_name(name)
         factor = derivatives.factor(name)
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         total = [factor * table[name] for table in tables]
         hover = f"{name}<br>%{{x:.1f}} m/s, %{{y:.4g}}"
         traces.append(
@@ -201,7 +197,6 @@ def by_contributor(derivatives: Derivatives, row: str) -> Figure:
     return Figure(
         f"derivatives-{row}",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         f"{row}: {_ROW_WORDS[row]} per {per}, by motion and control, and what contributes to it.",
         f"Derivatives of {row} over speed, split by contributor.",
         keys=keys,

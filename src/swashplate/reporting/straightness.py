@@ -11,9 +11,20 @@ import numpy as np
 from swashplate.control.analysis.straightness import StepRun
 from swashplate.flights.schema import channel
 from swashplate.models.vehicle import Vehicle
-from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
-from swashplate.reporting.theme import CONSTANT, GREY, MODEL, PUBLISHED, axis, axis_title, base_layout, line, stacked
-from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.reporting.structure import Block, Figure, Key, Points, Report, Row, Section, Text, tabulate
+from swashplate.reporting.theme import (
+    CONSTANT,
+    GREY,
+    MODEL,
+    PUBLISHED,
+    axis,
+    axis_number,
+    axis_title,
+    base_layout,
+    line,
+    stacked,
+)
+from swashplate.reporting.versions import card_hash, versions
 
 _STYLES = {"without": (PUBLISHED, "dash"), "by the paper": (CONSTANT, "dot"), "with": (MODEL, "solid")}
 _FAINT = {"without": "rgba(213,94,0,0.22)", "by the paper": "rgba(0,0,0,0.12)", "with": "rgba(0,114,178,0.22)"}
@@ -64,7 +75,7 @@ def compose_straightness(
          f"{100 * lost[0]:.2g} and {100 * lost[1]:.2g} cm.", "plain"),
         ("Inputs", f"largest servo command with the law {used:.2f} of 1.", "caution" if used >= 0.999 else "good"),
         ("Models", *_models(runs, many)),
-        *(("Against", *_against(name, *counts)) for name, counts in (nearer_than or {}).items()),
+        *(("Against", *_against(name, *counts)) for name, counts in (nearer_than or {}).items())
     ]  # fmt: skip
     return Report(
         title=title or f"{vehicle.name}: the path on a step of the pitch command",
@@ -72,7 +83,6 @@ def compose_straightness(
         summary=tuple(summary),
         picture=_path_figure(runs, many),
         sections=(_numbers(runs, lag), _time(runs), _provenance(vehicle)),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -125,7 +135,6 @@ def _path_figure(runs: Mapping[str, StepRun], many: str) -> Figure:
     return Figure(
         identifier="key-picture",
         spec={"data": traces, "layout": layout},
-        height=380,
         caption="Seen from above, from hover at 0 m until the distance is covered; right is down (as in Fig. 10).",
         alt="Path of the step with and without the decoupling.",
         keys=tuple(keys),
@@ -147,7 +156,7 @@ def _numbers(runs: Mapping[str, StepRun], lag: float) -> Section:
                 rows.append(_row(name, f"{percent:g} % of {arrived} that arrived", values))
     columns = ("decoupling", "models", "drift [m]", "leftmost [m]", "rightmost [m]", "fastest [m/s]", "time [s]")
     blocks: list[Block] = [
-        Table("The path", columns, tuple(rows), note="Offsets to the right of the first heading."),
+        tabulate("The path", columns, rows, note="Offsets to the right of the first heading."),
         Text(
             f"The law turns the commands back by a lag of {lag:.1f}° at hover and cancels what speed does to the lower "
             "rotor's disc. The stabilizer bar and the delays are not in its equations. With the rotor's own lag "
@@ -157,9 +166,9 @@ def _numbers(runs: Mapping[str, StepRun], lag: float) -> Section:
     return Section("path", "The path in numbers", tuple(blocks))
 
 
-def _row(name: str, models: str, values: list[float]) -> tuple[Cell, ...]:
+def _row(name: str, models: str, values: list[float]) -> Row:
     shown = [f"{v:+.2f}" if math.isfinite(v) else "–" for v in values[:3]] + [f"{v:.2f}" for v in values[3:]]
-    return (Cell(name), Cell(models), *(Cell(text, number=True) for text in shown))
+    return (name, models, *shown)
 
 
 def _time(runs: Mapping[str, StepRun]) -> Section:
@@ -170,13 +179,12 @@ def _time(runs: Mapping[str, StepRun]) -> Section:
         color, dash = _STYLES[kind]
         keys.append(Key(_WORDS[kind], color, dash))
         for i, name in enumerate(present):
-            number = "" if i == 0 else str(i + 1)
+            number = axis_number(i)
             values = run.flight.values(name) * (100.0 if name == "z" else channel(name).shown_factor)
             traces.append(line(run.flight.time(name), values, name=name, color=color, dash=dash, axis=number))
     figure = Figure(
         identifier="step-time",
         spec={"data": traces, "layout": layout},
-        height=int(layout["height"]),
         caption="Speeds, heading, height (down positive), lean and inputs; all panels zoom in time together.",
         alt=f"{', '.join(present)} against time, with and without the decoupling.",
         keys=tuple(keys),

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
+
+from swashplate.extras import version_of
+from swashplate.reporting.versions import date
 
 Spec = Mapping[str, Any]
 """A plotly figure as JSON types: `data` and `layout`."""
@@ -75,6 +79,25 @@ class Table:
             raise ValueError(f"table '{self.caption}' has rows of different lengths: {sorted(widths)}")
 
 
+Row = tuple[Cell | str, ...]
+_NUMBER = re.compile(r"[<>±+\-−–~ ]*(\d[\d.,]*(e[+-]?\d+)?(?![A-Za-z0-9_])|∞|$)")
+
+
+def tabulate(
+    caption: str,
+    columns: Iterable[str],
+    rows: Iterable[Iterable[Cell | str]],
+    *,
+    groups: tuple[tuple[str, int], ...] = (),
+    note: str = "",
+) -> Table:
+    """A table from its rows; a text that begins as a number does, or "–" for a missing one, stands at the right."""
+    cells = tuple(
+        tuple(Cell(c, bool(c and _NUMBER.match(c))) if isinstance(c, str) else c for c in row) for row in rows
+    )
+    return Table(caption, tuple(columns), cells, groups, note)
+
+
 @dataclass(frozen=True)
 class Key:
     """One entry of a figure's key: `style` is "solid", "dash", "dot", "band", "bar" or a marker's name."""
@@ -91,7 +114,6 @@ class Figure:
     Attributes:
         identifier: unique on the page.
         spec: what plotly draws.
-        height: pixels.
         caption: what to look at.
         alt: what is seen, for those who do not see it.
         keys: what the lines mean.
@@ -101,11 +123,15 @@ class Figure:
     kind: ClassVar[str] = "figure"
     identifier: str
     spec: Spec
-    height: int
     caption: str
     alt: str
     keys: tuple[Key, ...] = ()
     min_width: int = 0
+
+    @property
+    def height(self) -> int:
+        """Pixels."""
+        return int(self.spec["layout"]["height"])
 
 
 Block = Text | Points | Table | Figure
@@ -130,8 +156,8 @@ class Report:
         banners: what must be seen before anything else, as (tone, words), most important first.
         summary: five lines, as (label, words, tone).
         picture: the one figure of the summary.
-        verdict: a line for each axis, beside the picture; None for none.
         sections: everything else.
+        verdict: a line for each axis, beside the picture; None for none.
         made: when and by what, one line.
     """
 
@@ -140,8 +166,8 @@ class Report:
     summary: tuple[tuple[str, str, str], ...]
     picture: Figure | None
     sections: tuple[Section, ...]
-    made: str
     verdict: Table | None = None
+    made: str = field(default_factory=lambda: f"swashplate {version_of('swashplate')}, {date()}")
 
     @property
     def figures(self) -> tuple[Figure, ...]:

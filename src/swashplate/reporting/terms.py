@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from swashplate.reporting.structure import Cell, Figure, Section, Table, Text
+from swashplate.reporting.structure import Figure, Section, Table, Text, tabulate
 
 TERMS: dict[str, str] = {
     "at its bound": "a parameter ended at a limit that physics sets; the equations lack something that it stands for",
@@ -89,8 +89,8 @@ def with_terms(sections: Sequence[Section], lines: Sequence[tuple[str, str, str]
                 texts.append(block.caption)
             else:
                 texts += [block.words] if isinstance(block, Text) else block.items
-    rows = tuple((Cell(term), Cell(text)) for term, text in terms_in(texts).items())
-    table = Table("Words of this page", ("word", "meaning"), rows)
+    rows = tuple((term, text) for term, text in terms_in(texts).items())
+    table = tabulate("Words of this page", ("word", "meaning"), rows)
     return (*sections, Section("words", "What do the words mean?", (table,), folded=True)) if rows else tuple(sections)
 
 

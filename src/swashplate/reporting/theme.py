@@ -119,6 +119,31 @@ def line(
     return {**trace, **more}
 
 
+def shade(x: Any, y: Any, *, name: str, color: str, axis: str = "") -> dict[str, Any]:
+    """A closed shape, filled, that answers no pointer."""
+    edge = line(x, y, name=name, color=color, width=0, axis=axis)
+    return {**edge, "fill": "toself", "fillcolor": color, "hoverinfo": "skip", "hovertemplate": None}
+
+
+def dots(x: Any, y: Any, marker: Any, **more: Any) -> dict[str, Any]:
+    """Markers instead of a line; `more` as of `line`."""
+    return {**line(x, y, **{"color": marker.get("color", BLACK), **more}), "mode": "markers", "marker": marker}
+
+
+def axis_number(i: int) -> str:
+    """What the axes of panel i, from 0, end in."""
+    return "" if i == 0 else str(i + 1)
+
+
+def style(i: int) -> tuple[str, str]:
+    """Colour and line style number i."""
+    return _COLORS[i % len(_COLORS)], _DASHES[i % len(_DASHES)]
+
+
+_COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
+_DASHES = ("solid", "dash", "dot", "dashdot")
+
+
 def base_layout(height: int, *, left: int = 58, top: int = 8, right: int = 10, bottom: int = 40) -> dict[str, Any]:
     """What every figure has: margins that leave a telephone some plot, no legend (keys stand in the page)."""
     return {
@@ -174,7 +199,7 @@ def stacked(titles: Sequence[str], *, height: int, x_title: str = "time [s]") ->
     """A layout of panels one below the other that zoom in time together."""
     layout = base_layout(height * len(titles) + 48)
     for i, (title, domain) in enumerate(zip(titles, bands(len(titles), gap=0.1 / len(titles)), strict=True)):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         last = i == len(titles) - 1
         layout[f"yaxis{number}"] = axis(title, domain=list(domain), anchor=f"x{number}", nticks=5)
         layout[f"xaxis{number}"] = axis(
@@ -210,7 +235,7 @@ def grid(
         "meta": {"grid": {"panels": len(titles), "columns": columns, "height": height, "gap": gap}},
     }
     for i, title in enumerate(titles):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         row, column = divmod(i, columns)
         left = column * (width + gap)
         lowest = i + columns >= len(titles)

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from swashplate.identification.recursive.tracked import Tracked
-from swashplate.reporting.structure import Cell, Figure, Key, Points, Report, Section, Table, Text
-from swashplate.reporting.theme import BAND, MODEL, VERMILION, line, numbers, quantity, stacked
-from swashplate.reporting.versions import date, versions
+from swashplate.reporting.structure import Figure, Key, Points, Report, Section, Table, Text, tabulate
+from swashplate.reporting.theme import BAND, MODEL, VERMILION, axis_number, line, quantity, shade, stacked
 
 _MOST = 12
 """Stretches that are listed one by one."""
@@ -35,7 +34,6 @@ def compose_tracking(
         picture=None,
         sections=tuple(Section(f"equation-{k}", one.text, _blocks(one, k, source)) for k, one in enumerate(tracks))
         + ((Section("notes", "Notes", (Points(tuple(notes)),)),) if notes else ()),
-        made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
@@ -49,10 +47,10 @@ def _blocks(one: Tracked, k: int, source: str) -> tuple[Text | Points | Table | 
     final = one.final
     rows = tuple(
         (
-            Cell(name),
-            Cell("-" if final is None else f"{final.values[i]:.5g}", True),
-            Cell("-" if final is None else f"{final.sigmas[i]:.2g}", True),
-            Cell(one.units[i] or "unknown"),
+            name,
+            "-" if final is None else f"{final.values[i]:.5g}",
+            "-" if final is None else f"{final.sigmas[i]:.2g}",
+            one.units[i] or "unknown",
         )
         for i, name in enumerate(one.names)
     )
@@ -61,7 +59,7 @@ def _blocks(one: Tracked, k: int, source: str) -> tuple[Text | Points | Table | 
     blocks: list[Text | Points | Table | Figure] = [
         *(Text(remark, tone="caution") for remark in one.notes),
         _figure(one, k, source),
-        Table(caption, ("unknown", "value", "standard error", "unit"), rows, note=note),
+        tabulate(caption, ("unknown", "value", "standard error", "unit"), rows, note=note),
     ]
     if one.frozen:
         items = [f"{s.start:.2f} to {s.stop:.2f} s: {s.why}" for s in one.frozen[:_MOST]]
@@ -75,24 +73,12 @@ def _figure(one: Tracked, k: int, source: str) -> Figure:
     layout["margin"] = {**layout["margin"], "l": 78}  # converged estimates have long numbers at their axes
     traces = []
     for i, name in enumerate(one.names):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         value, sigma = one.values[:, i], one.sigmas[:, i]
         known = np.isfinite(value)
         ends = (value + 2.0 * sigma)[known], (value - 2.0 * sigma)[known]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": numbers(np.concatenate([one.time[known], one.time[known][::-1]])),
-                "y": numbers(np.concatenate([ends[0], ends[1][::-1]])),
-                "fill": "toself",
-                "fillcolor": BAND,
-                "line": {"width": 0},
-                "hoverinfo": "skip",
-                "xaxis": f"x{number}",
-                "yaxis": f"y{number}",
-            }
-        )
+        around = np.concatenate([one.time[known], one.time[known][::-1]])
+        traces.append(shade(around, np.concatenate([ends[0], ends[1][::-1]]), name="", color=BAND, axis=number))
         traces.append(line(one.time, value, name=name, color=MODEL, axis=number))
         settled = known & (one.time > one.time[0] + 0.25 * np.ptp(one.time))
         if np.any(settled):  # the first seconds' bounds would hide all the rest
@@ -118,7 +104,6 @@ def _figure(one: Tracked, k: int, source: str) -> Figure:
     return Figure(
         f"track-{k}",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         f"Estimates of '{one.text}' over time, {source}.",
         f"Coefficients {', '.join(one.names)} over time with two standard errors to each side.",
         keys=(*keys, *stood),

@@ -188,7 +188,7 @@ def test_every_axis_says_what_it_shows_and_in_which_unit(what: str) -> None:
 def test_an_axis_without_a_unit_would_be_found() -> None:
     layout = base_layout(200)
     layout["xaxis"], layout["yaxis"] = axis("time [s]"), axis("speed")
-    bare = Figure("bare", {"data": [line([0, 1], [1, 2], name="u", color="#000000")], "layout": layout}, 200, "", "")
+    bare = Figure("bare", {"data": [line([0, 1], [1, 2], name="u", color="#000000")], "layout": layout}, "", "")
     drawn = still([bare])
     assert nameless(drawn) == ["y of 'speed'"]
 
@@ -226,5 +226,5 @@ def test_the_key_names_what_is_drawn() -> None:
     assert explored.layout.title.text == "‹b>x‹/b>"
     layout = base_layout(200)
     layout["xaxis"], layout["yaxis"] = axis("time [s]"), axis("u [m/s]")
-    figure = Figure("a", {"data": [], "layout": layout}, 200, "", "", keys=(Key("band", "rgba(0,0,0,0.15)", "band"),))
+    figure = Figure("a", {"data": [], "layout": layout}, "", "", keys=(Key("band", "rgba(0,0,0,0.15)", "band"),))
     assert [text.get_text() for text in still([figure]).legends[0].texts] == ["band"]

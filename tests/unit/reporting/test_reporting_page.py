@@ -44,8 +44,9 @@ def test_words_from_files_stay_words(page: str) -> None:
     assert "<script>alert" not in page
     assert "<img" not in without_scripts(page)
     assert "&lt;script&gt;alert" in page
-    nasty = Figure("one", {"data": [line([0], [0], name=NASTY, color="#000000")], "layout": {}}, 100, NASTY, NASTY)
-    drawn = render(Report(NASTY, (), (), nasty, (), ""))
+    spec = {"data": [line([0], [0], name=NASTY, color="#000000")], "layout": {"height": 100}}
+    nasty = Figure("one", spec, NASTY, NASTY)
+    drawn = render(Report(NASTY, (), (), nasty, (), made=""))
     assert "<script>alert" not in drawn
     (spec,) = read_figures(packed_of(drawn))
     assert spec["data"][0]["name"] == NASTY.replace("<", "‹")
@@ -90,7 +91,7 @@ def test_numbers_come_through_the_packing_as_they_were() -> None:
     still = np.full(time.size, -2.5)
     layout = {"xaxis": {}, "yaxis": {}, "xaxis2": {"type": "log"}, "yaxis2": {}}
     data = [line(time, values, name="a", color="#000000"), line(time, still, name="b", color="#000000", axis="2")]
-    given = Figure("one", {"data": data, "layout": layout}, 100, "", "")
+    given = Figure("one", {"data": data, "layout": {**layout, "height": 100}}, "", "")
     (spec,) = read_figures(figures_text([given]))
     assert spec["name"] == "one"
     back = np.array([[np.nan if v is None else v for v in trace[side]] for trace in spec["data"] for side in "xy"])
@@ -122,6 +123,6 @@ def test_a_page_of_many_long_channels_is_small_enough_to_mail(tmp_path: Path) ->
     rows = {f"channel_{k}": rng.standard_normal(20_000) for k in range(14)}
     flight = sp.Flight.from_arrays(np.arange(20_000) / 100.0, rows)
     figure = over_time([flight])
-    report = Report("noise", (), (), None, (Section("channels", "Channels", (figure,)),), "today")
+    report = Report("noise", (), (), None, (Section("channels", "Channels", (figure,)),), made="today")
     assert len(figure.spec["data"]) == 12
     assert 1.9e6 < write_page(tmp_path / "page.html", report).stat().st_size < 2.5e6

@@ -108,7 +108,7 @@ _OPERATIONS: Mapping[str, tuple[Callable[..., Flight], tuple[str, ...]]] = {
     "remove_outliers": (remove_outliers, ("threshold", "longest")),
     "trim_ground": (cut, ("start", "stop", "reasons")),
     "resample": (resample, ("rate", "max_gap", "shortest_piece", "method", "straighten")),
-    "lowpass": (lowpass, ("cutoff", "order", "zero_phase")),
+    "lowpass": (lowpass, ("cutoff", "order")),
     "derive": (derive_motion, ("gravity",)),
     "move_to_cg": (move_to_cg, ("lever_arm",)),
     "correct_sensors": (correct_sensors, ("biases", "scales")),

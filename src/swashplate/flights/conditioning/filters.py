@@ -21,9 +21,7 @@ def shortest(order: int, *, band: bool = False) -> int:
     return 3 * (2 * sections + 1 - at_origin) + 1
 
 
-def filtered(
-    values: Array, *, rate: float, cutoff: float | tuple[float, float], order: int = 4, zero_phase: bool = True
-) -> Array:
+def filtered(values: Array, *, rate: float, cutoff: float | tuple[float, float], order: int = 4) -> Array:
     """A uniform record after a Butterworth filter run forwards and backwards: no phase, twice the order's slope.
 
     Args:
@@ -31,12 +29,11 @@ def filtered(
         rate: sample rate [Hz].
         cutoff: corner of a low-pass, or the two corners of a band-pass [Hz] (-6 dB there, as it runs twice).
         order: of one pass.
-        zero_phase: False runs it forwards only, from a state at rest at the first value (-3 dB at the corner).
 
     Raises:
         FlightError: the corner is not below half the rate, or the record is too short.
     """
-    from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+    from scipy.signal import butter, sosfiltfilt
 
     band = isinstance(cutoff, tuple)
     corners = np.atleast_1d(np.asarray(cutoff, dtype=np.float64))
@@ -54,9 +51,6 @@ def filtered(
             hint="Use a longer record, or condition with cutoff=0 (no filter).",
         )
     sos = butter(order, cutoff, btype="bandpass" if band else "lowpass", fs=rate, output="sos")
-    if not zero_phase:
-        rest = sosfilt_zi(sos).reshape(sos.shape[0], 2, *(1,) * (values.ndim - 1)) * values[0]
-        return np.asarray(sosfilt(sos, values, axis=0, zi=rest)[0], dtype=np.float64)
     return np.asarray(sosfiltfilt(sos, values, axis=0), dtype=np.float64)
 
 
@@ -110,8 +104,8 @@ def uniform_rate(flight: Flight) -> float:
     return flight.rate(flight.channels[0])
 
 
-def lowpass(flight: Flight, *, cutoff: float, order: int = 4, zero_phase: bool = True) -> Flight:
-    """Every channel alike, inputs too, through the same Butterworth low-pass, by default without phase.
+def lowpass(flight: Flight, *, cutoff: float, order: int = 4) -> Flight:
+    """Every channel alike, inputs too, through the same Butterworth low-pass, without phase.
 
     The same filter on inputs and outputs cancels in their relation: no parameter is shifted by it.
 
@@ -119,7 +113,6 @@ def lowpass(flight: Flight, *, cutoff: float, order: int = 4, zero_phase: bool =
         flight: one uniform stream.
         cutoff: corner [Hz].
         order: of one pass; it runs twice.
-        zero_phase: False runs it once, forwards, as a recorder's own filter would.
 
     Raises:
         FlightError: a segment is shorter than the filter needs, or than one period of its corner.
@@ -137,9 +130,7 @@ def lowpass(flight: Flight, *, cutoff: float, order: int = 4, zero_phase: bool =
     values = {str(n): np.asarray(v.values, dtype=np.float64) for n, v in data.data_vars.items()}
     try:
         smooth = {
-            n: by_segment(
-                flight, v, lambda part: filtered(part, rate=rate, cutoff=cutoff, order=order, zero_phase=zero_phase)
-            )
+            n: by_segment(flight, v, lambda part: filtered(part, rate=rate, cutoff=cutoff, order=order))
             for n, v in values.items()
         }
     except FlightError as error:
@@ -149,4 +140,4 @@ def lowpass(flight: Flight, *, cutoff: float, order: int = 4, zero_phase: bool =
         unit = continuous(np.stack([smooth[n] for n in QUATERNION], axis=-1))
         smooth.update(zip(QUATERNION, unit.T, strict=True))
     made = data.assign({n: timed(v, data[n].attrs) for n, v in smooth.items()})
-    return flight.with_streams({name: made}).done("lowpass", cutoff=cutoff, order=order, zero_phase=zero_phase)
+    return flight.with_streams({name: made}).done("lowpass", cutoff=cutoff, order=order, zero_phase=True)

@@ -11,7 +11,7 @@ from swashplate.errors import FlightError
 from swashplate.flights import datasets
 from swashplate.flights.epoch import rebased
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import analogue, blackbox, checks, no_log
+from swashplate.flights.readers import blackbox, checks, no_log
 from swashplate.flights.readers.given_units import with_units
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
@@ -84,8 +84,7 @@ def read(
         units: units by channel (CSV) or field (`.mat`, "position" of a motion capture file) where the file says none,
             or the wrong ones.
         mapping: a TOML file, or its content as a dictionary, that says which columns of a table, or which variables of
-            a `.mat`, are which channels (`readers/delimited.py`); its table `[mocap]` may hold the next four. With a
-            table `[recorder]` it is the calibration of an analogue recorder (`readers/analogue.py`).
+            a `.mat`, are which channels (`readers/delimited.py`); its table `[mocap]` may hold the next four.
         body: the tracked body, where a motion capture file has several.
         rotation: how three logged angles are meant: "helical" or "euler_xyz", where the file does not say.
         body_axes: where the tracked body's logged axes point, for example "forward-left-up" (a bag's default).
@@ -160,8 +159,6 @@ def _whole(
             channel="log",
             hint="Only Blackbox files hold several: leave it out.",
         )
-    if analogue.is_calibration(options.mapping):
-        return rebased(analogue.read(source, options))
     if "channels" in options.mapping:  # columns are named, so it is a table, whichever reader would know its head
         reader = next((READERS[name] for name in _TABLES if READERS[name].recognises(source)), None)
         if reader is None:

@@ -18,7 +18,7 @@ from swashplate.identification.responses.frequency_response import (
     unwrapped_degrees,
 )
 from swashplate.reporting.structure import Figure, Key
-from swashplate.reporting.theme import BLACK, FLIGHT, GREY, MODEL, axis, base_layout, line, phase_ticks
+from swashplate.reporting.theme import BLACK, FLIGHT, GREY, MODEL, axis, base_layout, line, phase_ticks, shade
 from swashplate.reporting.words import counted
 
 _ERROR = "rgba(0,0,0,0.15)"
@@ -155,7 +155,6 @@ def bode_matrix(rows: Sequence[Sequence[Pair | None]], *, identifier: str = "bod
     return Figure(
         identifier,
         {"data": traces, "layout": layout},
-        total,
         f"Magnitude, phase and coherence of {counted(len(cells), 'response')}; grey where the coherence is below "
         f"{LEAST_COHERENCE:g} and the response is not to be used.",
         f"Bode diagrams of {', '.join(f'{p.output} over {p.input}' for p in cells)}.",
@@ -235,10 +234,7 @@ def _traces(pair: Pair, numbers: Sequence[str]) -> list[dict[str, Any]]:
             for run in _runs(good & np.isfinite(middle) & np.isfinite(spread)):
                 edge = np.concatenate([(middle + above)[run], (middle + below)[run][::-1]])
                 x = np.concatenate([hertz[run], hertz[run][::-1]])
-                band = line(x, edge, name="±2 random errors", color=_ERROR, width=0, axis=n)
-                traces.append(
-                    {**band, "fill": "toself", "fillcolor": _ERROR, "hoverinfo": "skip", "hovertemplate": None}
-                )
+                traces.append(shade(x, edge, name="±2 random errors", color=_ERROR, axis=n))
     for n, values in zip(numbers, (gain, phase, pair.coherence), strict=True):
         if not good.all():
             faint = np.where(beside, values, np.nan)
@@ -252,10 +248,7 @@ def _traces(pair: Pair, numbers: Sequence[str]) -> list[dict[str, Any]]:
         ):
             if np.isfinite(half).all():
                 x, edge = (np.concatenate([a, b[::-1]]) for a, b in ((omega, omega), (values + half, values - half)))
-                band = line(x / TWO_PI, edge, name="±2 σ of the model", color=_BOUND, width=0, axis=n)
-                traces.append(
-                    {**band, "fill": "toself", "fillcolor": _BOUND, "hoverinfo": "skip", "hovertemplate": None}
-                )
+                traces.append(shade(x / TWO_PI, edge, name="±2 σ of the model", color=_BOUND, axis=n))
         for n, values in zip(numbers, middles, strict=False):
             traces.append(
                 line(

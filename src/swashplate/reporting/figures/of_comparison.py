@@ -6,7 +6,7 @@ import numpy as np
 
 from swashplate.flights.schema import channel
 from swashplate.reporting.downsample import joined, kept
-from swashplate.reporting.structure import Cell, Figure, Key, Section, Table, Text
+from swashplate.reporting.structure import Figure, Key, Section, Text, tabulate
 from swashplate.reporting.theme import (
     BAND,
     BLUE,
@@ -17,11 +17,13 @@ from swashplate.reporting.theme import (
     ORANGE,
     PURPLE,
     VERMILION,
+    axis_number,
     grid,
     inputs_title,
     line,
     numbers,
     quantity,
+    shade,
     shown,
     stacked,
 )
@@ -35,10 +37,10 @@ _STYLES = ((BLUE, "dash"), (VERMILION, "dot"), (GREEN, "dashdot"), (PURPLE, "das
 def section_of_comparison(comparison: ModelComparison) -> Section:
     """The lines, and how close each model comes."""
     rows = tuple(
-        (Cell(name), *(Cell(f"{fits[who]:.1f}" if who in fits else "-", number=True) for who in comparison.found))
+        (name, *(f"{fits[who]:.1f}" if who in fits else "-" for who in comparison.found))
         for name, fits in comparison.fits().items()
     )
-    table = Table(
+    table = tabulate(
         "Fit [%]: 100 (1 - rms error / rms of the flight about its mean)", ("output", *comparison.found), rows
     )
     warnings = tuple(Text(f"{n}: {t}", tone="caution") for n, v in comparison.found.items() for t in v.warnings)
@@ -76,7 +78,6 @@ def _lines(comparison: ModelComparison) -> Figure:
     return Figure(
         "models",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         "Flight and models along the recorded inputs; in brackets the mean fit over the outputs. Biases and start "
         "states are solved for.",
         f"{', '.join(names)} of the flight and of {', '.join(comparison.found)} over time.",
@@ -92,11 +93,11 @@ def section_of_residuals(left: Residuals) -> Section:
     """The verdict, and the correlations with their bounds."""
     tone = "good" if left.complete else "bad"
     rows = tuple(
-        (Cell(c.output), Cell(c.input), Cell(f"{c.worst[1]:+.3f}", True), Cell(f"{c.worst[0]:.3g}", True),
-         Cell(f"{c.limit:.3f}", True))
+        (c.output, c.input, f"{c.worst[1]:+.3f}", f"{c.worst[0]:.3g}",
+         f"{c.limit:.3f}")
         for c in left.cross
     )  # fmt: skip
-    table = Table("Largest causal correlations", ("output", "input", "largest", "at [s]", "limit"), rows)
+    table = tabulate("Largest causal correlations", ("output", "input", "largest", "at [s]", "limit"), rows)
     title = f"Residuals of {left.verification.model.name}"
     cross = _correlations(
         left.cross,
@@ -116,17 +117,15 @@ def _correlations(correlations: tuple[Correlation, ...], identifier: str, captio
     layout = grid(titles, columns=columns, height=140, x_title="lag [s]", y_title="correlation [-]")
     traces = []
     for i, c in enumerate(correlations):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         low, high = float(c.lags[0]), float(c.lags[-1])
         edge = [c.bound, c.bound, -c.bound, -c.bound]
-        band = line([low, high, high, low], edge, name="99 %", color=BAND, width=0, axis=number)
-        traces.append({**band, "fill": "toself", "fillcolor": BAND, "hoverinfo": "skip", "hovertemplate": None})
+        traces.append(shade([low, high, high, low], edge, name="99 %", color=BAND, axis=number))
         hover = f"{titles[i]}<br>lag %{{x:.3f}} s: %{{y:.3f}}"
         traces.append(line(numbers(c.lags), numbers(c.values), name=titles[i], color=MODEL, axis=number, hover=hover))
     return Figure(
         identifier,
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         caption,
         f"{identifier} of {', '.join(titles)} over the lag.",
         keys=(Key("correlation", MODEL), Key("99 % bound of each lag", BAND, "band")),

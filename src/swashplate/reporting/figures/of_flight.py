@@ -14,7 +14,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import Inspection
 from swashplate.flights.schema import channel
 from swashplate.reporting.downsample import kept
-from swashplate.reporting.structure import Cell, Figure, Key, Section, Table, Text
+from swashplate.reporting.structure import Cell, Figure, Key, Section, Text, tabulate
 from swashplate.reporting.theme import (
     BLACK,
     BLUE,
@@ -25,6 +25,7 @@ from swashplate.reporting.theme import (
     SKY,
     VERMILION,
     axis,
+    axis_number,
     base_layout,
     line,
     numbers,
@@ -95,7 +96,6 @@ def over_time(
     return Figure(
         "flight",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         "Channels over time; where a log has a gap, the line has one.",
         f"{', '.join(name for names in panels for name in names)} against time.",
         keys=tuple(keys.values()),
@@ -123,7 +123,7 @@ def label(flight: Flight, place: int) -> str:
 
 
 def _number(place: int) -> str:
-    return "" if place == 0 else str(place + 1)
+    return axis_number(place)
 
 
 def _panels(flights: Sequence[Flight], channels: Sequence[str] | None) -> list[tuple[str, ...]]:
@@ -205,7 +205,6 @@ def of_spectra(panels: Sequence[Mapping[str, spectra.Spectrum]], names: Sequence
     return Figure(
         "spectrum",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         "Power spectral density, one-sided, after Welch; of a log with gaps its longest unbroken piece.",
         f"Power spectra of {', '.join(one.channel for one in drawn)}. {'; '.join(lines)}.",
         keys=tuple(Key(name, color) for name, color in colors.items()) if len(names) > 1 else (),
@@ -256,7 +255,6 @@ def of_spectrograms(panels: Sequence[spectra.Spectrogram]) -> Figure:
     return Figure(
         "spectrogram",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         "Power over time and frequency, in dB below the strongest; of a log with gaps its longest unbroken piece.",
         f"Spectrograms of {', '.join(names)}.",
     )
@@ -271,9 +269,9 @@ def section_of_flight(flight: Flight, *, channels: Sequence[str] | None = None) 
         unit = str(values.attrs.get("units", "")) or known.unit
         rate = f"{flight.rate(name):.1f}" if values.size > 1 else "-"
         size = Cell(str(values.size), number=True)
-        rows.append((Cell(name), Cell(unit), Cell(rate, number=True), size, Cell(known.description)))
+        rows.append((name, unit, rate, size, known.description))
     notes = (*flight.provenance.damage, *flight.provenance.notes)
-    table = Table("Channels", ("channel", "unit", "rate [Hz]", "samples", "what"), tuple(rows))
+    table = tabulate("Channels", ("channel", "unit", "rate [Hz]", "samples", "what"), rows)
     figures = (over_time([flight], channels=channels),) if flight.channels else ()
     title = f"Flight {flight.provenance.source or '(unnamed)'}: {flight.duration:.1f} s"
     return Section("flight", title, (*(Text(note, tone="caution") for note in notes), *figures, table))
@@ -282,7 +280,7 @@ def section_of_flight(flight: Flight, *, channels: Sequence[str] | None = None) 
 def section_of_inspection(inspection: Inspection) -> Section:
     """Problems, what was recorded when, and the channels."""
     head, *rows = inspection.channel_rows()
-    table = Table("Channels", head, tuple(tuple(Cell(cell) for cell in row) for row in rows))
+    table = tabulate("Channels", head, rows)
     problems = tuple(Text(problem, tone="caution") for problem in inspection.problems)
     title = f"{inspection.source or '(unnamed)'}: {inspection.duration:.1f} s"
     return Section("inspection", title, (*problems, _recorded(inspection), table))
@@ -313,7 +311,6 @@ def _recorded(inspection: Inspection) -> Figure:
     return Figure(
         "recorded",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         "What was recorded when, and the frequency sweeps found in it.",
         f"Streams {', '.join(s.name for s in inspection.streams)} over time, with {len(inspection.sweeps)} sweeps.",
         keys=(Key("recorded", GREY, "bar"), *((Key("frequency sweep", BLUE, "bar"),) if inspection.sweeps else ())),

@@ -13,9 +13,20 @@ from swashplate.flights.maneuvers.maneuver_design import sampled
 from swashplate.flights.schema import channel
 from swashplate.flights.spectrum import Harmonics, Spectrogram, Spectrum
 from swashplate.reporting.figures.of_flight import of_spectra, of_spectrograms, over_time
-from swashplate.reporting.structure import Cell, Figure, Key, Report, Section, Table, Text
-from swashplate.reporting.theme import BLACK, BLUE, GREY, VERMILION, axis, base_layout, line, stacked, unit_words
-from swashplate.reporting.versions import date, versions
+from swashplate.reporting.structure import Figure, Key, Report, Section, Table, Text, tabulate
+from swashplate.reporting.theme import (
+    BLACK,
+    BLUE,
+    GREY,
+    VERMILION,
+    axis,
+    axis_number,
+    base_layout,
+    dots,
+    line,
+    stacked,
+    unit_words,
+)
 
 if TYPE_CHECKING:
     from swashplate.control.analysis.cascade_gains import LoopWorth
@@ -32,7 +43,7 @@ _BOUNDS = 2.0
 
 
 def _table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    return Table(caption, tuple(head), tuple(tuple(Cell(cell) for cell in row) for row in rows))
+    return tabulate(caption, head, rows)
 
 
 # ---- numbers with bounds ---------------------------------------------------------------------------------------
@@ -47,14 +58,13 @@ def _estimates(panels: Mapping[str, Mapping[str, tuple[float, float]]], caption:
     layout = base_layout(_ROW * count + 64 * len(panels) + 20, left=110)
     traces, top = [], 1.0
     for i, (title, values) in enumerate(panels.items()):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         low = max(0.0, top - (1.0 - gap * len(panels)) * len(values) / count)
         for place, (value, sigma) in enumerate(values.values()):
             ends = [value - _BOUNDS * sigma, value + _BOUNDS * sigma]
             color = BLUE if abs(value) > _BOUNDS * sigma else GREY
             traces.append(line(ends, [place, place], name=title, color=color, axis=number))
-            dot = line([value], [place], name=title, color=color, axis=number)
-            traces.append({**dot, "mode": "markers", "marker": {"color": color, "size": 7}})
+            traces.append(dots([value], [place], {"color": color, "size": 7}, name=title, axis=number))
         traces.append(line([0.0, 0.0], [-0.5, len(values) - 0.5], name="zero", color=BLACK, width=0.8, axis=number))
         ticks = {"tickvals": list(range(len(values))), "ticktext": list(values)}
         reach = [len(values) - 0.5, -0.5]
@@ -64,7 +74,6 @@ def _estimates(panels: Mapping[str, Mapping[str, tuple[float, float]]], caption:
     return Figure(
         "estimates",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         f"{caption} Bars are two standard errors; grey ones hold zero.",
         f"Estimates with bounds: {', '.join(name for values in panels.values() for name in values)}.",
     )
@@ -114,7 +123,7 @@ def section_of_harmonics(harmonics: Harmonics) -> Section:
     spec: dict[str, Any] = {**drawn.spec, "data": [*marks, *drawn.spec["data"]]}
     keys = (Key(harmonics.spectrum.channel, BLUE), Key(f"multiples of {harmonics.rotor}", VERMILION, "dot"))
     caption = f"{drawn.caption} {harmonics.words}"
-    figure = Figure("harmonics", spec, drawn.height, caption, drawn.alt, keys=keys)
+    figure = Figure("harmonics", spec, caption, drawn.alt, keys=keys)
     return Section("harmonics", f"Rotor vibration in {harmonics.spectrum.channel}", (figure, Text(str(harmonics))))
 
 
@@ -146,7 +155,7 @@ def section_of_steps(steps: RateSteps) -> Section:
     verdict = "Stable" if steps.stable else "UNSTABLE: do not fly these gains"
     summary = f"{verdict}; overshoot {100.0 * steps.overshoot:.0f} %, settles at {steps.settled:.3g}."
     alt = "The rate over time, after a step of the target and after a disturbance of 0.1 of the command."
-    figure = Figure("steps", {"data": traces, "layout": layout}, int(layout["height"]), summary, alt)
+    figure = Figure("steps", {"data": traces, "layout": layout}, summary, alt)
     return Section("steps", "Steps of a rate loop", (figure, Text(summary, tone="plain" if steps.stable else "bad")))
 
 
@@ -165,10 +174,9 @@ def section_of_loops(loops: Sequence[LoopWorth]) -> Section:
     )
     traces = []
     for i, (title, values, kept) in enumerate(panels):
-        number = "" if i == 0 else str(i + 1)
-        dots = line(values, places, name=title, color=BLUE, axis=number)
+        number = axis_number(i)
         ends = [-0.5, len(loops) - 0.5]
-        traces.append({**dots, "mode": "markers", "marker": {"color": BLUE, "size": 8}})
+        traces.append(dots(values, places, {"color": BLUE, "size": 8}, name=title, axis=number))
         if kept is not None:
             traces.append(line([kept, kept], ends, name="limit", color=VERMILION, dash="dash", axis=number))
         ticks = {"tickvals": places, "ticktext": names}
@@ -177,7 +185,6 @@ def section_of_loops(loops: Sequence[LoopWorth]) -> Section:
     figure = Figure(
         "margins",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         "Each loop broken with the others closed; margins lie right of their limit, the sensitivity left of it; the "
         "delay margin has none.",
         f"Margins of the loops {', '.join(names)}.",
@@ -190,6 +197,5 @@ def plain_page(
     title: str, *, summary: Mapping[str, str], sections: Sequence[Section] = (), problems: Sequence[str] = ()
 ) -> Report:
     """The page of a result of one verb: what is wrong first, then its numbers, then its figures."""
-    version = f"swashplate {versions()['swashplate']}, {date()}"
     lines = tuple((name, value, "plain") for name, value in summary.items())
-    return Report(title, tuple(("bad", text) for text in problems), lines, None, tuple(sections), version)
+    return Report(title, tuple(("bad", text) for text in problems), lines, None, tuple(sections))

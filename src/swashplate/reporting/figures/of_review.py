@@ -5,7 +5,7 @@ from __future__ import annotations
 from swashplate.flights.review.noise import GyroNoise
 from swashplate.flights.review.review import FlightReview, LoopReview
 from swashplate.reporting.structure import Figure, Key, Section, Text
-from swashplate.reporting.theme import BLUE, GREY, VERMILION, line, over_frequency, stacked
+from swashplate.reporting.theme import BLUE, GREY, VERMILION, axis_number, line, over_frequency, stacked
 
 
 def section_of_review(review: FlightReview) -> Section:
@@ -22,7 +22,7 @@ def _steps(loops: list[LoopReview]) -> Figure:
     layout = stacked([f"{loop.axis} rate over target [-]" for loop in loops], height=150)
     traces = []
     for i, loop in enumerate(loops):
-        step, number = loop.step, "" if i == 0 else str(i + 1)
+        step, number = loop.step, axis_number(i)
         if step is None:
             continue
         traces += [
@@ -34,7 +34,6 @@ def _steps(loops: list[LoopReview]) -> Figure:
     return Figure(
         "step responses",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         "The rate after a step of its target, deconvolved from the flight; grey: 95 % band over its windows.",
         f"Step responses of rate loops. {summary_text}.",
     )
@@ -44,7 +43,7 @@ def _noise(noise: tuple[GyroNoise, ...]) -> Figure:
     layout = over_frequency([f"{each.channel} [(deg/s)²/Hz]" for each in noise], height=150, unit="Hz")
     traces = []
     for i, each in enumerate(noise):
-        number = "" if i == 0 else str(i + 1)
+        number = axis_number(i)
         layout[f"yaxis{number}"] |= {"type": "log", "exponentformat": "power"}
         over = each.frequency[1:]
         traces.append(line(over, each.before[1:], name="before the filters", color=VERMILION, axis=number))
@@ -52,7 +51,6 @@ def _noise(noise: tuple[GyroNoise, ...]) -> Figure:
     return Figure(
         "gyro noise",
         {"data": traces, "layout": layout},
-        int(layout["height"]),
         "Power spectral density of the gyros before and behind the autopilot's filters.",
         f"Spectra of {'; '.join(map(str, noise))}.",
         keys=(Key("before the filters", VERMILION), Key("behind the filters", BLUE)),

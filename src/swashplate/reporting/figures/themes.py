@@ -10,17 +10,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
-from swashplate.reporting.theme import (
-    BAND,
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-)
+from swashplate.reporting.theme import BAND, BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 
 Theme = Literal["paper", "light", "dark"]
 Frequency = Literal["Hz", "rad/s"]

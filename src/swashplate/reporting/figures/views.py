@@ -23,7 +23,7 @@ from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import Frequency, Theme
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.sections_responses import gains_section
-from swashplate.reporting.structure import Cell, Figure, Report, Section, Table, Text
+from swashplate.reporting.structure import Figure, Report, Section, Text, tabulate
 from swashplate.validation.validation import Validation
 
 if TYPE_CHECKING:
@@ -63,13 +63,13 @@ def _of_report(page: Report, shown: Any) -> Section:
     if isinstance(shown, Result):
         warnings = (*shown.problems, *shown.warnings)
         columns = [(head, cells) for head, cells in shown.columns() if any(cells)]
-        rows = tuple(tuple(Cell(cell) for cell in row) for row in zip(*(cells for _, cells in columns), strict=True))
-        estimates = Table("Estimates", tuple(head for head, _ in columns), rows)
+        rows = zip(*(cells for _, cells in columns), strict=True)
+        estimates = tabulate("Estimates", tuple(head for head, _ in columns), rows)
         title = f"{shown.name} by {shown.method}: {shown.state}"
         return Section(
             "result", title, (*(Text(text, tone="caution") for text in warnings), *picture, *rest, estimates)
         )
-    summary = Table("Summary", ("", ""), tuple((Cell(label), Cell(text)) for label, text, _ in page.summary))
+    summary = tabulate("Summary", ("", ""), tuple((label, text) for label, text, _ in page.summary))
     return Section("shown", page.title, (*banners, *picture, *rest, summary))
 
 
@@ -80,9 +80,9 @@ def section_of_responses(responses: FrequencyResponse) -> Section:
         for name in responses.inputs:
             band = responses.band(output, name)
             ends = "none" if band is None else f"{band[0] / TWO_PI:.3g} - {band[1] / TWO_PI:.3g}"
-            rows.append((Cell(f"{output} / {name}"), Cell(ends)))
+            rows.append((f"{output} / {name}", ends))
     warnings = tuple(Text(text, tone="caution") for text in (*responses.problems, *responses.warnings))
-    table = Table("Where they may be used", ("output / input", "coherent band [Hz]"), tuple(rows))
+    table = tabulate("Where they may be used", ("output / input", "coherent band [Hz]"), rows)
     title = f"Frequency responses ({responses.method}): {responses.omega.size} lines"
     return Section("responses", title, (*warnings, bode_matrix.of_responses(responses), table))
 

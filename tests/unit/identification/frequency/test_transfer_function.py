@@ -16,7 +16,6 @@ from swashplate.identification.frequency.handling import attitude_of, handling_q
 from swashplate.identification.frequency.response_cost import ResponseCost, cost_of, target
 from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
 from swashplate.identification.frequency.transfer_function_forms import BAND, suggest
-from swashplate.identification.frequency.unnoticeable_dynamics import envelopes, mismatch
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.transfer_function import Form, TransferFunction
 from swashplate.validation.verify import verify
@@ -235,38 +234,6 @@ def test_cost_is_the_one_the_optimizer_minimises() -> None:
     assert value == pytest.approx(cost.cost(row))
     step = 1e-5
     assert gradient[0] == pytest.approx((cost.cost(row + step) - cost.cost(row - step)) / (2 * step), rel=1e-6)
-
-
-def test_envelopes_are_narrow_where_a_pilot_flies_and_wide_elsewhere() -> None:
-    omega = np.array([0.1, 2.0, 100.0])
-    bound = envelopes(omega)
-    for high, low in (("gain_high", "gain_low"), ("phase_high", "phase_low")):
-        width = bound[high] - bound[low]
-        assert np.all(width > 0.0)
-        assert width[1] < 0.5 * min(width[0], width[2])
-        assert np.all((bound[high] > 0.0) & (bound[low] < 0.0))
-    wanted = target(exact(SECOND), "rate", "stick")
-    assert wanted is not None
-    assert mismatch(wanted.measured, wanted).inside == 1.0
-    assert mismatch(3.0 * wanted.measured, wanted).inside < 0.3
-
-
-def test_envelopes_are_those_of_another_program() -> None:
-    """C. Regan 2006, LoesBound.m, rounded as printed there and without the leads of the phases."""
-    s = 1j * np.geomspace(0.3, 60.0, 40)
-    copied = {
-        "gain_high": np.polyval([3.16, 31.61, 22.79], s) / np.polyval([1.0, 27.14, 1.84], s),
-        "gain_low": np.polyval([0.095, 9.92, 2.15], s) / np.polyval([1.0, 11.6, 4.95], s),
-        "phase_high": np.polyval([68.89, 1100.12, -275.22], s) / np.polyval([1.0, 39.94, 9.99], s),
-        "phase_low": np.polyval([475.32, 184100.0, 29460.0], s) / np.polyval([1.0, 11.66, 0.039], s),
-    }
-    bound = envelopes(s.imag)
-    for name in ("gain_high", "gain_low"):
-        np.testing.assert_allclose(bound[name], 20.0 * np.log10(np.abs(copied[name])), atol=0.05)
-    for name, lead in (("phase_high", 0.0059), ("phase_low", -0.0072)):
-        np.testing.assert_allclose(
-            bound[name] - np.degrees(lead * s.imag), np.degrees(np.angle(copied[name])), atol=0.05
-        )
 
 
 def test_phase_delay_of_an_integrator_with_delay_is_half_the_delay() -> None:
