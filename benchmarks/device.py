@@ -21,7 +21,7 @@ from swashplate.engine.card import batch_program
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.batch import Precision
+from swashplate.simulation.closed_loop_batch import Precision
 from swashplate.simulation.trim import trim
 
 PROMISED = 1e9

@@ -10,8 +10,8 @@ from swashplate.simulation.derivatives import derivative_table
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.lpv import simulate_lpv
 from swashplate.simulation.reduction import PAPER_INPUTS
-from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import trim
+from swashplate.simulation.trim_curve import trims_over_speed
 
 SCAN_TARGET = 100_000.0
 SPEEDS_TARGET = 50.0

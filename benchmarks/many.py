@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.timing import Result, best_rate
 from swashplate.api.simulate_batch import simulate_batch
 from swashplate.models.catalogue import vehicle as load_vehicle
-from swashplate.simulation.batch import Precision
+from swashplate.simulation.closed_loop_batch import Precision
 from swashplate.simulation.trim import trim
 
 TARGETS = {"float64": 12e6, "float32": 25e6}

@@ -14,8 +14,8 @@ from benchmarks.timing import Result, best_rate
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row, unpack_rows
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.physics.backend import CasadiBackend
+from swashplate.simulation.discretisation import rk4_step
 from swashplate.simulation.integrate import simulate
-from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import trim
 
 TARGET = 180_000.0

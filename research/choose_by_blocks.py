@@ -26,9 +26,8 @@ from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.estimators import Question
 from swashplate.identification.time.estimates import LAGS, found_at
-from swashplate.identification.time.feedback import excitation, hold_unexcited
+from swashplate.identification.time.feedback import AxisExcitation, excitation, hold_unexcited
 from swashplate.identification.time.filter_error import SETTLING, FilterError
-from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.identify import FILTER_ERROR, ITERATIONS
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.vehicle import Vehicle

@@ -22,8 +22,8 @@ from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
+from swashplate.simulation.discretisation import rk4_step
 from swashplate.simulation.record import unflown
-from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
 from swashplate.simulation.stepping import MakeEngine, motion_row

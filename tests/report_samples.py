@@ -12,14 +12,13 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
-from swashplate.identification.core.comparison import Comparison
-from swashplate.identification.core.records import POSE, Record
+from swashplate.identification.core.records import POSE, Comparison, Record
 from swashplate.identification.core.result import Constant, Direction, Estimate, Result
 from swashplate.identification.core.sources import sources_of
-from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
+from swashplate.identification.time.feedback import AxisExcitation, FlightDetails
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.models.catalogue import vehicle
-from swashplate.simulation.modes import Mode
+from swashplate.simulation.linearize import Mode
 from swashplate.validation.floors import Floor
 from swashplate.validation.validation import (
     PREDICTORS,

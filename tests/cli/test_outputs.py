@@ -27,7 +27,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import sources_of
-from swashplate.identification.time.flight_details import FlightDetails
+from swashplate.identification.time.feedback import FlightDetails
 from swashplate.models.vehicle import Vehicle
 from swashplate.validation.validation import AxisVerdict, Score, Validation
 

@@ -30,9 +30,8 @@ from published_helicopters import (
 from swashplate.models.catalogue import from_card
 from swashplate.models.conventional.new_card import new_card
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.model_error import MEASURED, kind_of, model_error
+from swashplate.simulation.derivatives import MEASURED, kind_of, model_error, spread
 from swashplate.simulation.published import _scale
-from swashplate.simulation.uncertainty import spread
 
 KNOT = 0.514444
 

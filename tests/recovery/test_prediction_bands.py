@@ -20,7 +20,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.records import POSE
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.runge_kutta import rk4_step
+from swashplate.simulation.discretisation import rk4_step
 from swashplate.validation.bands import Band
 
 RATE, SECONDS, HOLDOUTS, DRAWS = 100.0, 30.0, 16, 39

@@ -17,8 +17,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.flights.maneuvers.composed import composed
 from swashplate.flights.maneuvers.multisine import dealt
 from swashplate.flights.maneuvers.series import AXES, DEFAULT_AMPLITUDE, Maneuver, parse
-from swashplate.identification.design.information import sensed
-from swashplate.identification.design.powers import best_powers
+from swashplate.identification.design.information import best_powers, sensed
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
 from swashplate.simulation.controller import Controller

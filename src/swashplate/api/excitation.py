@@ -6,7 +6,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import records
 from swashplate.identification.time import feedback
-from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.feedback import AxisExcitation
 from swashplate.identification.time.kinematics import measured_states
 from swashplate.models.vehicle import Vehicle
 

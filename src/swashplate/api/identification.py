@@ -20,7 +20,7 @@ from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
 from swashplate.identification.posterior import check_posterior
 from swashplate.identification.posterior import posterior as draw_posterior
-from swashplate.identification.time.flight_details import FlightDetails
+from swashplate.identification.time.feedback import FlightDetails
 from swashplate.models.card import Card
 from swashplate.models.choices import Free
 from swashplate.models.vehicle import Vehicle

@@ -30,8 +30,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.monte_carlo import compose_monte_carlo
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
-from swashplate.simulation.batch import Batch
-from swashplate.simulation.closed_loop_batch import simulate_closed_loops
+from swashplate.simulation.closed_loop_batch import Batch, simulate_closed_loops
 from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim, trim
 from swashplate.simulation.wind import Gusts, dryden

@@ -14,7 +14,7 @@ from swashplate.engine.fly import FlightPlan, fly
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.batch import Batch, Precision
+from swashplate.simulation.closed_loop_batch import Batch, Precision
 from swashplate.simulation.driving import Interpolation
 from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start

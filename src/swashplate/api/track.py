@@ -21,9 +21,8 @@ from swashplate.export.regression_c import RegressionCode, regression_code
 from swashplate.filtering.sensor_suite import KINDS, suite
 from swashplate.flights.channel_names import with_names
 from swashplate.flights.flight import Flight
-from swashplate.identification.recursive.equation import RegressionEquation, regression_equation
+from swashplate.identification.recursive.equation import RegressionEquation, model_equations, regression_equation
 from swashplate.identification.recursive.fourier_regression import RecursiveRegression, RegressionPlan, regression_plan
-from swashplate.identification.recursive.model_equations import model_equations
 from swashplate.identification.recursive.slow_parameters import slow_plan
 from swashplate.identification.recursive.tracked import Tracked, stream_of, tracked, tracked_parameters
 from swashplate.json_text import as_json

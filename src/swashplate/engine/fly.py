@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
-from swashplate.engine.c_expression import body, statements
-from swashplate.engine.c_split import ROOTS, split
+from swashplate.engine.c_expression import ROOTS, body, split, statements
 from swashplate.engine.c_text import REAL, Precision, literal
 from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, Equations, equations_of
 from swashplate.engine.lanes import KERNELS, LANES, REDUCED, WHOLE, horner, moving, plain

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from swashplate.atomic import folder_when_complete, write_bytes
 from swashplate.engine.c_text import Precision, identifier
@@ -19,6 +20,67 @@ from swashplate.registry import Registry
 from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
+
+if TYPE_CHECKING:
+    from swashplate.export.traced import Traced
+
+
+def c(asked: ExportRequest) -> Export:
+    """C99 source and header: step, rates and Jacobians."""
+    from swashplate.export.model_c import model_code
+    from swashplate.export.traced import late_notes
+
+    traced = _traced(asked)
+    return Export(_encoded(model_code(traced, precision=asked.precision).files()), late_notes(traced))
+
+
+def fmu(asked: ExportRequest) -> Export:
+    """An FMI 2.0 co-simulation unit."""
+    from importlib import metadata
+
+    from swashplate.export import fmu as unit
+
+    traced = _traced(asked)
+    content, message = unit.fmu(traced, version=metadata.version("swashplate"))
+    return Export({f"{asked.name}.fmu": content}, (message,) if message else ())
+
+
+def simulink(asked: ExportRequest) -> Export:
+    """A C S-function and what builds it."""
+    from swashplate.export import simulink as blocks
+    from swashplate.export.traced import late_notes
+
+    traced = _traced(asked)
+    return Export(_encoded(blocks.simulink(traced)), late_notes(traced))
+
+
+def control(asked: ExportRequest) -> Export:
+    """JSON for python-control."""
+    from swashplate.export.control_json import control_json
+
+    return Export(_encoded({f"{asked.name}_control.json": control_json(asked.linear())}))
+
+
+def matlab(asked: ExportRequest) -> Export:
+    """A `.mat` file of matrices and names."""
+    from swashplate.export import matlab as files
+
+    return Export({f"{asked.name}.mat": files.matlab(asked.linear())})
+
+
+def _traced(asked: ExportRequest) -> Traced:
+    from swashplate.export.traced import trace_linear, trace_vehicle
+
+    model, about = asked.model, asked.about
+    if not isinstance(model, Vehicle):
+        return trace_linear(asked.linear(), name=asked.name)
+    assert about is not None
+    return trace_vehicle(model, about, name=asked.name, delays=asked.late)
+
+
+def _encoded(texts: Mapping[str, str]) -> dict[str, bytes]:
+    return {name: text.encode("utf-8") for name, text in texts.items()}
+
 
 Model = Vehicle | StateSpaceModel | Linear
 
@@ -80,11 +142,11 @@ FORMATS: Registry[Maker] = Registry(
     "exports",
     what="format",
     own={
-        "c": "swashplate.export.makers:c",
-        "fmu": "swashplate.export.makers:fmu",
-        "control": "swashplate.export.makers:control",
-        "matlab": "swashplate.export.makers:matlab",
-        "simulink": "swashplate.export.makers:simulink",
+        "c": "swashplate.export.formats:c",
+        "fmu": "swashplate.export.formats:fmu",
+        "control": "swashplate.export.formats:control",
+        "matlab": "swashplate.export.formats:matlab",
+        "simulink": "swashplate.export.formats:simulink",
         "web": "swashplate.api.web_page:web",
     },
 )

@@ -13,9 +13,8 @@ from types import ModuleType
 
 import numpy as np
 
-from swashplate.engine.c_expression import Statements, printed, statements
+from swashplate.engine.c_expression import ROOTS, Statements, printed, split, statements
 from swashplate.engine.c_loops import looped
-from swashplate.engine.c_split import ROOTS, split
 from swashplate.engine.c_tangents import VECTORS, Tangents
 from swashplate.engine.equations import Equations
 from swashplate.engine.graph import Graph

@@ -12,8 +12,7 @@ import numpy as np
 from swashplate.engine.graph import Expression, Graph
 from swashplate.engine.roots import require_casadi
 from swashplate.physics.backend import Backend, CasadiBackend, Scalar
-from swashplate.simulation.discretisation import held_series
-from swashplate.simulation.runge_kutta import rk4_change
+from swashplate.simulation.discretisation import held_series, rk4_change
 
 Scalars = Callable[[Sequence[Scalar], Sequence[Scalar]], Sequence[Scalar]]
 """A function of two rows of scalars; scalars back."""

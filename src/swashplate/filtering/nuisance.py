@@ -2,12 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.filtering.disturbances import DISTURBED, on_axes
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
+
+
+def commands_moved(vehicle: Vehicle, dt: float, inputs: Array, nuisance: Nuisance) -> tuple[Array, Array]:
+    """What reaches the vehicle at each sample, to be held there: trimmed, and later than logged; and its slopes by each
+    input's delay [1/s]. Both (n, n_inputs).
+
+    A smooth curve through the samples; before the first and after the last sample the nearest one holds.
+    """
+    n = inputs.shape[0]
+    trims = np.stack([np.asarray(getattr(nuisance, f"trim_{name}", 0.0), dtype=float) for name in vehicle.input_names])
+    delay = np.where(np.asarray(motors(vehicle)), nuisance.delay_motor, nuisance.delay_servo)
+    trimmed = inputs + trims
+    wanted = np.arange(n)[:, None] - delay[None, :] / dt
+    place = np.clip(wanted, 0.0, n - 1.0)
+    below = np.clip(np.floor(place), 0, n - 2).astype(int)
+    a, b, c, d = (np.take_along_axis(trimmed, np.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
+    t = place - below
+    # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
+    first, second, third = c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a
+    slope = 0.5 * (first + t * (2.0 * second + t * (3.0 * third)))
+    return b + 0.5 * t * (first + t * (second + t * third)), np.where(wanted == place, -slope / dt, 0.0)
+
+
+def commands_by(vehicle: Vehicle, late: Array, names: Sequence[str]) -> Array:
+    """Slopes of the arriving commands by some of a record's own numbers (names, n, n_inputs).
+
+    Args:
+        late: slopes by each input's delay, of `commands_moved`. names: of `Nuisance`; most move no command.
+    """
+    motor = np.array(motors(vehicle))
+    ways = {"delay_motor": late * motor, "delay_servo": late * ~motor}
+    for j, name in enumerate(vehicle.input_names):
+        ways[f"trim_{name}"] = np.tile(np.arange(len(motor)) == j, (len(late), 1)).astype(float)
+    return np.stack([ways.get(name, np.zeros_like(late)) for name in names])
+
+
+def motors(vehicle: Vehicle) -> list[bool]:
+    """Which inputs are motors; the others come by way of servos, with a delay of their own."""
+    return [name in vehicle.traits.motors for name in vehicle.input_names]
 
 
 class Nuisance(NamedTuple):

@@ -11,9 +11,8 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.identification.core import accuracy, nuts
-from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.parameter_row import Row
-from swashplate.identification.core.posterior_draws import LEAST_ESS, SPLIT_RHAT, Posterior
+from swashplate.identification.core.posterior_draws import LEAST_ESS, SPLIT_RHAT, Posterior, normal_within
 from swashplate.identification.core.result import Fitted, Result, bounds_of
 from swashplate.identification.core.whitened import Chains, effective, split_rhat
 

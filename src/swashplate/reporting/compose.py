@@ -16,8 +16,7 @@ from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.summary import banners, summary
 from swashplate.reporting.terms import with_terms
-from swashplate.simulation.linearize import linearize
-from swashplate.simulation.modes import Mode
+from swashplate.simulation.linearize import Mode, linearize
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 

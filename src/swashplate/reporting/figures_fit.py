@@ -28,7 +28,7 @@ from swashplate.reporting.theme import (
     stacked,
     unit_words,
 )
-from swashplate.simulation.modes import Mode
+from swashplate.simulation.linearize import Mode
 
 LAGS = 50
 """Samples of autocorrelation that are drawn."""

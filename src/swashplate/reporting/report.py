@@ -23,7 +23,7 @@ from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
-from swashplate.simulation.modes import Mode
+from swashplate.simulation.linearize import Mode
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from swashplate.errors import SwashError
 from swashplate.identification.core.sources import problem_words, scale_words
-from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
+from swashplate.identification.frequency.state_space_result import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
 from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import ResponseMaterial

@@ -10,7 +10,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.records import Comparison
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.estimators import GAINS
 from swashplate.identification.one_step import in_words, not_judged, one_step_effects

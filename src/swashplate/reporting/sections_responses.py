@@ -17,8 +17,7 @@ from swashplate.identification.frequency.mode_accuracy import ModeAccuracy
 from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, INDISTINGUISHABLE, Target
 from swashplate.identification.frequency.search_result import StructureSearch
-from swashplate.identification.frequency.state_space_result import StateSpaceFit
-from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
+from swashplate.identification.frequency.state_space_result import CR_TARGET, I_TARGET, StateSpaceFit
 from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit
 from swashplate.identification.frequency.transfer_function_forms import TriedStructure
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
@@ -31,7 +30,7 @@ from swashplate.reporting.structure import Block, Cell, Points, Section, Table, 
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
 from swashplate.reporting.words import value_words
-from swashplate.simulation.modes import Mode
+from swashplate.simulation.linearize import Mode
 from swashplate.validation.verification import Verification
 
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from swashplate.identification.core.result import Result
-from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.feedback import AxisExcitation
 from swashplate.reporting.figures_fit import correlation_matrix, eigenvalues
 from swashplate.reporting.structure import Block, Cell, Points, Row, Section, Table, Text, tabulate
 from swashplate.reporting.words import value_words
-from swashplate.simulation.modes import Mode
+from swashplate.simulation.linearize import Mode
 
 _SLOW = 1e-6
 

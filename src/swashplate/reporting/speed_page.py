@@ -25,8 +25,7 @@ from swashplate.reporting.theme import (
     unit_words,
 )
 from swashplate.simulation.derivatives_over_speed import Derivatives
-from swashplate.simulation.linearize import linearize
-from swashplate.simulation.modes import Mode
+from swashplate.simulation.linearize import Mode, linearize
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim_curve import TrimCurve
 

@@ -11,9 +11,8 @@ from swashplate.models.conventional.derivative_table import DerivativeTable, fac
 from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
 from swashplate.shown import Saved
-from swashplate.simulation.derivatives import derivative_table
+from swashplate.simulation.derivatives import CardSpread, derivative_table, spread
 from swashplate.simulation.trim import Trim
-from swashplate.simulation.uncertainty import CardSpread, spread
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

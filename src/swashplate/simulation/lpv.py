@@ -38,8 +38,8 @@ from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.reduction import PAPER_INPUTS, PAPER_STATES, paper_model
-from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim_curve import trims_over_speed
 
 Scheme = Literal["as-printed", "trim-term", "stitched"]
 

@@ -5,16 +5,44 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from swashplate.errors import SwashError
+from swashplate.errors import SwashError, TrimError
 from swashplate.models.doubts import doubts, shaft_power
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.public import resolve
 from swashplate.shown import Shown
-from swashplate.simulation.speeds import trims_over_speed
-from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim import Trim, trim
+
+
+def trims_over_speed(
+    vehicle: Vehicle,
+    speeds: Sequence[float],
+    *,
+    climb: float = 0.0,
+    turn: float = 0.0,
+    lateral: float = 0.0,
+    environment: Environment | None = None,
+) -> tuple[Trim, ...]:
+    """Trims at ascending speeds [m/s], each from the one before.
+
+    Raises:
+        TrimError: at the first speed that cannot be flown, with the limit that stops it.
+    """
+    trims: list[Trim] = []
+    for speed in speeds:
+        at = partial(
+            trim, vehicle, speed=float(speed), lateral=lateral, climb=climb, turn=turn, environment=environment
+        )
+        try:
+            trims.append(at(near=trims[-1] if trims else None))
+        except TrimError:
+            # A neighbour may lead astray where the trim curve bends; what fails afresh too, fails.
+            trims.append(at())
+    return tuple(trims)
+
 
 ENGINE = "engine_power"
 _IDLE = 1e-3

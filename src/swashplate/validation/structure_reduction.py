@@ -14,8 +14,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.frequency.mode_accuracy import ModeAccuracy
 from swashplate.identification.frequency.state_space_fit import fit_targets
-from swashplate.identification.frequency.state_space_result import ReductionStep, StateSpaceFit
-from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
+from swashplate.identification.frequency.state_space_result import CR_TARGET, I_TARGET, ReductionStep, StateSpaceFit
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.validation.refutation import REFUTED
 from swashplate.validation.verification import Verification

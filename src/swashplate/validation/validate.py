@@ -19,8 +19,7 @@ from swashplate.identification.core.result import Result
 from swashplate.identification.core.sources import sources_of
 from swashplate.identification.core.spans import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION
 from swashplate.identification.time.calibration import calibrate
-from swashplate.identification.time.feedback import excitation
-from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.feedback import AxisExcitation, excitation
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.card import packaged_cards
 from swashplate.models.catalogue import from_card

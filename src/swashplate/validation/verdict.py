@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.feedback import AxisExcitation
 from swashplate.validation.bands import SURE, Band
 from swashplate.validation.floors import Floor
 from swashplate.validation.validation import AxisVerdict, Score

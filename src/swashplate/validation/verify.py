@@ -18,8 +18,10 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.filters import filtered
-from swashplate.flights.excitation import excitations
+from swashplate.flights.excitation import excitations, of_inputs
+from swashplate.flights.feedback import share_of
 from swashplate.flights.flight import Flight, as_flights
+from swashplate.identification.core.record_facts import bystanders_of
 from swashplate.identification.core.records import uniform_table
 from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.identification.responses.response_warnings import damaged
@@ -31,9 +33,46 @@ from swashplate.validation.black_box import CROSSED, Ceiling
 from swashplate.validation.ceiling_along import ceiling_along
 from swashplate.validation.floors import Floor, floors
 from swashplate.validation.noise_filter import Piece
-from swashplate.validation.other_inputs import other_inputs
 from swashplate.validation.refutation import OPEN, REFUTED, Judgement, judge
 from swashplate.validation.verification import GOOD_TIC, OutputVerification, Trace, Verification
+
+MUCH = 0.3
+"""Share of what a model leaves from which an input that it does not have is named."""
+
+
+def other_inputs(
+    flights: Sequence[Flight], inputs: Sequence[str], errors: Mapping[str, Sequence[tuple[Array, Array]]]
+) -> dict[str, str]:
+    """By output, the inputs to add to a model, in words; outputs that no other input moved are left out.
+
+    An input that a controller moved is none: it answers the gusts that moved the output, too.
+
+    Args:
+        flights: at one rate, with all that was logged on the inputs' time base.
+        inputs: of the model.
+        errors: of the model by output, each as stamps [s] and values of stretches, in the flights' order.
+    """
+    others = bystanders_of(flights, (*inputs, *errors))
+    excitation = of_inputs(excitations(flights, others, outputs=tuple(errors))) if others else {}
+    explanations: dict[str, str] = {}
+    for output, stretches in errors.items():
+        movers = []
+        for name in (n for n in others if excitation[n].outside):
+            left = total = 0.0
+            for flight, (time, error) in zip(flights, stretches, strict=True):
+                command = np.interp(time, flight.time(name), flight.values(name))
+                share = share_of(error, command[:, None], float(time[1] - time[0]))
+                total += float(np.sum(error**2))
+                left += float(np.sum(error**2)) * (1.0 - max(np.nan_to_num(share), 0.0))
+            if total > 0.0 and 1.0 - left / total >= MUCH:
+                movers.append((1.0 - left / total, name))
+        if movers:
+            names = ", ".join(f"'{name}' ({100.0 * share:.0f} %)" for share, name in sorted(movers, reverse=True))
+            explanations[output] = (
+                f"of what the model leaves of {output}, other inputs explain much: {names}. Add them to it."
+            )
+    return explanations
+
 
 _WEIGHT = {"rad": np.degrees(1.0), "rad/s": np.degrees(1.0), "m/s": 1.0 / 0.3048, "m/s^2": 1.0 / 0.3048}
 """1 deg, 1 deg/s, 1 ft/s and 1 ft/s^2 weigh alike."""

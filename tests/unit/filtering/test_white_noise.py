@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from swashplate.filtering.riccati import steady_gain
-from swashplate.filtering.white_noise import STEP, gathered_noise, white_noise_gain
+from swashplate.filtering.riccati import STEP, gathered_noise, steady_gain, white_noise_gain
 
 A = np.array([[-0.7, 2.0, 0.0], [0.1, -4.0, 1.0], [0.0, -3.0, -80.0]])
 C = np.array([[1.0, 0.0, 0.0], [0.0, 9.81, 0.2]])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rolling import OFF_CENTRE
-from swashplate.identification.effect_test import EffectTest, chance_of, holm
+from swashplate.identification.one_step import EffectTest, chance_of, holm
 
 
 def test_chances_are_those_of_draws_about_zero() -> None:

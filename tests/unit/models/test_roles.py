@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.filtering.arriving_commands import motors
 from swashplate.filtering.disturbed_model import stochastic_model
+from swashplate.filtering.nuisance import motors
 from swashplate.models.traits import Role
 
 READINGS = ("x", "y", "z", "phi", "theta", "psi")

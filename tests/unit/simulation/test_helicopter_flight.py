@@ -21,10 +21,10 @@ from swashplate.physics.engine import RotorSpeed
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
 from swashplate.simulation.integrate import simulate
-from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.standing import at_rest, standing
 from swashplate.simulation.stepping import Stepping
 from swashplate.simulation.trim import Trim, trim
+from swashplate.simulation.trim_curve import trims_over_speed
 
 RAPTOR = vehicle("raptor50")
 

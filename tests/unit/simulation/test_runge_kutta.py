@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swashplate.simulation.runge_kutta import rk4_step
+from swashplate.simulation.discretisation import rk4_step
 
 
 def falling(x: float, w: float) -> float:

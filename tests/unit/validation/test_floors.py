@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.feedback import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.validation import block_bootstrap
 from swashplate.validation.black_box import LEAK, NO_INPUTS, FilteredMotion, ceiling, past_and_inputs

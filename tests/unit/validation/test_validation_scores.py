@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import multivariate_normal
 
-from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.feedback import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.validation.bands import Band
 from swashplate.validation.innovations import check, log_likelihood

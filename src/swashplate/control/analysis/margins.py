@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import ControllerError
-from swashplate.identification.frequency.handling import delay_words
-from swashplate.identification.responses.crossing_delays import crossing_delays
+from swashplate.identification.frequency.handling import crossing_delays, delay_words
 from swashplate.text_table import text_table
 
 _REFINED = 8

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swashplate.control.analysis.margins import Margins, margins
 from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.errors import ControllerError
-from swashplate.identification.responses.crossing_delays import crossing_delays
+from swashplate.identification.frequency.handling import crossing_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim

@@ -13,8 +13,7 @@ from swashplate.control.laws.autopilot import Autopilot
 from swashplate.errors import ControllerError
 from swashplate.flights.flight import Flight
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.batch import Batch
-from swashplate.simulation.closed_loop_batch import simulate_closed_loops
+from swashplate.simulation.closed_loop_batch import Batch, simulate_closed_loops
 from swashplate.simulation.trim import Trim
 
 _TRACKS = 60

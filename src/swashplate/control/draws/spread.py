@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError
-from swashplate.simulation.batch import Batch
+from swashplate.simulation.closed_loop_batch import Batch
 from swashplate.simulation.trim import Trim
 from swashplate.text_table import text_table
 

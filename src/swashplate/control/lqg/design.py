@@ -48,7 +48,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.discretisation import with_late_inputs, zero_order_hold
 from swashplate.simulation.linearize import LinearModel, linearize
-from swashplate.simulation.speeds import trims_over_speed
+from swashplate.simulation.trim_curve import trims_over_speed
 
 Holding = Literal["place", "speed"]
 HOLDINGS: tuple[Holding, ...] = ("place", "speed")

@@ -26,9 +26,9 @@ PARTS: Registry[type] = Registry(
     "result_parts",
     what="part of a result",
     own={
-        "record": "swashplate.identification.core.comparison:Comparison",
+        "record": "swashplate.identification.core.records:Comparison",
         "response": "swashplate.identification.frequency.response_cost:ResponseComparison",
-        "flight": "swashplate.identification.time.flight_details:FlightDetails",
+        "flight": "swashplate.identification.time.feedback:FlightDetails",
         "records in time": "swashplate.identification.time.record_fit:TimeDetails",
         "state-space responses": "swashplate.identification.frequency.state_space_result:StateSpaceDetails",
         "transfer functions": "swashplate.identification.frequency.transfer_function_fit:TransferFunctionDetails",

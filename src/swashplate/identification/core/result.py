@@ -15,9 +15,8 @@ from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.core.comparison import Compared, Comparison
-from swashplate.identification.core.draws import normal_within
-from swashplate.identification.core.posterior_draws import Posterior
+from swashplate.identification.core.posterior_draws import Posterior, normal_within
+from swashplate.identification.core.records import Compared, Comparison
 from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve

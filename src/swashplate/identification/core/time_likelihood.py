@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.records import Record
+from swashplate.identification.core.records import Comparison, Record
 
 Moved = tuple[NDArray[np.intp], Array, Array]
 """Places of entries (m,), errors of a record (n_t, n_outputs), their slopes by those entries (m, n_t, n_outputs)."""

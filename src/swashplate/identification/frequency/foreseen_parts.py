@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.identification.frequency.composed_start import TIED, from_relative
+from swashplate.identification.frequency.linear_start import TIED, from_relative
 from swashplate.identification.frequency.response_cost import Target, log_error
 from swashplate.identification.frequency.state_space_search import pairs_of
 from swashplate.identification.frequency.structure_score import hidden, robust, scatter, score

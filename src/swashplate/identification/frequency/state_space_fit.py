@@ -15,10 +15,9 @@ from swashplate.flights.excitation import OUTSIDE
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource, scale_words
 from swashplate.identification.estimators import Data, Question
-from swashplate.identification.frequency.composed_start import from_core
 from swashplate.identification.frequency.fit_accuracy import accuracy_of_fit
 from swashplate.identification.frequency.fitted_pairs import PairChoice
-from swashplate.identification.frequency.linear_start import other_starts
+from swashplate.identification.frequency.linear_start import from_core, other_starts
 from swashplate.identification.frequency.mode_accuracy import mode_accuracy
 from swashplate.identification.frequency.response_cost import (
     ACCEPTABLE,
@@ -27,9 +26,8 @@ from swashplate.identification.frequency.response_cost import (
     Target,
     followed,
 )
-from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit
+from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit, words
 from swashplate.identification.frequency.state_space_search import STARTED, best_below, better_start, pairs_of
-from swashplate.identification.frequency.state_space_words import words
 from swashplate.identification.frequency.structure_misfit import misfit_words
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 from swashplate.models.linear.linear_vehicle import structure_of

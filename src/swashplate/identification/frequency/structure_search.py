@@ -11,10 +11,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from swashplate.errors import IdentificationError
-from swashplate.identification.frequency.composed_start import from_core, from_relative
 from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.foreseen_parts import Foresight, worths
-from swashplate.identification.frequency.lacking_parts import parts_in
+from swashplate.identification.frequency.linear_start import from_core, from_relative
 from swashplate.identification.frequency.response_cost import ACCEPTABLE
 from swashplate.identification.frequency.search_candidates import (
     contains,
@@ -27,10 +26,10 @@ from swashplate.identification.frequency.search_candidates import (
     ranks,
     without,
 )
-from swashplate.identification.frequency.search_result import Contender, StructureSearch
-from swashplate.identification.frequency.search_words import reasons
+from swashplate.identification.frequency.search_result import Contender, StructureSearch, reasons
 from swashplate.identification.frequency.state_space_fit import fit_targets, silent
 from swashplate.identification.frequency.state_space_search import led, price_of
+from swashplate.identification.frequency.structure_misfit import parts_in
 from swashplate.identification.frequency.structure_score import spread_of, squared_misfit
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.composition import PREFIX, in_order

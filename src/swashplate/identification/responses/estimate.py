@@ -13,8 +13,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
 from swashplate.identification.responses.composite import composite
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.identification.responses.input_shares import own_shares
-from swashplate.identification.responses.multi_input import Conditioned, condition_spectra, random_error
+from swashplate.identification.responses.multi_input import Conditioned, condition_spectra, own_shares, random_error
 from swashplate.identification.responses.resolution import TWICED, first_guess, without
 from swashplate.identification.responses.shared_errors import SharedErrors
 from swashplate.identification.responses.spectra import Signals, SpectralMatrix, runs, spectral_matrix

@@ -18,11 +18,10 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import DELAYS, Nuisance
 from swashplate.identification.core import robust
-from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Free, Parameterization
-from swashplate.identification.core.records import Record, logs
+from swashplate.identification.core.records import Comparison, Record, logs
 from swashplate.identification.time.beginning import FilterNumbers, seen_at_start
 from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun
 from swashplate.identification.time.kinematics import PREDICTED, turned_rows

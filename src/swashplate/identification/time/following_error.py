@@ -25,9 +25,8 @@ from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import steady_gain
 from swashplate.identification.core import robust
-from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameters import Parameterization
-from swashplate.identification.core.records import Record
+from swashplate.identification.core.records import Comparison, Record
 from swashplate.identification.time.beginning import (
     FilterNumbers,
     FirstMotion,

@@ -15,7 +15,6 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core import accuracy, stopping
-from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.low_passed import (
     noise_too_small,
     refuse_lowpassed,
@@ -25,15 +24,15 @@ from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepE
 from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import APART, Estimate, Fitted, Result, correlation_of
-from swashplate.identification.core.scoring import Optimum, Solver, minimise
+from swashplate.identification.core.scoring import Optimum, Solver, minimise, minimise_over_valleys
 from swashplate.identification.core.sources import scale_words, sources_of
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time import feedback
 from swashplate.identification.time.belonging import unrelated
 from swashplate.identification.time.estimates import Found, constants, estimates_of, found_at
+from swashplate.identification.time.feedback import FlightDetails, moving_air
 from swashplate.identification.time.filter_error import SETTLING, FilterError
-from swashplate.identification.time.flight_details import FlightDetails, moving_air
 from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.linear_residual import (

@@ -9,12 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.arrays import IMAGINARY, Array
-from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel
 from swashplate.filtering.filter_code import RecordSeries, driving_rows
 from swashplate.filtering.following import COMPLEX_ARRAYS
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import Nuisance, commands_by, commands_moved
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.beginning import (
     Begun,

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.filtering.white_noise import white_noise_gain
+from swashplate.filtering.riccati import white_noise_gain
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.time_likelihood import NOTHING, SPREAD, gust_entries
 from swashplate.identification.time.linear_likelihood import Batch, OutputErrors

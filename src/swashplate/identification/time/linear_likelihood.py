@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.filtering.white_noise import STEP
+from swashplate.filtering.riccati import STEP
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.records import Record

@@ -17,10 +17,9 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import DELAYS, Nuisance
 from swashplate.identification.core import robust
-from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Parameterization
-from swashplate.identification.core.records import Record, logs
+from swashplate.identification.core.records import Comparison, Record, logs
 from swashplate.identification.time.beginning import FirstMotion
 from swashplate.identification.time.filter_error import parameter_entries
 from swashplate.identification.time.kinematics import PREDICTED

@@ -26,9 +26,8 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.multi_step import Horizon
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record
-from swashplate.identification.time.feedback import by_itself
+from swashplate.identification.time.feedback import AxisExcitation, by_itself
 from swashplate.identification.time.filter_error import FilterError
-from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.linear_residual import (
     LinearResidual,
     accelerations_along,
@@ -39,13 +38,13 @@ from swashplate.identification.time.linear_residual import (
     units_of,
     with_coefficients,
 )
-from swashplate.identification.time.residual_ahead import fit_ahead
-from swashplate.identification.time.residual_strength import (
+from swashplate.identification.time.residual_ahead import (
     BLOCK,
     LeftOutBlock,
     Physics,
     chosen_strength,
     enough_blocks,
+    fit_ahead,
     shrunk,
 )
 from swashplate.models.residual import coefficients, with_residual

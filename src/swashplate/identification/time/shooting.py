@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.filtering.arriving_commands import commands_by, commands_moved
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, StochasticModel
 from swashplate.filtering.filter_code import RecordSeries, driving_rows
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import Nuisance, commands_by, commands_moved
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.beginning import (
     Begun,

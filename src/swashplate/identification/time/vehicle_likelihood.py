@@ -15,8 +15,8 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, equations_of
 from swashplate.errors import IdentificationError
+from swashplate.filtering.riccati import STEP, white_noise_gain
 from swashplate.filtering.vehicle_filter import FORCES, Ran, VehicleFilter
-from swashplate.filtering.white_noise import STEP, white_noise_gain
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.parameters import Parameterization

@@ -13,7 +13,7 @@ from swashplate.api.monte_carlo import not_followed
 from swashplate.control.draws.spread import Limits, Spread, spread
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.batch import Batch
+from swashplate.simulation.closed_loop_batch import Batch
 from swashplate.simulation.trim import Trim
 
 SAMPLES, FLIGHTS = 40, 4

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.scoring import Solver, minimise
+from swashplate.identification.core.scoring import Solver, minimise, minimise_over_valleys
 
 PERIOD, DEEPEST = 1.2, 2.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swashplate.identification.design.powers import best_powers
+from swashplate.identification.design.information import best_powers
 
 NOTHING_KNOWN = np.diag([1e-9, 1e-9, 1.0])
 

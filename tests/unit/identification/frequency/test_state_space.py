@@ -16,7 +16,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.identification.core.result import Estimate, percent
 from swashplate.identification.frequency.start_values import at_flown_trim, from_linear_model, from_models
 from swashplate.identification.frequency.state_space_fit import fit_state_space
-from swashplate.identification.frequency.state_space_words import words
+from swashplate.identification.frequency.state_space_result import words
 from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.linearised_model import model_of

@@ -8,8 +8,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import IdentificationError
-from swashplate.identification.recursive.equation import coefficient_unit, regression_equation
-from swashplate.identification.recursive.model_equations import model_equations
+from swashplate.identification.recursive.equation import coefficient_unit, model_equations, regression_equation
 
 
 def test_an_equation_is_read() -> None:

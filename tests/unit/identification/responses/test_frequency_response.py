@@ -15,11 +15,9 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Event, Provenance
 from swashplate.identification.responses.composite import composite
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.identification.responses.input_shares import own_shares
-from swashplate.identification.responses.multi_input import SINGULAR, condition_spectra
-from swashplate.identification.responses.respond import respond
+from swashplate.identification.responses.multi_input import SINGULAR, condition_spectra, own_shares
+from swashplate.identification.responses.respond import choose_windows, respond
 from swashplate.identification.responses.spectra import Signals, spectral_matrix
-from swashplate.identification.responses.window_lengths import choose_windows
 
 RATE = 100.0
 

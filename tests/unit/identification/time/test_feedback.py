@@ -12,8 +12,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.feedback import ANSWER
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.records import POSE, Record, records
-from swashplate.identification.time.feedback import EXPLAINED, UNMOVED, excitation, mark_unmoved
-from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.feedback import EXPLAINED, UNMOVED, AxisExcitation, excitation, mark_unmoved
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.catalogue import vehicle
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from swashplate.filtering.disturbances import Noise
-from swashplate.identification.time.flight_details import moving_air
+from swashplate.identification.time.feedback import moving_air
 
 
 def test_a_fit_without_a_wind_says_where_gusts_tilted_the_aircraft() -> None:

@@ -14,11 +14,11 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import records
 from swashplate.identification.time import residual_fit
+from swashplate.identification.time.feedback import AxisExcitation
 from swashplate.identification.time.filter_error import FilterError
-from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.linear_residual import LinearResidual
+from swashplate.identification.time.residual_ahead import BLOCK
 from swashplate.identification.time.residual_fit import fit_residual
-from swashplate.identification.time.residual_strength import BLOCK
 
 
 def test_words_say_what_was_gained_and_where() -> None:

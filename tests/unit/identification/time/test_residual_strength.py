@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swashplate.arrays import Array
-from swashplate.identification.time import residual_strength
-from swashplate.identification.time.residual_strength import ALONE, LeftOutBlock, Physics, chosen_strength, shrunk
+from swashplate.identification.time import residual_ahead
+from swashplate.identification.time.residual_ahead import ALONE, LeftOutBlock, Physics, chosen_strength, shrunk
 
 K = 20
 """Coefficients."""
@@ -59,7 +59,7 @@ def test_gains_on_the_blocks_that_were_learnt_from_would_keep_chance(monkeypatch
     kept = 0
     for seed in range(10):
         told = blocks(np.zeros(K), seed=seed)
-        monkeypatch.setattr(residual_strength, "shrunk", lambda _, strength, physics, told=told: shrunk(told, strength))
+        monkeypatch.setattr(residual_ahead, "shrunk", lambda _, strength, physics, told=told: shrunk(told, strength))
         kept += np.isfinite(chosen_strength(told)[0])
     assert kept >= 5  # against one in twenty
 

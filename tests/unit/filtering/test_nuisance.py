@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swashplate.filtering.arriving_commands import commands_moved
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import Nuisance, commands_moved
 from swashplate.models.catalogue import vehicle
 
 COAX = vehicle("coax")

@@ -10,7 +10,7 @@ import pytest
 import swashplate as sp
 from swashplate.errors import SwashError
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.step_size import check_step, fastest_mode
+from swashplate.simulation.integrate import check_step, fastest_mode
 
 
 @pytest.fixture(scope="module")

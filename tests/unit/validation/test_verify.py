@@ -9,8 +9,7 @@ from scipy.signal import lfilter, lsim
 from swashplate.flights.flight import Flight, stream
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse
-from swashplate.validation.other_inputs import other_inputs
-from swashplate.validation.verify import verify
+from swashplate.validation.verify import other_inputs, verify
 
 ROLL = """
 kind = "state-space"
