@@ -55,6 +55,8 @@ _SLOW = 2.0 * np.pi * 0.2
 """rad/s: unstable modes below it are the attitude loop's or the pilot's, not the rate loop's."""
 _SHARES = {"P": np.geomspace(20.0, 0.02, 50), "D": np.array([0.2, 0.1, 0.05, 0.0]), "I": np.array([0.5, 0.25, 0.1])}
 """Shares: P of one over the steady rate, D of a tenth of P, I of the feed-forward or else of P / 5."""
+_FADED = np.array([1.5, 0.5])
+"""1/s, I over P that are tried too: a disturbance that lasts must fade although the steady rate is large."""
 _HELD = np.array([20.0, 8.0, 3.0, 1.0])
 """1/s, I over P where the integral of the rate holds the attitude (Rotorflight)."""
 _NEARLY = 0.9
@@ -181,6 +183,9 @@ def _told(f: LoopFigures) -> list[tuple[str, str]]:
         ("bandwidth [rad/s]", number(f.bandwidth)),
         ("disturbance rejection [rad/s]", number(f.rejection)),
         ("overshoot of a step [%]", number(f.overshoot, 100.0)),
+        ("largest disturbed rate [deg/s]", number(np.degrees(f.shaken))),
+        ("left of it after 2 s [deg/s]", number(np.degrees(f.left))),
+        ("gyro noise in command [s/rad]", number(f.noise)),
         ("coupling into other rates", number(f.coupling)),
     ]
 
@@ -276,13 +281,18 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
         middle = complex(loop.plant(np.array([_SLOW]))[0])
         one = float(np.sign((1j * middle).real or 1.0) / abs(middle))
     holds = loop.axis in ROTORFLIGHT  # no attitude loop stands behind its integral
-    tried = np.meshgrid(_SHARES["P"], _SHARES["D"], _HELD if holds else _SHARES["I"], indexing="ij")
-    share, slope, integral = (np.ravel(x) for x in tried)
+    ours = np.arange(_HELD.size if holds else _SHARES["I"].size + _FADED.size)
+    tried = np.meshgrid(_SHARES["P"], _SHARES["D"], ours, indexing="ij")
+    share, slope, which = (np.ravel(x) for x in tried)
     p: Array = one * share
+    of_one = _SHARES["I"][:, None] * (one if steady else 0.2 * p)
+    integral = (_HELD[:, None] * p if holds else np.concatenate([of_one * np.ones(p.size), _FADED[:, None] * p]))[
+        which, np.arange(p.size)
+    ]
     grid: dict[str, Array] = {
         "FF": np.full(p.size, one if steady else 0.0),
         "P": p,
-        "I": integral * (p if holds else one if steady else 0.2 * p),
+        "I": integral,
         "D": slope * 0.1 * p,
         **{name: np.full(p.size, value) for name, value in loop.filters.items()},
     }

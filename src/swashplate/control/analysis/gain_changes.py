@@ -15,6 +15,9 @@ _CHANGES = (
     ("bandwidth", "rad/s", 1.0, True, 0.05, True),
     ("disturbance rejection", "rad/s", 1.0, True, 0.05, True),
     ("overshoot of a step", "%", 100.0, False, 5.0, False),
+    ("largest answer to a disturbance", "deg/s", 180.0 / np.pi, False, 0.1, True),
+    ("left of a disturbance after 2 s", "deg/s", 180.0 / np.pi, False, 0.2, True),
+    ("noise of the gyro in the command", "s/rad", 1.0, False, 0.2, True),
     ("coupling", "", 1.0, False, 0.1, True),
 )
 
@@ -29,7 +32,7 @@ def gain_changes(flown: LoopFigures, suggested: LoopFigures) -> list[tuple[str, 
     changes = []
     columns = [
         (*(_or_any(r.value) for r in (f.margins.phase_margin, f.margins.gain_margin, f.margins.delay_margin)), f.peak,
-         f.bandwidth, f.rejection, f.overshoot, f.coupling)
+         f.bandwidth, f.rejection, f.overshoot, f.shaken, f.left, f.noise, f.coupling)
         for f in (flown, suggested)
     ]  # fmt: skip
     for (what, unit, scale, larger, least, relative), before, after in zip(_CHANGES, *columns, strict=True):

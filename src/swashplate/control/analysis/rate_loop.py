@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.rate_gain_names import short
-from swashplate.control.analysis.rate_loop_steps import stepped
+from swashplate.control.analysis.rate_loop_steps import DISTURBED, stepped
 from swashplate.identification.frequency.handling import ReadNumber, ResponseMargins, margins
 from swashplate.identification.frequency.handling_readings import model_margins
 from swashplate.identification.frequency.reading_accuracy import Fitted
@@ -30,6 +30,8 @@ _SLOWER = frozenset(("x", "y", "z", "u", "v", "w", "phi", "theta", "psi"))
 """States that a rate moves first of all: held, they leave what a rate settles at before they act."""
 _SETTLING, _SETTLED = 2.0, 0.25
 """Seconds after which a rate must be within this share of its steady value to be fed forward."""
+_LAST, _NOISY = 80, 2.0 * np.pi * 10.0
+"""Samples at the end that say what is left of a disturbance; rad/s above which a gyro's signal is noise."""
 HALF_POWER = 10.0 ** (-3.0 / 20.0)
 NAN = float("nan")
 
@@ -46,6 +48,9 @@ class LoopFigures:
             disturbance rejection bandwidth of ADS-79 (definition from memory). 0 where none is.
         overshoot: of the rate beyond a demand that steps at once, 1 is all of it; NaN where the loop is unstable or the
             model cannot be stepped.
+        shaken, left: rate after a step of a tenth of the command: the largest, and what the last 0.2 s of two seconds
+            still hold [rad/s]; NaN where the model cannot be stepped or the loop is unstable.
+        noise: largest gain from a noise of the gyro to the command above 10 Hz [command per rad/s].
         coupling: largest answer of another rate to this axis' demand, over the demand, with all axes' loops closed; NaN
             where the model has one axis.
     """
@@ -55,10 +60,13 @@ class LoopFigures:
     bandwidth: float
     rejection: float
     overshoot: float
+    shaken: float
+    left: float
+    noise: float
     coupling: float = NAN
 
 
-NO_FIGURES = LoopFigures(ResponseMargins(*[ReadNumber(NAN)] * 5), NAN, NAN, NAN, NAN)
+NO_FIGURES = LoopFigures(ResponseMargins(*[ReadNumber(NAN)] * 5), *[NAN] * 7)
 
 
 @dataclass(frozen=True)
@@ -119,21 +127,31 @@ class RateLoop:
         else:
             read = model_margins(self.fit, self.rate, self.command, omega, controller)
         follows = np.abs(plant * self.ahead(gains, omega) / (1.0 + loop))
-        overshoot = self.overshoots({name: np.array([value]) for name, value in short(gains).items()})
+        one = {name: np.array([value]) for name, value in short(gains).items()}
+        shaken = np.abs(self._answers(one, target=0.0, disturbance=DISTURBED)[:, 0])
         return LoopFigures(
             read,
             float(np.max(sensitivity)),
             _first_below(omega, follows, HALF_POWER),
             _first_above(omega, sensitivity, HALF_POWER),
-            float(overshoot[0]),
+            float(self.overshoots(one)[0]),
+            float(np.max(shaken)),
+            float(np.max(shaken[-_LAST:])),
+            float(np.max(np.abs(controller[omega >= _NOISY]))),
         )
 
     def overshoots(self, gains: Mapping[str, Array]) -> Array:
         """Of the rate beyond a step of the demand, for each of m sets of gains, shape (m,)."""
+        return np.asarray(np.maximum(0.0, self._answers(gains).max(axis=0) - 1.0))
+
+    def _answers(self, gains: Mapping[str, Array], *, target: float = 1.0, disturbance: float = 0.0) -> Array:
+        """The rate after a step of the demand and of the command, shape (n, m); NaN where nothing can be stepped."""
         if self.structure is None:
-            return np.full(max(np.size(v) for v in gains.values()), np.nan)
-        rate = stepped(self.structure, gains, self.rate, self.command, seconds=_SETTLING, gyro_filter=self.gyro_filter)
-        return np.asarray(np.maximum(0.0, rate.max(axis=0) - 1.0))
+            return np.full((1, max(np.size(v) for v in gains.values())), np.nan)
+        return stepped(
+            self.structure, gains, self.rate, self.command,
+            seconds=_SETTLING, gyro_filter=self.gyro_filter, target=target, disturbance=disturbance,
+        )  # fmt: skip
 
     @cached_property
     def steady(self) -> float:

@@ -26,6 +26,8 @@ from swashplate.shown import Shown
 
 RATE = 400.0
 """Hz: ArduPilot's loop."""
+DISTURBED = 0.1
+"""Of the command: the step of a disturbance."""
 _WILD = 50.0
 """A rate beyond so many times the target, or an answer that still grows: the loop is unstable."""
 
@@ -82,7 +84,7 @@ def rate_loop_steps(
     row = {name: np.array([value]) for name, value in k.items()}
     step = stepped(structure, row, rate, command, seconds=seconds, gyro_filter=gyro_filter)[:, 0]
     shaken = stepped(
-        structure, row, rate, command, seconds=seconds, gyro_filter=gyro_filter, target=0.0, disturbance=0.1
+        structure, row, rate, command, seconds=seconds, gyro_filter=gyro_filter, target=0.0, disturbance=DISTURBED
     )[:, 0]
     time = np.arange(step.size) / RATE
     stable = not _grows(step - step[-1]) and not _grows(shaken - shaken[-1])

@@ -155,3 +155,22 @@ def test_an_unstable_rate_gets_no_gains_but_a_reason() -> None:
     (slow,) = suggest_gains(structure("yaw").with_values({"Nr": 0.2}))
     assert "0.2 rad/s" in slow.words
     assert slow.parameters
+
+
+@pytest.mark.parametrize("flown_integral", [0.0446, 0.005])
+def test_a_disturbance_that_lasts_fades_and_what_becomes_worse_is_named_with_its_number(flown_integral: float) -> None:
+    """A hardly damped, quick yaw (a CoaX's): an integral of its feed-forward's size left 175 deg/s after two seconds."""
+    model = structure("yaw").with_values({"Nr": -1.0, "Nped": 870.0, "tau_yaw": 0.012})
+    own = {"P": 0.0297, "I": flown_integral, "D": 0.0, "FF": 0.0, "FLTT": 20.0, "FLTD": 20.0}
+    (yaw,) = suggest_gains(model, autopilot={f"ATC_RAT_YAW_{name}": value for name, value in own.items()})
+    before, after, steps = yaw.figures_flown, yaw.figures_suggested, yaw.steps()
+    assert yaw.parameters != yaw.flown
+    assert np.degrees(after.left) < 20.0
+    assert (after.left > 1.2 * before.left) == any(words.startswith("left of a disturbance") for words in yaw.costs)
+    assert any(words.startswith("left of a disturbance") for words in yaw.costs) == (flown_integral == 0.0446)
+    assert after.noise > before.noise
+    assert any(words.startswith("noise of the gyro in the command") for words in yaw.costs)
+    for figures, name in ((before, "flown"), (after, "suggested")):
+        shaken = np.abs(steps[name].disturbance)
+        assert figures.shaken == pytest.approx(shaken.max())
+        assert figures.left == pytest.approx(shaken[-80:].max())

@@ -8,9 +8,9 @@ const LEAST = { phase_margin: 45, gain_margin: 6 }; // what every suggestion kee
 const ROWS = [
   ["phase margin [deg]", "phase_margin", 1], ["gain margin [dB]", "gain_margin", 1], ["delay margin [ms]", "delay_margin", 1e3], ["crossover [rad/s]", "crossover", 1],
   ["largest sensitivity", "peak", 1], ["bandwidth [rad/s]", "bandwidth", 1], ["disturbance rejection [rad/s]", "rejection", 1], ["overshoot of a step [%]", "overshoot", 100],
-  ["left of a disturbance after 2 s [deg/s]", "left", 180 / Math.PI],
+  ["largest answer to a disturbance [deg/s]", "shaken", 180 / Math.PI], ["left of a disturbance after 2 s [deg/s]", "left", 180 / Math.PI],
+  ["noise of the gyro in the command [s/rad]", "noise", 1],
 ];
-const LASTING = 1.2; // times as much left of a disturbance as flown: that is said
 
 const digits = (value) => (value === null || value === undefined ? "–" : String(+(+value).toPrecision(4)));
 
@@ -74,7 +74,6 @@ export function gains(home, axis) {
   const of = axis.loop;
   const has = (which) => axis.gains.some((gain) => gain[which] !== null);
   const worth = { flown: has("flown") ? figures(of, loopOf(axis, axis.gains.map((g) => g.flown))) : null, suggested: has("suggested") ? figures(of, loopOf(axis, axis.gains.map((g) => g.suggested))) : null };
-  const slower = worth.flown?.left && worth.suggested?.left > LASTING * worth.flown.left ? ` A lasting disturbance fades more slowly than flown: ${short((worth.suggested.left * 180) / Math.PI)} deg/s are left after 2 s, ${short((worth.flown.left * 180) / Math.PI)} flown. More I takes it away.` : "";
   const cell = (content, strong = false) => make("td", { class: "number" }, strong ? make("b", {}, content) : content);
   const shown = [], sentence = make("p", { class: "verdict", role: "status" }), table = make("table", { class: "gains" });
   const mineRead = ROWS.map(() => make("td", { class: "number" }));
@@ -119,7 +118,7 @@ export function gains(home, axis) {
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   } }, axis.cli ? "My gains (CLI)" : "My gains (.param)");
   const pictures = make("div", {});
-  home.append(make("p", { class: "why" }, axis.words + slower), table, make("div", { class: "bar" }, has("suggested") && back("Mine = suggested", "suggested") || "", has("flown") && back("Mine = flown", "flown") || "", away), sentence, pictures);
+  home.append(make("p", { class: "why" }, axis.words), table, make("div", { class: "bar" }, has("suggested") && back("Mine = suggested", "suggested") || "", has("flown") && back("Mine = flown", "flown") || "", away), sentence, pictures);
   const step = make("div", {}), plane = make("div", {}), plots = [];
   pictures.append(step, plane);
   let waiting = 0;

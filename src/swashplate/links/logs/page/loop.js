@@ -160,7 +160,9 @@ export function figures(of, k) {
     bandwidth: below < 0 ? Infinity : below > 0 ? omega[below] : 0,
     rejection: above < 0 ? Infinity : above > 0 ? omega[above] : 0,
     overshoot: step ? Math.max(0, Math.max(...step) - 1) : NaN,
-    left: shaken ? Math.abs(shaken.at(-1)) : NaN,
+    shaken: shaken ? Math.max(...shaken.map(Math.abs)) : NaN,
+    left: shaken ? Math.max(...shaken.slice(-80).map(Math.abs)) : NaN,
+    noise: Math.max(...omega.filter((w) => w >= TURN * 10).map((w) => size(controller(k, w, gyro)))),
     stable: step ? !grows(step) && !grows(shaken) : null,
   };
 }
@@ -170,7 +172,8 @@ const CHANGES = [
   ["phase margin", "phase_margin", "deg", 1, true, 3, false], ["gain margin", "gain_margin", "dB", 1, true, 0.5, false],
   ["delay margin", "delay_margin", "ms", 1e3, true, 0.05, true], ["largest sensitivity", "peak", "", 1, false, 0.05, true],
   ["bandwidth", "bandwidth", "rad/s", 1, true, 0.05, true], ["disturbance rejection", "rejection", "rad/s", 1, true, 0.05, true],
-  ["overshoot of a step", "overshoot", "%", 100, false, 5, false],
+  ["overshoot of a step", "overshoot", "%", 100, false, 5, false], ["largest answer to a disturbance", "shaken", "deg/s", 180 / Math.PI, false, 0.1, true],
+  ["left of a disturbance after 2 s", "left", "deg/s", 180 / Math.PI, false, 0.2, true], ["noise of the gyro in the command", "noise", "s/rad", 1, false, 0.2, true],
 ];
 
 // What differs from one set of gains to another by more than it matters: words, and whether it is better.
