@@ -87,8 +87,8 @@ def test_figures_and_answers_are_pythons(case: str, page: Any) -> None:
         expected = {
             "crossover": read.crossover.value, "phase_margin": read.phase_margin.value,
             "gain_margin": read.gain_margin.value, "delay_margin": read.delay_margin.value, "peak": right.peak,
-            "bandwidth": right.bandwidth, "rejection": right.rejection, "overshoot": right.overshoot, "shaken": right.shaken, "left": right.left,
-            "noise": right.noise,
+            "bandwidth": right.bandwidth, "rejection": right.rejection, "overshoot": right.overshoot,
+            "shaken": right.shaken, "left": right.left, "noise": right.noise,
         }  # fmt: skip
         for name, value in expected.items():
             assert made[name] == pytest.approx(value, rel=CLOSE, abs=CLOSE, nan_ok=True), (name, gains)

@@ -9,7 +9,7 @@ from swashplate.control.analysis.rate_gain_names import ARDUPILOT
 from swashplate.errors import SwashError
 from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.validation.refutation import REFUTED, Judgement
+from swashplate.validation.refutation import REFUTED
 from swashplate.validation.verification import Verification
 
 
@@ -26,12 +26,12 @@ def suggest_gains(
     Args:
         fit: of transfer functions or of a state-space model.
         responses: that it was fitted to; they remember their logs' channels and parameters.
-        unseen: how the model follows flights that it was not fitted to.
+        unseen: how the model follows flights; those that the fit has seen are told apart (`fitted_sources`).
 
     Raises:
         SwashError: no axis joins a rate with its mixer command.
     """
-    settings, refuted = responses.settings, "" if unseen is None else _refuted(unseen.judgement)
+    settings, refuted = responses.settings, "" if unseen is None else _refuted(unseen)
     suggestions = ardupilot_gains.suggest_gains(
         fit,
         autopilot=settings.get("autopilot"),
@@ -48,8 +48,10 @@ def suggest_gains(
     return suggestions
 
 
-def _refuted(judgement: Judgement | None) -> str:
-    """That flights which the model was not fitted to refute it. "" where they do not, or were not asked."""
+def _refuted(verification: Verification) -> str:
+    """That the flights that the model was flown along refute it, and which they are. "" where they do not."""
+    judgement = verification.judgement
     if judgement is None or judgement.verdict != REFUTED:
         return ""
-    return f"the held-out flight refutes the model: {' '.join(judgement.reasons)} Do not use it for gains."
+    whose = "the fit's own flight (NOT a held-out one)" if verification.fitted_sources else "the held-out flight"
+    return f"{whose} refutes the model: {' '.join(judgement.reasons)} Do not use it for gains."

@@ -113,7 +113,7 @@ _PIECE = re.compile(r"(?P<source>.+) (?P<start>-?[\d.]+)-(?P<stop>-?[\d.]+) s")
 
 
 def marked(verification: Verification, sources: Sequence[str]) -> Verification:
-    """The verification, with a warning where a stretch lies in what the fit was made from.
+    """The verification, with what of it lies in what the fit was made from, and a warning of that.
 
     Args:
         sources: names of the fit's records, "log 3.00-9.00 s" each.
@@ -131,4 +131,4 @@ def marked(verification: Verification, sources: Sequence[str]) -> Verification:
     if not used:
         return verification
     words = f"NOT A HOLD-OUT: the fit has seen {', '.join(used)}."
-    return replace(verification, warnings=(words, *verification.warnings))
+    return replace(verification, warnings=(words, *verification.warnings), fitted_sources=tuple(used))

@@ -71,7 +71,7 @@ def _title(m: ResponseMaterial) -> str:
 
 def _banners(m: ResponseMaterial) -> tuple[tuple[str, str], ...]:
     banners = []
-    if m.verification and any("NOT A HOLD-OUT" in text for text in m.verification.warnings):
+    if m.verification and m.verification.fitted_sources:
         banners.append(("caution", "NOT A HOLD-OUT: the fit has seen the records that are shown."))
     if m.verification and any(one.simulated for one in m.verification.data):
         banners.append(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."))

@@ -41,9 +41,7 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
         )
     blocks.append(
         tabulate(
-            "Along records of the fit"
-            if any("NOT A HOLD-OUT" in text for text in v.warnings)
-            else "Along unseen records",
+            "Along records of the fit" if v.fitted_sources else "Along unseen records",
             ("output", "unit", "rms error", "Theil", "fit %"),
             rows,
             note=f"Theil's coefficient up to {GOOD_TIC:g} is good (1: of no use). Biases and shifts are solved for per "

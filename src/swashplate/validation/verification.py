@@ -63,6 +63,7 @@ class Verification(Shown):
         constants, samples: numbers solved for, and numbers compared.
         floors: what the fits stand beside, by output.
         inputs: names of the model's inputs, in the order of the traces'. units: of inputs and outputs, by name.
+        fitted_sources: sources of stretches that the fit has seen: no hold-out.
     """
 
     model: StateSpaceModel | Vehicle
@@ -80,6 +81,7 @@ class Verification(Shown):
     floors: tuple[Floor, ...] = ()
     inputs: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    fitted_sources: tuple[str, ...] = ()
 
     @property
     def good(self) -> bool:

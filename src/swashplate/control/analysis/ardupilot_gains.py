@@ -281,14 +281,13 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
         middle = complex(loop.plant(np.array([_SLOW]))[0])
         one = float(np.sign((1j * middle).real or 1.0) / abs(middle))
     holds = loop.axis in ROTORFLIGHT  # no attitude loop stands behind its integral
-    ours = np.arange(_HELD.size if holds else _SHARES["I"].size + _FADED.size)
+    ours = np.arange(float(_HELD.size if holds else _SHARES["I"].size + _FADED.size))
     tried = np.meshgrid(_SHARES["P"], _SHARES["D"], ours, indexing="ij")
-    share, slope, which = (np.ravel(x) for x in tried)
+    share, slope, which = (np.ravel(np.asarray(x, dtype=np.float64)) for x in tried)
     p: Array = one * share
-    of_one = _SHARES["I"][:, None] * (one if steady else 0.2 * p)
-    integral = (_HELD[:, None] * p if holds else np.concatenate([of_one * np.ones(p.size), _FADED[:, None] * p]))[
-        which, np.arange(p.size)
-    ]
+    of_one = _SHARES["I"][:, None] * (one if steady else 0.2 * p) * np.ones(p.size)
+    rows = _HELD[:, None] * p if holds else np.concatenate([of_one, _FADED[:, None] * p])
+    integral: Array = np.asarray(rows[which.astype(np.int64), np.arange(p.size)], dtype=np.float64)
     grid: dict[str, Array] = {
         "FF": np.full(p.size, one if steady else 0.0),
         "P": p,

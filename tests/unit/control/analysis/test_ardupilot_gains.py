@@ -158,8 +158,8 @@ def test_an_unstable_rate_gets_no_gains_but_a_reason() -> None:
 
 
 @pytest.mark.parametrize("flown_integral", [0.0446, 0.005])
-def test_a_disturbance_that_lasts_fades_and_what_becomes_worse_is_named_with_its_number(flown_integral: float) -> None:
-    """A hardly damped, quick yaw (a CoaX's): an integral of its feed-forward's size left 175 deg/s after two seconds."""
+def test_a_disturbance_that_lasts_fades_and_what_becomes_worse_is_named(flown_integral: float) -> None:
+    """A hardly damped, quick yaw (a CoaX's): an integral of the feed-forward's size left 175 deg/s after 2 s."""
     model = structure("yaw").with_values({"Nr": -1.0, "Nped": 870.0, "tau_yaw": 0.012})
     own = {"P": 0.0297, "I": flown_integral, "D": 0.0, "FF": 0.0, "FLTT": 20.0, "FLTD": 20.0}
     (yaw,) = suggest_gains(model, autopilot={f"ATC_RAT_YAW_{name}": value for name, value in own.items()})

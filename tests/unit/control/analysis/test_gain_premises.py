@@ -127,12 +127,18 @@ def test_a_controllers_answer_gets_none_even_where_it_is_called_a_sweep() -> Non
 
 
 @pytest.mark.parametrize("verdict", [REFUTED, STANDS, OPEN])
-def test_a_flight_that_was_held_out_and_refutes_the_model_gives_none(verdict: str) -> None:
+@pytest.mark.parametrize("seen", [(), ("sweep.csv 1.00-8.00 s",)])
+def test_a_flight_that_refutes_the_model_gives_none_and_is_called_held_out_only_where_it_was(
+    verdict: str, seen: tuple[str, ...]
+) -> None:
     responses = measured(plant())
     fit = fit_transfer_function(responses, "0/2", input="mixer_roll")
-    seen: Any = SimpleNamespace(judgement=Judgement(verdict, ("p misses by 40 % of the motion.",)))
-    (roll,) = sp.suggest_gains(fit, responses, unseen=seen)
-    told = "the held-out flight refutes the model: p misses by 40 % of the motion." in roll.refused
+    along: Any = SimpleNamespace(
+        judgement=Judgement(verdict, ("p misses by 40 % of the motion.",)), fitted_sources=seen
+    )
+    (roll,) = sp.suggest_gains(fit, responses, unseen=along)
+    whose = "the fit's own flight (NOT a held-out one)" if seen else "the held-out flight"
+    told = f"{whose} refutes the model: p misses by 40 % of the motion." in roll.refused
     assert told == (roll.parameters == {}) == (verdict == REFUTED)
 
 
