@@ -23,19 +23,10 @@ _START = 120.0
 """s that a worker may take for its first file of a kind: it imports, and makes the whole files."""
 _LOT = 4.0
 """s of work that is handed out at once."""
-ABOUT = {
-    "files": (
-        "Siege: damaged files and documents",
-        "Bytes are cut, doubled, exchanged, overwritten by odd numbers; documents have entries left out, renamed, of "
-        "another type, huge, not finite, nested; HDF5 and MATLAB files are written whole with odd shapes and numbers.",
-    ),
-    "forged": (
-        "Siege: forged containers",
-        "Records are left out, doubled, exchanged and changed inside, and all lengths and checksums around them put "
-        "right again; SQLite writes its own tables with odd values.",
-    ),
-}
-"""By campaign: title of its section, and what is done to the files."""
+_DONE = (
+    "Bytes are cut, doubled, exchanged, overwritten by odd numbers; documents have entries left out, renamed, of "
+    "another type, huge, not finite, nested; HDF5 and MATLAB files are written whole with odd shapes and numbers."
+)
 _MOST = 0.15
 """Part of all files that one kind may have: lines of text are read a thousand times quicker than logs."""
 
@@ -108,7 +99,6 @@ class Files:
         workers: processes at a time.
         seed: of the first file of each kind.
         kept: where the counts are kept, so that a stopped campaign goes on; what fell is tried again then. None: no.
-        about: title of the section, and what is done to the files.
     """
 
     def __init__(
@@ -120,9 +110,7 @@ class Files:
         workers: int = 2,
         seed: int = 0,
         kept: Path | None = None,
-        about: tuple[str, str] | None = None,
     ) -> None:
-        self._about = about or ABOUT["files"]
         self._names, self._files, self._workers, self._kept = names, files, workers, kept
         self._until = time.monotonic() + seconds
         self._next = dict.fromkeys(names, seed)
@@ -282,9 +270,9 @@ class Files:
         rows = [[n, self.counts[n].total(), *(self.counts[n][kind] for kind in kinds)] for n in self._names]
         total = sum(row[1] for row in rows)
         return Found(
-            title=self._about[0],
+            title="Siege: damaged files and documents",
             text=f"{total:,} files in {seconds / 60:.1f} minutes ({total / max(seconds, 1e-9):.0f} a second). "
-            f"{self._about[1]} Each is read in a process that is watched from outside, with 4 GB of memory. Other "
+            f"{_DONE} Each is read in a process that is watched from outside, with 4 GB of memory. Other "
             "ends: what is no flight, no object and no error of swashplate's of at most 2,000 characters.",
             columns=[*columns, "hangs above 10 s", "dead processes"],
             rows=[*rows, ["all", *(sum(row[k] for row in rows) for k in range(1, 8))]],
@@ -294,9 +282,9 @@ class Files:
 
 def mutant(name: str, seed: int, path: Path) -> Path:
     """Writes the damaged file of a seed, to look at it."""
-    from .targets import FORGED, TARGETS
+    from .targets import TARGETS
 
-    target = {**TARGETS, **FORGED}[name]()
+    target = TARGETS[name]()
     place = path.with_suffix(target.suffix) if target.suffix else path
     place.write_bytes(target.mutant(random.Random(f"{name} {seed}")))
     return place

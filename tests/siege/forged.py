@@ -6,15 +6,14 @@ and wrong inside: records left out, doubled, exchanged, and odd numbers in them.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import random
 import sqlite3
 import struct
-import tempfile
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from mutations import mutated
 
@@ -234,38 +233,52 @@ _SQL_WORDS = (
 
 
 def by_sqlite(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
-    """Tables with odd values, rows and columns, written by SQLite itself."""
-    with tempfile.TemporaryDirectory() as name:
-        path = Path(name) / "a.db3"
-        path.write_bytes(chance.choice(whole))
-        opened = sqlite3.connect(path)
+    """Tables with odd values, rows and columns, and views in their place, written by SQLite itself."""
+    with contextlib.closing(sqlite3.connect(":memory:")) as opened:
+        opened.deserialize(chance.choice(whole))
         for _ in range(chance.choice((1, 1, 2, 4))):
-            tables = [row[0] for row in opened.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
-            if not tables:
-                break
-            table = chance.choice(tables)
-            columns = [row[1] for row in opened.execute(f"PRAGMA table_info({table})")]
-            column = chance.choice(columns)
-            number = chance.choice((*ODD_NUMBERS, *_SQL_WORDS))
-            word = f"{number if not isinstance(number, int) else min(number, (1 << 63) - 1)}"
-            where = chance.choice(("", " WHERE rowid = 1", " WHERE rowid % 7 = 3"))
-            sentence = chance.choice(
-                (
-                    f"UPDATE {table} SET {column} = {word}{where}",
-                    f"DELETE FROM {table}{where}",
-                    f"ALTER TABLE {table} RENAME COLUMN {column} TO other",
-                    f"DROP TABLE {table}",
-                    f"INSERT INTO {table} SELECT * FROM {table} LIMIT 3",
-                    f"INSERT INTO {table} ({column}) VALUES ({word})",
-                )
-            )
-            try:
-                opened.execute(sentence)
-            except sqlite3.Error:
-                continue
+            _change_tables(opened, chance)
         opened.commit()
-        opened.close()
-        return path.read_bytes()
+        return opened.serialize()
+
+
+def _change_tables(opened: sqlite3.Connection, chance: random.Random) -> None:
+    tables = [row[0] for row in opened.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+    if not tables:
+        return
+    table = chance.choice(tables)
+    column = chance.choice([row[1] for row in opened.execute(f"PRAGMA table_info({table})")])
+    number = chance.choice((*ODD_NUMBERS, *_SQL_WORDS))
+    word = f"{number if not isinstance(number, int) else min(number, (1 << 63) - 1)}"
+    where = chance.choice(("", " WHERE rowid = 1", " WHERE rowid % 7 = 3"))
+    sentence = chance.choice(
+        (
+            f"UPDATE {table} SET {column} = {word}{where}",
+            f"DELETE FROM {table}{where}",
+            f"ALTER TABLE {table} RENAME COLUMN {column} TO other",
+            f"DROP TABLE {table}",
+            f"INSERT INTO {table} SELECT * FROM {table} LIMIT 3",
+            f"INSERT INTO {table} ({column}) VALUES ({word})",
+            f"ALTER TABLE {table} RENAME TO kept; CREATE VIEW {table} AS SELECT * FROM kept UNION SELECT * FROM kept",
+        )
+    )
+    with contextlib.suppress(sqlite3.Error):
+        for one in sentence.split("; "):
+            opened.execute(one)
+
+
+def by_packed(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
+    """A MATLAB file with a variable that is unpacked, changed and packed again."""
+    content = chance.choice(whole)
+    at, elements = 128, []
+    while at + 8 <= len(content):
+        kind, size = struct.unpack_from("<II", content, at)
+        elements.append((kind, content[at + 8 : at + 8 + size]))
+        at += 8 + size
+    k = chance.randrange(len(elements))
+    inside = damaged(zlib.decompress(elements[k][1]), chance)
+    elements[k] = (elements[k][0], zlib.compress(inside, 1))
+    return content[:128] + b"".join(struct.pack("<II", kind, len(data)) + data for kind, data in elements)
 
 
 def by_header_lines(whole: tuple[bytes, ...], chance: random.Random) -> bytes:

@@ -40,12 +40,12 @@ def _use_campaign(path: Path) -> None:
     plan_campaign(path)
 
 
-def _result(ending: str) -> bytes:
+def stored_result(ending: str) -> bytes:
     table = {"seed": np.arange(4), "verdict": np.array(["found", "lost"] * 2), "tau": np.linspace(0.0, 1.0, 4)}
     return packed(table, ending=ending, task="task")
 
 
-def _use_result(path: Path) -> None:
+def use_result(path: Path) -> None:
     folder = path.parent / f"store{path.suffix}"
     (folder / RESULTS).mkdir(parents=True, exist_ok=True)
     (folder / RESULTS / f"task{path.suffix}").write_bytes(path.read_bytes())
@@ -77,6 +77,6 @@ MORE: Mapping[str, Callable[[], Target]] = {
     "published derivatives": _of(".csv", lambda: PUBLISHED, read_published),
     "campaign": _of(".toml", lambda: (CAMPAIGN.encode(),), _use_campaign),
     "plan of a campaign": _of(".json", lambda: (_plan(),), _use_plan),
-    "result of a task": _of(PARQUET, lambda: (_result(PARQUET),), _use_result),
-    "result of a task without the extra": _of(NUMPY, lambda: (_result(NUMPY),), _use_result),
+    "result of a task": _of(PARQUET, lambda: (stored_result(PARQUET),), use_result),
+    "result of a task without the extra": _of(NUMPY, lambda: (stored_result(NUMPY),), use_result),
 }

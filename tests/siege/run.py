@@ -4,7 +4,7 @@
 
 Campaigns: `files` (damaged logs and documents), `kills` (hard kills, and disks that break), `disks` (a small disk that
 is full or read-only, mounted for it), `places` (paths that are no file), `packets` (everything that listens), `pages`
-(hostile pages), `forged` (containers built by rule), `neighbours` (other users of the machine), `small` (machines with
+(hostile pages), `fuzz` (containers), `neighbours` (other users of the machine), `small` (machines with
 little of everything). Each ends at its number or at its share of the minutes, whichever is first, and the page says
 what was reached. Exit code 1 where anything fell. `make proof` leaves the section as it is.
 
@@ -28,7 +28,7 @@ from tests import proof
 
 ROOT = proof.ROOT
 FOLDER = ROOT / "build" / "siege"
-_SHARES = {"files": 0.35, "forged": 0.15, "kills": 0.3, "disks": 0.05, "places": 0.04, "packets": 0.07, "pages": 0.02}
+_SHARES = {"files": 0.35, "fuzz": 0.15, "kills": 0.3, "disks": 0.05, "places": 0.04, "packets": 0.07, "pages": 0.02}
 SHARES = _SHARES | {"neighbours": 0.01, "small": 0.1}
 """Of the minutes; disks, places, pages and neighbours take what they take."""
 _LEAST = 120.0
@@ -38,24 +38,32 @@ _LEAST = 120.0
 def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[dict[str, object]]]]:
     """What runs, by name, from its seconds to sections of the page."""
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
-    from tests.siege import disks, files, kills, neighbours, packets, pages, places, small
-    from tests.siege.targets import FORGED, TARGETS
+    from tests.siege import disks, files, fuzz, kills, neighbours, packets, pages, places, small
+    from tests.siege.containers import CONTAINERS
+    from tests.siege.targets import TARGETS
 
     def besiege_files(seconds: float) -> list[dict[str, object]]:
-        return read_by_workers(list(TARGETS), "files", chosen.files, seconds)
-
-    def besiege_forged(seconds: float) -> list[dict[str, object]]:
-        return read_by_workers(list(FORGED), "forged", chosen.forged * len(FORGED), seconds)
-
-    def read_by_workers(names: list[str], campaign: str, count: int, seconds: float) -> list[dict[str, object]]:
         siege = files.Files(
-            names,
-            files=count,
+            list(TARGETS),
+            files=chosen.files,
             seconds=seconds,
             workers=chosen.workers,
             seed=chosen.seed,
-            kept=FOLDER / f"{campaign}.kept",
-            about=files.ABOUT[campaign],
+            kept=FOLDER / "files.kept",
+        )
+        return [siege.run().as_dict()]
+
+    def besiege_containers(seconds: float) -> list[dict[str, object]]:
+        if not chosen.resume:
+            (FOLDER / "fuzz" / "counts.json").unlink(missing_ok=True)
+        workers, seed = chosen.workers, chosen.seed
+        siege = fuzz.Fuzz(
+            list(CONTAINERS),
+            inputs=chosen.inputs,
+            seconds=seconds,
+            folder=FOLDER / "fuzz",
+            workers=workers,
+            seed=seed,
         )
         return [siege.run().as_dict()]
 
@@ -90,7 +98,7 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
 
     return {
         "files": besiege_files,
-        "forged": besiege_forged,
+        "fuzz": besiege_containers,
         "kills": besiege_writers,
         "disks": besiege_disks,
         "places": besiege_places,
@@ -128,7 +136,7 @@ def siege_section(folder: Path, page: str) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description="Besiege the program and write what came out into docs/proof.md.")
     parser.add_argument("--files", type=int, default=1_000_000, help="damaged files and documents")
-    parser.add_argument("--forged", type=int, default=1_000_000, help="forged containers for each reader")
+    parser.add_argument("--inputs", type=int, default=1_000_000, help="fuzzed inputs for each container")
     parser.add_argument("--kills", type=int, default=1_000, help="hard kills of commands that write")
     parser.add_argument("--failures", type=int, default=500, help="runs on full and broken disks")
     parser.add_argument("--packets", type=int, default=1_000_000, help="mutated packets for each link")

@@ -37,8 +37,6 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.links.servos import servo_mapping
 from swashplate.models.linear.expressions import parse_tie
 
-from . import forged
-from .forged import by_records
 from .more_targets import MORE
 from .target import Target, Use, by_bytes, by_entries, by_hdf5, by_matlab
 
@@ -99,13 +97,17 @@ def _written(name: str, write: Callable[[Path], object]) -> bytes:
         return (Path(folder) / name).read_bytes()
 
 
-def _growing(path: Path) -> None:
+def growing_file(*, rows: int = 200) -> bytes:
+    return _written("a.growing", lambda path: _growing(path, rows=rows))
+
+
+def _growing(path: Path, *, rows: int) -> None:
     flight = _flight()
     motion = flight.streams["motion"]
     empty = Flight({"motion": motion.isel(time=slice(0, 0))}, flight.provenance, flight.history)
     names = [str(name) for name in motion.data_vars]
     with Growing(path, like=empty) as file:
-        for t, row in zip(flight.time("p"), flight.array(names), strict=True):
+        for t, row in zip(flight.time("p")[:rows], flight.array(names)[:rows], strict=True):
             file.append(float(t), row)
 
 
@@ -251,8 +253,8 @@ def _texts(whole: tuple[bytes, ...], read: Callable[[str], object]) -> Callable[
     return lambda: Target(".txt", whole, by_bytes, _line(read))
 
 
-def _saved_mat(compressed: bool) -> bytes:
-    return _written("a.mat", lambda path: made_logs.write_coax(path, compressed=compressed, n=40))
+def saved_mat(*, compressed: bool, n: int = 40) -> bytes:
+    return _written("a.mat", lambda path: made_logs.write_coax(path, compressed=compressed, n=n))
 
 
 TARGETS: Mapping[str, Callable[[], Target]] = {
@@ -264,11 +266,11 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     ),
     "PX4 ULog": _logs(lambda: (made_autopilot_logs.ulog(15), made_autopilot_logs.ulog(15, dropout=True)), ".ulg"),
     "Blackbox log": _logs(_blackbox, ".bbl"),
-    "ROS bag, first form": _logs(lambda: _bags(1), ".bag"),
-    "ROS bag, second form": lambda: Target("", _bags(2), by_bytes, _look_at_bag),
-    "CoaX .mat": _logs(lambda: (_saved_mat(True), _saved_mat(False)), ".mat", by_matlab),
+    "ROS bag, first form": _logs(lambda: bags(1), ".bag"),
+    "ROS bag, second form": lambda: Target("", bags(2), by_bytes, look_at_bag),
+    "CoaX .mat": _logs(lambda: (saved_mat(compressed=True), saved_mat(compressed=False)), ".mat", by_matlab),
     "netCDF flight": _logs(lambda: (_written("a.nc", _flight().save),), ".nc", by_hdf5),
-    "growing recording": _logs(lambda: (_written("a.growing", _growing),), ".growing"),
+    "growing recording": _logs(lambda: (growing_file(),), ".growing"),
     "NanoBench CSV": _logs(lambda: (_nanobench(),), ".csv"),
     "Vicon export": _logs(lambda: (made_logs.vicon(VICON_ROWS).encode(),), ".csv"),
     "OptiTrack export": _logs(lambda: (made_logs.motive(MOTIVE_ROWS).encode(),), ".csv"),
@@ -291,46 +293,25 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     **MORE,
 }
 """By name, made when asked for: some take seconds."""
-FORGED: Mapping[str, Callable[[], Target]] = {
-    "PX4 ULog, forged": _logs(
-        lambda: (made_autopilot_logs.ulog(15),), ".ulg", by_records(forged.split_ulog, forged.join_ulog)
-    ),
-    "ArduPilot log, forged": _logs(
-        lambda: (made_autopilot_logs.dataflash(_rows(120)),),
-        ".bin",
-        by_records(forged.split_dataflash, forged.join_dataflash),
-    ),
-    "Blackbox log, forged": _logs(_blackbox, ".bbl", forged.by_header_lines),
-    "MATLAB file, forged": _logs(
-        lambda: (_saved_mat(False),), ".mat", by_records(forged.split_matlab, forged.join_matlab)
-    ),
-    "growing recording, forged": _logs(lambda: (_written("a.growing", _growing),), ".growing", forged.by_growing_head),
-    "ROS bag, first form, forged": _logs(lambda: _bags(1), ".bag", by_records(forged.split_bag1, forged.join_bag1)),
-    "MCAP, forged": _logs(
-        lambda: tuple(whole.partition(BAG_MARK)[2] for whole in _bags(2)),
-        ".mcap",
-        by_records(forged.split_mcap, forged.join_mcap),
-    ),
-    "SQLite bag, forged": _logs(
-        lambda: tuple(whole.partition(BAG_MARK)[2] for whole in _bags(2, plugin="SQLITE3")), ".db3", forged.by_sqlite
-    ),
-    "metadata of a bag, forged": lambda: Target("", _bags(2), forged.by_metadata(BAG_MARK), _look_at_bag),
-}
-"""Containers that are well-formed outside and wrong inside; HDF5 and MATLAB with odd shapes are among `TARGETS`."""
 
 
-def _bags(generation: int, *, plugin: str = "MCAP") -> tuple[bytes, ...]:
+def bags(
+    generation: int, *, plugin: str = "MCAP", kind: str = "geometry_msgs/msg/PoseStamped", count: int = 40
+) -> tuple[bytes, ...]:
+    """A bag of one topic; of the second form its metadata and its file, with a mark between them: `look_at_bag`."""
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_HUMBLE)
-    types, kind = store.types, "geometry_msgs/msg/PoseStamped"
+    types = store.types
     sequence = {"seq": 0} if generation == 1 else {}
     serialize = store.serialize_ros1 if generation == 1 else store.serialize_cdr
 
     def message(k: int) -> Any:
+        if kind.startswith("std_msgs"):
+            return types[kind](data=float(k))
         time = types["builtin_interfaces/msg/Time"](sec=1_700_000_000, nanosec=10_000_000 * k)
         header = types["std_msgs/msg/Header"](**sequence, stamp=time, frame_id="map")
         turned = types["geometry_msgs/msg/Quaternion"](x=0.05, y=0.0, z=0.0, w=0.99875)
@@ -342,11 +323,11 @@ def _bags(generation: int, *, plugin: str = "MCAP") -> tuple[bytes, ...]:
         made = Writer1(path) if generation == 1 else Writer2(path, version=9, storage_plugin=StoragePlugin[plugin])
         with made as writer:
             connection = writer.add_connection("/mocap/pose", kind, typestore=store)
-            for k in range(40):
+            for k in range(count):
                 writer.write(connection, 1_700_000_000_000_000_000 + 10_000_000 * k, serialize(message(k), kind))
         if generation == 1:
             return (path.read_bytes(),)
-        # one blob of both files of the folder, which `_look_at_bag` takes apart again
+        # one blob of both files of the folder, which `look_at_bag` takes apart again
         files = {file.name: file.read_bytes() for file in sorted(path.iterdir())}
         return (BAG_MARK.join([files["metadata.yaml"], next(c for n, c in files.items() if n != "metadata.yaml")]),)
 
@@ -354,12 +335,17 @@ def _bags(generation: int, *, plugin: str = "MCAP") -> tuple[bytes, ...]:
 BAG_MARK = b"\n--bag--\n"
 
 
-def _look_at_bag(path: Path) -> None:
-    head, mark, tail = path.read_bytes().partition(BAG_MARK)
+def look_at_bag(path: Path) -> None:
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name) / "bag"
-        folder.mkdir()
-        (folder / "metadata.yaml").write_bytes(head)
-        if mark:
-            (folder / "a.bag.mcap").write_bytes(tail)
-        _look(folder)
+        _look(bag_folder(path.read_bytes(), Path(name)))
+
+
+def bag_folder(content: bytes, beside: Path) -> Path:
+    """The folder of a bag of the second form, from the one blob that `bags` makes of it."""
+    head, mark, tail = content.partition(BAG_MARK)
+    folder = beside / "bag"
+    folder.mkdir(exist_ok=True)
+    (folder / "metadata.yaml").write_bytes(head)
+    if mark:
+        (folder / "a.bag.mcap").write_bytes(tail)
+    return folder

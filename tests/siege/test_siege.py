@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import random
 import signal
 import sys
@@ -13,18 +14,19 @@ import pytest
 
 from swashplate.errors import FlightError
 
-from . import files, forged, kills, neighbours, packets, pages, places, small, worker
+from . import files, forged, fuzz, fuzzed, kills, neighbours, packets, pages, places, small, worker
+from .containers import CONTAINERS, Container
 from .files import Files
 from .kills import Case
 from .plain import Ended
-from .targets import FORGED, TARGETS, Target
+from .targets import TARGETS, Target
 
 MUTANTS = 6
 
 
-@pytest.mark.parametrize("name", [*TARGETS, *FORGED])
+@pytest.mark.parametrize("name", TARGETS)
 def test_whole_files_are_read_and_damaged_ones_refused_in_words(name: str, tmp_path: Path) -> None:
-    target = {**TARGETS, **FORGED}[name]()
+    target = TARGETS[name]()
     for content in target.whole:
         path = tmp_path / f"whole{target.suffix}"
         path.write_bytes(content)
@@ -37,19 +39,75 @@ def test_whole_files_are_read_and_damaged_ones_refused_in_words(name: str, tmp_p
 @pytest.mark.parametrize(
     ("name", "split", "join"),
     [
-        ("PX4 ULog, forged", forged.split_ulog, forged.join_ulog),
-        ("ArduPilot log, forged", forged.split_dataflash, forged.join_dataflash),
-        ("MATLAB file, forged", forged.split_matlab, forged.join_matlab),
-        ("growing recording, forged", forged.split_growing, forged.join_growing),
-        ("ROS bag, first form, forged", forged.split_bag1, forged.join_bag1),
-        ("MCAP, forged", forged.split_mcap, forged.join_mcap),
+        ("ULog", forged.split_ulog, forged.join_ulog),
+        ("DataFlash", forged.split_dataflash, forged.join_dataflash),
+        ("MATLAB, level 5", forged.split_matlab, forged.join_matlab),
+        ("growing recording", forged.split_growing, forged.join_growing),
+        ("ROS bag, first form", forged.split_bag1, forged.join_bag1),
+        ("MCAP", forged.split_mcap, forged.join_mcap),
     ],
 )
 def test_what_is_taken_apart_and_put_together_is_the_same(name: str, split: forged.Split, join: forged.Join) -> None:
-    for content in FORGED[name]().whole:
+    for content in CONTAINERS[name]().whole:
         start, records = split(content)
         assert len(records) > 4
         assert join(start, records) == content
+
+
+INPUTS = 48
+
+
+@pytest.mark.parametrize("name", CONTAINERS)
+def test_every_container_is_fuzzed_in_short(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(fuzzed.Loop, "_tell", lambda self, content, words: told.append(words))
+    (tmp_path / "kept").mkdir()
+    loop = fuzzed.Loop(name, CONTAINERS[name](), seed=0, kept=tmp_path / "kept", folder=tmp_path)
+    counts = loop.run(INPUTS, 120.0)
+    assert counts["fell"] == 0, told
+    assert counts["inputs"] == INPUTS
+    assert counts["kept"] > 1, "outcomes are told from each other"
+    assert counts["read"] + counts["refused"] + counts["contained"] == INPUTS
+
+
+def test_the_fuzzer_adds_up_what_its_processes_tell(tmp_path: Path) -> None:
+    siege = fuzz.Fuzz(["MATLAB, level 5"], inputs=300, seconds=60.0, folder=tmp_path, workers=1)
+    found = siege.run()
+    assert found.bad == []
+    assert found.rows[0][1] == found.rows[-1][1] == 300
+    again = fuzz.Fuzz(["MATLAB, level 5"], inputs=300, seconds=60.0, folder=tmp_path, workers=1)
+    assert again.run().rows == found.rows, "a folder with counts is gone on with"
+
+
+def _dying(content: bytes, path: Path) -> object:
+    match content[:1]:
+        case b"k":
+            os.kill(os.getpid(), signal.SIGKILL)
+        case b"h":
+            while True:
+                pass
+        case b"m":
+            return len(bytearray(1 << 32))
+        case b"e":
+            raise KeyError(content)
+    return content[:1]
+
+
+@pytest.mark.parametrize("job", [True, False])
+def test_what_ends_or_holds_up_a_parser_is_told(job: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(fuzzed, "SLOWEST", 1)
+    monkeypatch.setattr(fuzzed.Loop, "_tell", lambda self, content, words: told.append(words))
+    monkeypatch.setattr(fuzzed.Loop, "_changed", lambda self: b"akhmeb"[self.counts["inputs"] :][:1])
+    made = Container(".x", (b"z",), _dying, use=lambda path: None, job=job)
+    loop = fuzzed.Loop("made up", made, seed=0, kept=tmp_path / "kept", folder=tmp_path)
+    (tmp_path / "kept").mkdir()
+    counts = loop.run(6, 60.0)
+    assert counts["inputs"] == 6
+    assert (counts["fell"], counts["contained"]) == ((0, 2) if job else (4, 0))
+    assert told[:2] == [
+        f"{'contained: ' * job}{words}" for words in ("ended the process with -9", "took more than 1 s")
+    ]
 
 
 def _raises(error: Exception) -> Callable[[Path], object]:

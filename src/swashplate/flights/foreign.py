@@ -1,7 +1,7 @@
 """Containers of others, read by others' libraries in a process with limits, so that no file ends or stops this one.
 
-HDF5's library ends its process over some damaged files and comes to no end over others; a ROS bag of some kilobytes
-unpacks to gigabytes, and an SQLite view in one has no last row. All of that runs in one process
+HDF5's and Arrow's libraries end their process over some damaged files and come to no end over others; a ROS bag of some
+kilobytes unpacks to gigabytes, and an SQLite view in one has no last row. All of that runs in one process
 (`foreign_process`), which has a limit of time, memory and disk by the size of the file, and can be ended.
 """
 
@@ -25,7 +25,7 @@ from swashplate.own_python import own_python
 from swashplate.systems import OUT_OF_TIME, resource
 from swashplate.threads import ONE_THREAD
 
-Job = Literal["hdf5", "rosbag"]
+Job = Literal["hdf5", "rosbag", "parquet"]
 Told = dict[str, Any]
 
 _LAST = {"foreign", "failed", "refused", "limit"}
@@ -56,7 +56,7 @@ class ProcessLimits:
         )
 
 
-BYTES_A_SECOND: Final[dict[Job, int]] = {"hdf5": 20 << 20, "rosbag": 512 << 10}
+BYTES_A_SECOND: Final[dict[Job, int]] = {"hdf5": 20 << 20, "rosbag": 512 << 10, "parquet": 20 << 20}
 """Of a file, that its library reads at least: a fifth of what it does on a slow processor."""
 
 

@@ -23,8 +23,11 @@ from swashplate.systems import resource
 
 Frame = tuple[dict[str, Any], bytes]
 
-JOBS = {"hdf5": "swashplate.flights.hdf5_frames", "rosbag": "swashplate.flights.readers.rosbag_frames"}
-
+JOBS = {
+    "hdf5": "swashplate.flights.hdf5_frames",
+    "rosbag": "swashplate.flights.readers.rosbag_frames",
+    "parquet": "swashplate.api.campaigns.parquet_frames",
+}
 
 _SQLITE_WROTE = {("apsw", "IOError"), ("apsw", "FullError")}
 """Of a file that is only read: what it sorts or keeps meanwhile does not fit into the limit."""

@@ -199,12 +199,13 @@ class CampaignStore:
     @staticmethod
     def _unpacked(path: Path, content: bytes, name: str) -> Columns:
         try:
-            return unpacked(content, ending=path.suffix, task=name)
+            return unpacked(path, content, task=name)
         except MissingLibraryError:
             raise
         except Exception as error:  # whatever the libraries raise on damaged bytes is the file's fault
+            words = str(getattr(error, "problem", error)).rstrip(".")
             raise CampaignError(
-                f"is no result of its task: {error or type(error).__name__}.",
+                f"is no result of its task: {words or type(error).__name__}.",
                 where=path,
                 hint="`swash campaign resume` does the task again.",
             ) from None

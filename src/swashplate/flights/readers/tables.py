@@ -129,7 +129,9 @@ class NumberRows(Sequence[list[str]]):
         return [cell.strip() for cell in line.split(self.mark)]
 
     def texts(self, index: int) -> list[str]:
-        """One column as it stands in the file; nothing to the right of it is split."""
+        """One column as it stands in the file, blank where the rows end before; nothing to its right is split."""
+        if index >= self.numbers.shape[1]:
+            return [""] * len(self.lines)
         return [line.split(self.mark, index + 1)[index].strip() for line in self.lines]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,9 @@ from made_campaigns import tasks
 from swashplate.api.campaigns import result_files
 from swashplate.api.campaigns.result_files import ENDINGS, NUMPY, PARQUET, packed, unpacked
 from swashplate.api.campaigns.store import CampaignStore
+from swashplate.api.campaigns.tasks import Columns
 from swashplate.errors import CampaignError, MissingLibraryError
+from swashplate.flights import foreign
 
 TABLE = {
     "number": np.arange(5),
@@ -25,11 +28,17 @@ TABLE = {
 }
 
 
+def _back(content: bytes, ending: str, folder: Path, *, task: str = "") -> Columns:
+    path = folder / f"a{ending}"
+    path.write_bytes(content)
+    return unpacked(path, content, task=task)
+
+
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_a_table_comes_back_to_the_bit(ending: str) -> None:
+def test_a_table_comes_back_to_the_bit(ending: str, tmp_path: Path) -> None:
     content = packed(TABLE, ending=ending)
     assert packed(dict(TABLE), ending=ending) == content
-    back = unpacked(content, ending=ending)
+    back = _back(content, ending, tmp_path)
     assert list(back) == list(TABLE)
     for name, values in TABLE.items():
         assert back[name].dtype.kind == values.dtype.kind
@@ -42,8 +51,8 @@ def test_a_table_comes_back_to_the_bit(ending: str) -> None:
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_no_rows_are_a_table_too(ending: str) -> None:
-    back = unpacked(packed({name: values[:0] for name, values in TABLE.items()}, ending=ending), ending=ending)
+def test_no_rows_are_a_table_too(ending: str, tmp_path: Path) -> None:
+    back = _back(packed({name: values[:0] for name, values in TABLE.items()}, ending=ending), ending, tmp_path)
     assert {name: (len(values), values.dtype.kind) for name, values in back.items()} == {
         name: (0, values.dtype.kind) for name, values in TABLE.items()
     }
@@ -63,34 +72,34 @@ def test_columns_that_are_no_table_are_refused(ending: str, odd: np.ndarray) -> 
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_the_name_of_a_log_need_not_be_text(ending: str) -> None:
+def test_the_name_of_a_log_need_not_be_text(ending: str, tmp_path: Path) -> None:
     name = b"flight \xff.bin".decode("utf-8", "surrogateescape")
-    back = unpacked(packed({"log": np.array([name, "b.bin"])}, ending=ending), ending=ending)
+    back = _back(packed({"log": np.array([name, "b.bin"])}, ending=ending), ending, tmp_path)
     assert back["log"].tolist() == ["flight \\udcff.bin", "b.bin"]
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_a_changed_number_is_told(ending: str) -> None:
+def test_a_changed_number_is_told(ending: str, tmp_path: Path) -> None:
     content = packed({"a": np.linspace(1.0, 2.0, 200)}, ending=ending)
     inside = content.index(np.linspace(1.0, 2.0, 200)[100:102].tobytes())
     with pytest.raises(Exception, match=r"(?i)crc"):
-        unpacked(content[:inside] + b"\x00" + content[inside + 1 :], ending=ending)
+        _back(content[:inside] + b"\x00" + content[inside + 1 :], ending, tmp_path)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_a_file_that_claims_too_much_is_refused(ending: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_claims_too_much_is_refused(ending: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     content = packed(TABLE, ending=ending)
     monkeypatch.setattr(result_files, "LARGEST", 100)
     with pytest.raises(ValueError, match="claims more than it can hold"):
-        unpacked(content, ending=ending)
+        _back(content, ending, tmp_path)
 
 
-def test_a_packed_archive_is_refused() -> None:
+def test_a_packed_archive_is_refused(tmp_path: Path) -> None:
     """Nothing of ours packs a result; a packed one may hold a thousand times of what it weighs."""
     stream = io.BytesIO()
     np.savez_compressed(stream, x=np.zeros(1000))
     with pytest.raises(ValueError, match="it is packed, and no result is"):
-        unpacked(stream.getvalue(), ending=NUMPY)
+        _back(stream.getvalue(), NUMPY, tmp_path)
 
 
 def test_a_store_reads_what_it_wrote_with_and_without_the_library(
@@ -109,10 +118,7 @@ def test_a_store_reads_what_it_wrote_with_and_without_the_library(
     one, other = store.columns(first.name), store.columns(second.name)
     assert all(one[name].tolist() == other[name].tolist() for name in ("number", "seed", "verdict"))
 
-    def absent(module: str, **_: object) -> None:
-        raise MissingLibraryError(f"{module} is not installed here.")
-
-    monkeypatch.setattr(result_files, "library", absent)
+    monkeypatch.setattr(result_files, "find_spec", lambda _: None)
     with pytest.raises(MissingLibraryError):
         store.columns(first.name)
 
@@ -128,23 +134,36 @@ def test_the_folder_of_results_is_one_table_for_others(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_a_result_says_whose_it_is(ending: str) -> None:
+def test_a_result_says_whose_it_is(ending: str, tmp_path: Path) -> None:
     content = packed(TABLE, ending=ending, task="a" * 64)
     assert packed(dict(TABLE), ending=ending, task="a" * 64) == content
-    assert list(unpacked(content, ending=ending, task="a" * 64)) == list(TABLE)
-    assert list(unpacked(content, ending=ending)) == list(TABLE)
+    assert list(_back(content, ending, tmp_path, task="a" * 64)) == list(TABLE)
+    assert list(_back(content, ending, tmp_path)) == list(TABLE)
     with pytest.raises(ValueError, match="it is the result of another task, aaaa"):
-        unpacked(content, ending=ending, task="b" * 64)
+        _back(content, ending, tmp_path, task="b" * 64)
     with pytest.raises(ValueError, match="it does not say whose result it is"):
-        unpacked(packed(TABLE, ending=ending), ending=ending, task="a" * 64)
+        _back(packed(TABLE, ending=ending), ending, tmp_path, task="a" * 64)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("name", list(TABLE))
-def test_any_other_value_has_another_hash(ending: str, name: str) -> None:
+def test_any_other_value_has_another_hash(ending: str, name: str, tmp_path: Path) -> None:
     values = TABLE[name].copy()
     values[1] = {"b": True, "U": "bad"}.get(values.dtype.kind, 3)
     one, other = (result_files._mark(table, "a") for table in (TABLE, {**TABLE, name: values}))
     assert one != other
-    assert result_files._mark(unpacked(packed(TABLE, ending=ending), ending=ending), "a") == one
+    assert result_files._mark(_back(packed(TABLE, ending=ending), ending, tmp_path), "a") == one
     assert result_files._mark({f"{name}2" if n == name else n: v for n, v in TABLE.items()}, "a") != one
+
+
+def test_a_library_that_aborts_over_a_result_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process that read it is gone, this one is not, and the next result is read."""
+    store, (first, *_) = CampaignStore(tmp_path), tasks()
+    store.begin("", {}, {})
+    store.keep(first, TABLE)
+    with monkeypatch.context() as dying:
+        dying.setattr(foreign, "own_python", lambda _: [sys.executable, "-c", "import os; input(); os.abort()"])
+        dying.setattr(foreign, "_processes", [foreign._Process()])
+        with pytest.raises(CampaignError, match=r"is no result of its task: was given up: .*\(SIGABRT\)"):
+            store.columns(first.name)
+    assert store.columns(first.name)["number"].tolist() == [0, 1, 2, 3, 4]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swashplate.flights.readers.tables import NumberRows, column, rows_of
+from swashplate.flights.readers.tables import NumberRows, column, rows_of, texts
 
 
 def _text(mark: str = ",", *, end: str = "\n") -> str:
@@ -51,3 +51,12 @@ def test_what_is_odd_is_read_cell_by_cell(odd: str) -> None:
     lines = _text().split("\n")
     assert NumberRows.of("\n".join(lines)) is not None
     assert NumberRows.of("\n".join([*lines[:200], odd, *lines[200:]])) is None
+
+
+def test_a_column_that_no_row_reaches_is_blank() -> None:
+    """Found by fuzzing: a header with more names than its rows of numbers have."""
+    rows = NumberRows.of("time,a,b\n0,1\n1,2\n")
+    assert rows is not None
+    assert texts(rows, 2) == ["", ""]
+    assert np.isnan(column(rows, 2, name="b", where="log.csv", lines=range(2, 4))).all()
+    assert texts(rows, 1) == ["1", "2"]
