@@ -1,13 +1,10 @@
-"""Real time on the live page: steps that come late, the processor's share, and how long a stick takes.
+"""Real time on the live page: time that it loses, its share of the processor, from a stick to its picture.
 
-A page here is a program that reads every update (what a browser on another machine costs this one), or headless
-Chromium that draws in software on the same cores.
+The page is headless Chromium, which draws in software on the same cores.
 """
 
 from __future__ import annotations
 
-import asyncio
-import json
 import math
 import os
 import re
@@ -24,8 +21,19 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 MODEL = "coax"
-_SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-_STIR = "swash.sticks.scripted = {roll: 0.05 * Math.sign(Math.random() - 0.5), pitch: 0, yaw: 0, heave: 0}"
+_SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"]
+_PICTURES = "Number(document.documentElement.dataset.drawn)"
+_ANSWER = """async () => {
+  const told = [];
+  for (let k = 0; k < 40; k += 1) {
+    await new Promise((done) => setTimeout(done, 60 + 40 * Math.random()));
+    const before = document.documentElement.dataset.drawn, begun = performance.now();
+    swash.sticks.scripted = { roll: 0.05 * (-1) ** k, pitch: 0, yaw: 0, heave: 0 };
+    while (document.documentElement.dataset.drawn === before) await new Promise((done) => setTimeout(done));
+    told.push(performance.now() - begun);
+  }
+  return told;
+}"""
 
 
 @dataclass(frozen=True)
@@ -33,12 +41,12 @@ class Punctual:
     """One run in real time.
 
     Attributes:
-        name: what looked at it.
-        late: share of controller steps that ended more than a period after they were due [%].
+        name: how it draws.
+        late: share of the time that it had to drop [%].
         target: the most that is promised [%].
-        processor: share of one core that the server took [%].
-        updates: of the page per second.
-        latency: from a stick to the update that answers it, median [ms].
+        pictures: a second.
+        page: share of one core that the page took [%]. drawing: that its drawing in software took beside [%].
+        latency: from a stick to the picture that shows it, median [ms].
         seconds: how long.
         load: other work on the machine, as its load average before.
     """
@@ -46,8 +54,9 @@ class Punctual:
     name: str
     late: float
     target: float
-    processor: float
-    updates: float
+    pictures: float
+    page: float
+    drawing: float
     latency: float
     seconds: float
     load: float
@@ -58,10 +67,10 @@ class Punctual:
 
     @property
     def note(self) -> str:
-        updates = "" if math.isnan(self.updates) else f"{self.updates:.1f} updates/s, "
         return (
-            f"{self.seconds:.0f} s, {updates}{self.processor:.1f} % of a core for the server, "
-            f"{self.latency:.0f} ms from stick to page, load {self.load:.1f} before"
+            f"{self.seconds:.0f} s, {self.pictures:.1f} pictures/s, {self.page:.1f} % of a core for the page and "
+            f"{self.drawing:.1f} % for drawing, "
+            f"{self.latency:.0f} ms from stick to picture, load {self.load:.1f} before"
         )
 
     def as_json(self) -> dict[str, object]:
@@ -69,106 +78,72 @@ class Punctual:
 
 
 def measure(*, short: bool) -> list[Punctual]:
-    """Both kinds of page for 60 s; the first alone for 2 s in the short form and without Chromium."""
-    seconds = 2.0 if short else 60.0
-    readings = [_reading(seconds)]
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-headless-shell", "chromium-browser"))), None)
-    if chromium is not None and not short:
-        readings.append(_drawn(seconds, chromium))
-    return readings
+    """Pictures as without a graphics card, and as many as with one, for 60 s; nothing without Chromium or in short."""
+    chromium = next(filter(None, map(shutil.which, ("chromium-headless-shell", "chromium", "chromium-browser"))), None)
+    if chromium is None or short:
+        return []
+    return [_drawn(60.0, chromium, every=every) for every in (False, True)]
 
 
 @contextmanager
-def _served() -> Iterator[tuple[str, subprocess.Popen[str]]]:
+def _served() -> Iterator[str]:
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "swashplate", "live", MODEL, "--port", "0", "--out", f"{folder}/live"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
-            match = re.search(r"http://(\S+)/", process.stdout.readline())
+            match = re.search(r"http://\S+/", process.stdout.readline())
             assert match is not None
             try:
-                yield match[1], process
+                yield match[0]
             finally:
                 process.send_signal(signal.SIGINT)
 
 
-def _processor(process: subprocess.Popen[str]) -> float:
-    """Seconds of processor that a process has used."""
-    with open(f"/proc/{process.pid}/stat", encoding="ascii") as file:
-        fields = file.read().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def _processors() -> dict[str, float]:
+    """Seconds of processor that the page and its drawing have used: the youngest of Chromium's processes."""
+    found: dict[str, tuple[int, float]] = {}
+    for pid in sorted(int(name) for name in os.listdir("/proc") if name.isdigit()):
+        try:
+            with open(f"/proc/{pid}/cmdline", encoding="utf-8", errors="replace") as words:
+                kind = re.search(r"--type=(renderer|gpu-process)", words.read())
+            with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
+                fields = file.read().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if kind is not None:
+            found[kind[1]] = (pid, (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"))
+    return {kind: used for kind, (_, used) in found.items()}
 
 
-def _reading(seconds: float) -> Punctual:
-    load = os.getloadavg()[0]
-    with _served() as (host, process):
-        first, last, updates, delays, used = asyncio.run(_follow(host, process, seconds))
-    return _told("page on another machine", 0.1, first, last, used, updates / seconds, delays, seconds, load)
-
-
-async def _follow(host: str, process: subprocess.Popen[str], seconds: float) -> Any:
-    from websockets.asyncio.client import connect
-
-    async with connect(f"ws://{host}/socket", origin=f"http://{host}") as page:  # type: ignore[arg-type]
-        moment = await _moment(page)
-        while moment["t"] < 1.0:
-            moment = await _moment(page)
-        first, begun, used = moment, time.monotonic(), _processor(process)
-        updates, number, sent = 0, 0, {}
-        delays: list[float] = []
-        while time.monotonic() - begun < seconds:
-            if updates % 10 == 0:
-                number += 1
-                sent[number] = time.monotonic()
-                stick = {"roll": 0.05 * (-1) ** number, "pitch": 0, "yaw": 0, "heave": 0, "number": number}
-                await page.send(json.dumps({"type": "stick", **stick}))
-            moment = await _moment(page)
-            updates += 1
-            if moment["stick"] in sent:
-                delays.append(1000.0 * (time.monotonic() - sent.pop(moment["stick"])))
-        return first, moment, updates, delays, _processor(process) - used
-
-
-async def _moment(page: Any) -> dict[str, Any]:
-    while (message := json.loads(await page.recv()))["type"] != "moment":
-        pass
-    return message  # type: ignore[no-any-return]
-
-
-def _drawn(seconds: float, chromium: str) -> Punctual:
+def _drawn(seconds: float, chromium: str, *, every: bool) -> Punctual:
     from playwright.sync_api import sync_playwright
 
     load = os.getloadavg()[0]
-    with _served() as (host, process), sync_playwright() as playwright:
+    with _served() as url, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=_SOFTWARE)
         page = browser.new_page(viewport={"width": 1280, "height": 860})
-        page.goto(f"http://{host}/")
+        page.goto(url)
         while not page.evaluate("Boolean(window.swash?.now?.t > 5)"):
             page.wait_for_timeout(200)
-        first, used = page.evaluate("swash.now"), _processor(process)
-        delays = []
-        begun = time.monotonic()
-        while time.monotonic() - begun < seconds:
-            page.evaluate(_STIR)
-            page.wait_for_timeout(1000)
-            delays.append(page.evaluate("swash.latency") or float("nan"))
-        last, spent = page.evaluate("swash.now"), time.monotonic() - begun
-        used = _processor(process) - used
+        if every:
+            page.evaluate("swash.pace.software = false; swash.pace.interval = 0")
+        used, before, begun = _processors(), _state(page), time.monotonic()
+        time.sleep(seconds)
+        after, spent = _state(page), time.monotonic() - begun
+        share = {kind: 100.0 * (now - used.get(kind, math.nan)) / spent for kind, now in _processors().items()}
+        latency = statistics.median(page.evaluate(_ANSWER))
         browser.close()
-    return _told("headless Chromium, software", 1.0, first, last, used, float("nan"), delays, spent, load)
+    name = "every picture drawn in software" if every else "as without a graphics card"
+    lost, pictures = (after[k] - before[k] for k in (0, 1))
+    return Punctual(
+        name, 100.0 * lost / spent, 1.0, pictures / spent, share["renderer"], share["gpu-process"], latency, spent, load
+    )
 
 
-def _told(
-    name: str,
-    target: float,
-    first: dict[str, Any],
-    last: dict[str, Any],
-    used: float,
-    updates: float,
-    delays: list[float],
-    seconds: float,
-    load: float,
-) -> Punctual:
-    late = 100.0 * (last["late"] - first["late"]) / max(last["steps"] - first["steps"], 1)
-    latency = statistics.median(delays) if delays else float("nan")
-    return Punctual(name, late, target, 100.0 * used / seconds, updates, latency, seconds, load)
+def _state(page: Any) -> list[float]:
+    return list(page.evaluate(f"[swash.now.skipped, {_PICTURES}]"))
+
+
+if __name__ == "__main__":
+    for run in measure(short=False):
+        print(f"{run.name}: {run.late:.2f} % of the time lost; {run.note}")

@@ -156,7 +156,7 @@ def main() -> None:
     keep("live", flown)
     show(
         "Live: 500 Hz physics and 100 Hz controller in real time",
-        ("page", "late %", "promised", "", "note"),
+        ("page", "lost %", "promised", "", "note"),
         [
             (
                 run.name,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from flown_here import World
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.recording import LiveRecording, SavedRecording
-from swashplate.links.live.world import World
 
 X, Y, Z, U, V, PHI, PSI = 0, 1, 2, 3, 4, 6, 8
 RAISED = {"roll": (Y, 1.0), "pitch": (X, 1.0), "yaw": (PSI, 1.0), "heave": (Z, -1.0)}

@@ -39,6 +39,13 @@ def ziglang() -> tuple[str, ...] | None:
     return (sys.executable, "-I", "-m", "ziglang", "cc") if find_spec("ziglang") is not None else None
 
 
+def web_compiler() -> tuple[str, ...] | None:
+    """The words that start a C compiler which makes WebAssembly: ziglang, or clang beside wasm-ld; None without."""
+    clang, linker = (shutil.which(name) for name in ("clang", "wasm-ld"))
+    beside = clang is not None and linker is not None and os.path.isabs(clang) and os.path.isabs(linker)
+    return ziglang() or ((clang,) if clang is not None and beside else None)
+
+
 def ran(command: Sequence[str], *, where: str, seconds: float = LIMIT) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of the compiler; what is no UTF-8 in them is replaced.
 

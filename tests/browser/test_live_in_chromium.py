@@ -13,10 +13,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import chromium
 import swashplate as sp
+from swashplate.compiler import web_compiler
 from swashplate.links.web.libraries import PAGE
 
 pytest.importorskip("starlette", reason="the extra `live` is not installed")
@@ -29,6 +31,8 @@ _WAIT = 90_000.0  # ms; a busy machine draws slowly
 def browser() -> Iterator[Any]:
     if not (PAGE / "vendor" / "three.module.min.js").is_file():
         pytest.skip("the page's libraries are not here: python scripts/vendor_page.py (needs npm)")
+    if web_compiler() is None:
+        pytest.skip("the extra 'compiler' is not installed: nothing makes WebAssembly")
     yield from chromium.running_browser(webgl=True)
 
 
@@ -125,12 +129,6 @@ def test_the_helicopter_moves_under_the_stick_and_charts_advance(visit_: Any, co
     assert units == ["Attitude [deg]", "Rates [deg/s]", "Velocities [m/s]", "Inputs [1]"]
     turned = visit.of("swash.scene.crafts.own.model.phases[0]")
     visit.until(f"swash.scene.crafts.own.model.phases[0] !== {turned}")
-    visit.stick()
-    visit.until("Math.abs(swash.now.stick) > 1")
-    visit.page.click("#record")
-    visit.until("swash.now.recording > 0.1")
-    visit.page.click("#record")
-    visit.until("swash.now.recording === null")
     visit.done()
 
 
@@ -150,21 +148,60 @@ def test_a_linear_model_moves_under_the_stick_and_says_what_it_is(visit_: Any, t
         visit.done()
 
 
-def test_pictures_come_rarer_while_steps_are_late_and_more_often_again(visit_: Any, coax: str) -> None:
+def test_pictures_come_rarer_while_they_take_long_and_more_often_again(visit_: Any, coax: str) -> None:
     visit = visit_(coax).flies()
     assert visit.of("swash.scene.software"), "this browser draws in software"
-    late = "new swash.pace.constructor(true)"
-    told = "Array.from({length: 8}, (_, i) => (p.told({steps: 100 * i, late: %s}), p.interval))"
-    slower = visit.of(f"(() => {{ const p = {late}; return {told % '5 * i'}; }})()")
-    assert slower[0] == 100.0
-    assert slower[-1] == 400.0
-    back = visit.of(f"(() => {{ const p = {late}; p.interval = 400; return {told % '0'}; }})()")
-    assert back[-1] < 350.0
+    some = "(() => {{ const p = new swash.pace.constructor({0}); return {1}.map(ms => (p.took(ms), p.interval)); }})()"
+    slower = visit.of(some.format("true", "Array(30).fill(90)"))
+    assert slower == sorted(slower)
+    assert slower[-1] == pytest.approx(270.0, abs=1.0), "a third of the time"
+    back = visit.of(some.format("true", "[...Array(30).fill(900), ...Array(30).fill(1)]"))
+    assert (back[29], back[-1]) == (400.0, 100.0)
+    assert visit.of(some.format("false", "[900]")) == [0], "a card draws every frame"
     drawn = "Number(document.documentElement.dataset.drawn)"
     before = visit.of(drawn)
     visit.page.wait_for_timeout(1000)
     assert visit.of(drawn) - before <= 11, "ten a second at most"
     visit.done()
+
+
+def test_nothing_is_between_a_stick_and_the_model(visit_: Any, coax: str) -> None:
+    """The turn that reads the sticks flies them: the inputs have moved before the next picture."""
+    visit = visit_(coax).flies()
+    moved = """() => {
+      const { connection, sticks } = swash, { flight } = connection;
+      connection.turn(performance.now() + 20);
+      const before = flight.places[0].inputs[2];
+      connection.say("stick", { roll: 0.5, pitch: 0, yaw: 0, heave: 0 });
+      connection.turn(connection.last + 10);
+      return Math.abs(flight.places[0].inputs[2] - before);
+    }"""
+    assert visit.of(moved) > 1e-3
+    visit.done()
+
+
+def test_a_recording_is_on_the_server_s_disk(browser: Any, visit_: Any, tmp_path: Path) -> None:
+    """All of it, without a gap, and what the equations of this machine make of its inputs."""
+    with _served("live", "coax", cwd=tmp_path) as url:
+        visit = visit_(url).flies()
+        visit.page.click("#record")
+        visit.until("swash.now.recording >= 0.1")
+        visit.page.click("[data-maneuver='doublet']")
+        visit.until("swash.now.recording > 3")
+        visit.page.click("#record")
+        visit.until("swash.now.recordings.length === 1")
+        visit.done()
+    coax, truth = sp.vehicle("coax"), sp.read(tmp_path / "live" / "recording-1-truth.nc")
+    states = truth.array(coax.state_names)
+    assert np.allclose(np.diff(truth.time("x")), 0.01)
+    assert np.ptp(truth.values("servo_roll")) > 0.05
+    again = sp.simulate(
+        coax,
+        {name: truth.values(name) for name in coax.input_names},
+        start=dict(zip(coax.state_names, states[0], strict=True)),
+        substeps=5,
+    )
+    assert np.max(np.abs(again.array(coax.state_names) - states)) < 1e-9
 
 
 def test_charts_of_a_single_sample_are_drawn(visit_: Any, coax: str) -> None:

@@ -15,9 +15,9 @@ import pytest
 
 import chromium
 import swashplate as sp
+from flown_here import World
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
-from swashplate.links.live.world import World
 from swashplate.links.web.libraries import PAGE
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.frames import Euler, Vector, local_to_body

@@ -14,15 +14,16 @@ from typing import Any
 
 import pytest
 
-import swashplate as sp
+from swashplate.compiler import web_compiler
 from swashplate.flights.flight import Flight
 from swashplate.links.live.recording import recover
 from swashplate.links.web import libraries
+from told_rows import told
 
 connect = pytest.importorskip("websockets.sync.client", reason="the extra `live` is not installed").connect
 pytestmark = pytest.mark.skipif(
-    not (libraries.PAGE / "vendor" / "three.module.min.js").is_file(),
-    reason="the page's libraries are not here: python scripts/vendor_page.py",
+    not (libraries.PAGE / "vendor" / "three.module.min.js").is_file() or web_compiler() is None,
+    reason="the page's libraries (python scripts/vendor_page.py) or the extra 'compiler' are not here",
 )
 SECONDS = 2.2
 
@@ -42,12 +43,12 @@ def flying(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Any]]:
             found = re.search(r"http://(\S+)/", process.stdout.readline())
             assert found is not None, process.stderr.read()
             with connect(f"ws://{found[1]}/socket", origin=f"http://{found[1]}") as page:
+                version = json.loads(page.recv(timeout=120.0))["version"]
                 page.send(json.dumps({"type": "record", "value": True}))
                 assert line_of(process) == "Recording 1 grows in live/recording-1.growing.\n"
-                while True:
-                    moment = json.loads(page.recv(timeout=120.0))
-                    if (moment.get("recording") or 0.0) > SECONDS:
-                        break
+                page.send(told(version, 1, round(100 * SECONDS)))
+                while json.loads(page.recv(timeout=120.0)).get("recording") != SECONDS:
+                    pass
                 yield process, page
         finally:
             process.kill()
@@ -73,27 +74,37 @@ def test_a_signal_ends_it_with_the_recording_saved(
     process, _ = flying
     process.send_signal(number)
     _, said = process.communicate(timeout=300)
-    waits, saved = (line for line in said.splitlines() if not line.startswith("... "))
-    assert waits.startswith("No page is open: time stands still. Recording 1 waits with 2.")
+    (saved,) = (line for line in said.splitlines() if not line.startswith("... "))
     assert saved == "Recording 1 is saved: live/recording-1.nc."
     assert process.returncode == (0 if number == signal.SIGINT else 128 + number)
     flown(tmp_path / "live")
 
 
-def test_a_closed_page_leaves_it_on_disk_and_the_end_saves_it(
-    flying: tuple[subprocess.Popen[str], Any], tmp_path: Path
-) -> None:
+def test_a_closed_page_has_it_saved(flying: tuple[subprocess.Popen[str], Any], tmp_path: Path) -> None:
     process, page = flying
     page.close()
-    assert process.stderr is not None
-    told = line_of(process)
-    assert told.startswith("No page is open: time stands still. Recording 1 waits with 2.")
-    assert told.endswith("in live/recording-1.growing; it is saved when this command ends.\n")
-    assert sp.read(tmp_path / "live" / "recording-1.growing").duration > SECONDS - 0.1
+    assert line_of(process) == "Recording 1 is saved: live/recording-1.nc.\n"
+    flown(tmp_path / "live")
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=300)
-    assert (process.returncode, said) == (0, "Recording 1 is saved: live/recording-1.nc.\n")
-    flown(tmp_path / "live")
+    assert (process.returncode, said) == (0, "")
+
+
+def test_a_closed_page_that_records_nothing_is_no_news(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "swashplate", "live", "coax", "--port", "0"]
+    with subprocess.Popen(command, cwd=tmp_path, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        try:
+            found = re.search(r"http://(\S+)/", process.stdout.readline())
+            assert found is not None
+            with connect(f"ws://{found[1]}/socket", origin=f"http://{found[1]}") as page:
+                version = json.loads(page.recv(timeout=120.0))["version"]
+                page.send(told(version, 1, 30))
+        finally:
+            process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=300)
+    assert [line for line in said.splitlines() if not line.startswith("... ")] == []
+    assert os.listdir(tmp_path) == []
 
 
 def test_a_hard_kill_leaves_it_for_the_next_session(flying: tuple[subprocess.Popen[str], Any], tmp_path: Path) -> None:

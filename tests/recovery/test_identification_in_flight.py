@@ -17,6 +17,7 @@ from scipy.stats import chi2
 
 import proof_page
 import swashplate as sp
+from flown_here import World
 from short_period import TRUTH, short_period
 from swashplate.engine.run import runnable
 from swashplate.filtering.sensor_suite import suite
@@ -24,7 +25,6 @@ from swashplate.identification.recursive.equation import regression_equation
 from swashplate.identification.recursive.fourier_regression import RecursiveRegression, regression_plan
 from swashplate.identification.recursive.slow_parameters import SlowParameters, slow_plan
 from swashplate.links.estimating import Estimating
-from swashplate.links.live.world import World
 from swashplate.models.vehicle import Vehicle
 
 pytestmark = pytest.mark.proof

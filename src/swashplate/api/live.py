@@ -69,13 +69,12 @@ def live(
     chosen = read_controller(controller) if isinstance(controller, str | Path) else controller
     check_page()
     with serving.listen(host, port, allow_remote=allow_remote) as listening:
-        say("preparing (compiling takes longest the first time)")
+        say("preparing")
         flown = vehicle.with_values(truth) if truth else vehicle
         recover(place, tell)
         session = LiveSession(
             flown, controller=chosen, folder=place, estimate=estimate, model=vehicle, draws=draws, tell=tell
         )
-        session.clock.start()
         try:
             with suppress(KeyboardInterrupt):  # from when the address is told, an interrupt is the ordinary end
                 announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)

@@ -83,6 +83,6 @@ def open_logs(
         try:
             with suppress(KeyboardInterrupt):  # from when the address is told, an interrupt is the ordinary end
                 announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
-                serving.serve(logs_app(desk, remote=allow_remote), listening, first=False)
+                serving.serve(logs_app(desk, remote=allow_remote), listening)
         finally:
             desk.close()

@@ -35,7 +35,7 @@ def web(request: ExportRequest) -> Export:
     made = (f"swashplate {version_of('swashplate')}, card {card_digest(model)} of {model.name}: {model.card.title}.",)
     late = {name: delay for name, delay in (request.late or {}).items() if delay}
     not_flown = ", ".join(f"{name} {1e3 * delay:.3g} ms" for name, delay in late.items())
-    page = single_page(world, name=request.name, draws=request.draws, made=made)
+    page = single_page(world, name=request.name, made=made)
     drawn = f"; {len(request.draws)} models drawn from the fit" if request.draws else ""
     inside = f"the equations and numbers of {model.name}, its card's sources, {world.pilot.title}{drawn}"
     return Export(

@@ -13,12 +13,12 @@ import own_package
 import pytest
 
 import swashplate as sp
+from flown_here import World
 from swashplate.control.lqg.design import design
 from swashplate.errors import CardError, SwashError
 from swashplate.export.formats import export_model
 from swashplate.flights.flight import Flight
 from swashplate.links.live.picture import picture, pose_of
-from swashplate.links.live.world import World
 from swashplate.models.catalogue import cards_by_name, from_card
 from swashplate.physics.backend import FloatBackend
 from swashplate.simulation.standing import at_rest, standing

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from swashplate.atomic import scratch_folder
-from swashplate.compiler import ran, ziglang
+from swashplate.compiler import ran, web_compiler
 from swashplate.engine.c_expression import body
 from swashplate.engine.equations import equations_of
 from swashplate.engine.fly import flight_code
@@ -20,20 +21,19 @@ from swashplate.extras import missing
 from swashplate.links.live.pilots import WANTED
 from swashplate.links.live.world import World
 
-EXPORTS = ("frame", "buffer", "delays", "memory")
-"""What the module shows."""
-_TARGET = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-nostartfiles", "-Wl,--no-entry", "-Wl,--strip-all")
+EXPORTS = ("frame", "buffer", "delays")
+"""What the module shows, beside its memory."""
+_TARGET = ("-target", "wasm32-freestanding", "-nostdlib", "-Wl,--no-entry", "-Wl,--strip-all")
 _OPTIONS = ("-O2", "-fno-math-errno", "-fno-trapping-math", "-w")
 _STACK = 1 << 18
 """Bytes: a period of a vehicle with a hundred states needs a tenth of it."""
 
 
-def frame_code(world: World, *, crafts: int) -> str:
+def frame_code(world: World) -> str:
     """C of `frame`: one period of the controller for one of some crafts (`templates/frame.c`).
 
     Args:
-        world: what flies; its vehicle, law, delays and steps.
-        crafts: how many may fly beside each other.
+        world: what flies; its vehicle, law, delays and steps. It, its ghost and its drawn models may fly at a time.
 
     Raises:
         ExportError: for equations or a law that CasADi cannot trace.
@@ -79,32 +79,34 @@ def frame_code(world: World, *, crafts: int) -> str:
             "ASKED": len(WANTED),
             "GAINS": world.pilot.gain_count,
             "DRAWN": law.draws,
-            "CRAFTS": crafts,
+            "CRAFTS": 2 + len(world.draws),
             "STEP": repr(world.period / len(back)),
         },
     )
 
 
-def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS[:3]) -> bytes:
-    """A C source as a WebAssembly module that imports nothing.
+def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS) -> bytes:
+    """A C source as a WebAssembly module without a library: all that it imports is mathematics, from the browser.
 
     Args:
         source: C without a main.
         exports: functions that it shows, beside its memory.
 
     Raises:
-        MissingLibraryError: without ziglang, the extra `compiler`.
+        MissingLibraryError: without a compiler that makes it: ziglang (the extra `compiler`), or clang with wasm-ld.
         ExportError: where it refuses the source.
     """
-    program = ziglang()
+    program = web_compiler()
     if program is None:
-        raise missing("ziglang", what="a page that flies by itself")
+        raise missing("ziglang", what="a page in which a model flies")
+    bare = filled("bare.h", {}) + re.sub(r"#include <(?:math|string)\.h>\n", "", source)
     with scratch_folder() as folder:
         text, made = folder / "frame.c", folder / "frame.wasm"
-        text.write_text(source, encoding="utf-8")
+        text.write_text(bare, encoding="utf-8")
         shown = [f"-Wl,--export={name}" for name in exports]
         command = [*program, *_TARGET, f"-Wl,-z,stack-size={_STACK}", *_OPTIONS, *shown]
         code, _, said = ran([*command, "-o", str(made), str(text)], where="WebAssembly")
         if code != 0 or not made.is_file():
-            raise ExportError(f"ziglang refused the model's C: {said.strip()[:300]}", where="WebAssembly")
+            name = "ziglang" if len(program) > 1 else program[0]
+            raise ExportError(f"{name} refused the model's C: {said.strip()[:300]}", where="WebAssembly")
         return made.read_bytes()

@@ -8,21 +8,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from swashplate.errors import SwashError
-from swashplate.links.live.axes import STICKS
 from swashplate.links.live.identifying import HOWS
-from swashplate.links.live.pilots import MODES
 
 LONGEST = 2048
 """Characters of a message."""
 
 Check = Callable[[Any], bool]
-
-
-def _number(low: float, high: float) -> Check:
-    def check(value: Any) -> bool:
-        return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
-
-    return check
 
 
 def _whole(low: int, high: int) -> Check:
@@ -37,26 +28,8 @@ def _switch(value: Any) -> bool:
     return isinstance(value, bool)
 
 
-SPEEDS = (0.1, 4.0)
-"""Slowest and fastest run of time."""
 SCHEMA: Mapping[str, Mapping[str, Check]] = {
-    "stick": {**dict.fromkeys(STICKS, _number(-1.0, 1.0)), "number": _whole(0, 2**53)},
-    "mode": {"value": _one_of(*MODES)},
-    "decoupled": {"value": _switch},
-    "ghost": {"value": _switch},
     "bar": {"value": _switch},
-    "wind": dict.fromkeys(("north", "east", "down"), _number(-20.0, 20.0)),
-    "gusts": {"value": _number(0.0, 5.0)},
-    "voltage": {"value": _number(1.0, 100.0)},
-    "maneuver": {
-        "kind": _one_of("sweep", "doublet", "3211"),
-        "axis": _one_of(*STICKS),
-        "size": _number(0.1, 3.0),
-    },
-    "pause": {"value": _switch},
-    "step": {},
-    "speed": {"value": _number(*SPEEDS)},
-    "reset": {},
     "record": {"value": _switch},
     "identify": {"recording": _whole(1, 10_000), "how": _one_of(*HOWS)},
     "stop_identifying": {},

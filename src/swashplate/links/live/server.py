@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import json
 import logging
-import time
 from typing import Any
 
 from starlette.applications import Starlette
@@ -19,27 +18,28 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from swashplate.errors import SwashError
 from swashplate.links.live.identifying import REPORT
-from swashplate.links.live.messages import LONGEST, MessageError, parse
+from swashplate.links.live.messages import MessageError, parse
 from swashplate.links.live.session import LiveSession
 from swashplate.links.web.guard import Guard
 from swashplate.links.web.libraries import PAGE
 from swashplate.links.web.serving import page
 
-UPDATES = 30.0
-"""Updates of the page per second [Hz]."""
+UPDATES = 10.0
+"""Looks per second at whether a page has to be told anything [Hz]."""
 MOST_PAGES = 8
 """Connections at a time."""
 MOST_BAD = 20
 """Messages of one connection that the schema refuses, before it is closed."""
-FRAME = 4 * LONGEST
+FRAME = 1 << 18
 """Bytes of a frame of the WebSocket."""
+ELSEWHERE = "Another page flies here: recordings and estimates are of its flight."
 _LOG = logging.getLogger("swashplate.live")
 
 
 def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
     """The live page, its socket, and the reports of its recordings."""
     pages: set[WebSocket] = set()
-    steering: list[WebSocket] = []
+    flying: list[WebSocket] = []
     refused: set[str] = set()
 
     async def talk(socket_: WebSocket) -> None:
@@ -48,8 +48,7 @@ def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
             return
         await socket_.accept()
         pages.add(socket_)
-        session.watched(len(pages))
-        sending = asyncio.create_task(_tell(socket_, session))
+        sending = asyncio.create_task(_tell(socket_, session, flying))
         try:
             await hear(socket_)
         except WebSocketDisconnect:
@@ -59,25 +58,26 @@ def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
             with contextlib.suppress(asyncio.CancelledError, Exception):
                 await sending
             pages.discard(socket_)
-            if steering == [socket_]:
+            if flying == [socket_]:
+                flying.clear()
                 session.let_go()
-            session.watched(len(pages))
 
     async def hear(socket_: WebSocket) -> None:
         bad = 0
         while True:
             try:
-                heard = await socket_.receive_text()
+                heard = await socket_.receive()
             except RuntimeError:  # an update could not be sent while this was busy: the page is gone
                 return
-            except KeyError:  # bytes instead of text
-                await socket_.close(code=1003, reason="text only")
+            if heard["type"] == "websocket.disconnect":
                 return
+            if not flying:
+                flying.append(socket_)
             try:
-                message = parse(heard)
-                if message["type"] == "stick":
-                    steering[:] = [socket_]
-                await session.obey(message)
+                if heard.get("text") is not None:
+                    await session.obey(parse(heard["text"]))
+                elif flying == [socket_]:
+                    session.fly(heard.get("bytes") or b"")
             except MessageError as error:
                 bad += 1
                 if error.problem not in refused:
@@ -94,7 +94,7 @@ def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
         return FileResponse(path) if path.is_file() else PlainTextResponse("No such report.\n", status_code=404)
 
     routes = [
-        Route("/", page(PAGE / "live.html")),
+        Route("/", page(PAGE / "live.html", code=True)),
         Route("/report/{number:number}", report),
         WebSocketRoute("/socket", talk),
         Mount("/page", StaticFiles(directory=PAGE)),
@@ -102,16 +102,20 @@ def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
     return Guard(Starlette(routes=routes), remote=remote)
 
 
-async def _tell(socket_: WebSocket, session: LiveSession) -> None:
-    """Updates at their rate; a page that does not keep up gets fewer, and never a heap of old ones."""
-    version, due = 0, time.monotonic()
+async def _tell(socket_: WebSocket, session: LiveSession, flying: list[WebSocket]) -> None:
+    """What flies, when it is another version, and what is told of it, when that is new."""
+    version, last = None, ""
     while True:
         if session.version != version:
-            version = session.version
+            version, last = session.version, ""
             await socket_.send_text(json.dumps(session.hello()))
-        await socket_.send_text(json.dumps(session.moment(), separators=(",", ":")))
-        due = max(due + 1.0 / UPDATES, time.monotonic() - 0.5 / UPDATES)
-        await asyncio.sleep(max(0.0, due - time.monotonic()))
+        told = session.told()
+        if flying and flying != [socket_]:
+            told |= {"recording": None, "estimates": [[None] * 3 for _ in told["estimates"]], "doubts": ELSEWHERE}
+        if (text := json.dumps(told, separators=(",", ":"))) != last:
+            last = text
+            await socket_.send_text(text)
+        await asyncio.sleep(1.0 / UPDATES)
 
 
 def replay_app(flight: dict[str, Any], *, remote: bool = False) -> ASGIApp:

@@ -24,13 +24,12 @@ _KINDS = {"sweep": (30.0, (0.3, 5.0)), "doublet": (1.0, None), "3211": (3.5, Non
 _CARD_HEAD = ("name", "value", "unit", "±", "source")
 
 
-def single_page(world: World, *, name: str, draws: Sequence[Vehicle] = (), made: Sequence[str] = ()) -> str:
+def single_page(world: World, *, name: str, made: Sequence[str] = ()) -> str:
     """The text of the page.
 
     Args:
         world: what flies, at its start.
         name: of the model, for what is recorded.
-        draws: models that a fit cannot tell from it, which fly beside it.
         made: what it was made from, a line each: commit, card, data.
 
     Raises:
@@ -39,21 +38,28 @@ def single_page(world: World, *, name: str, draws: Sequence[Vehicle] = (), made:
     return single_file(
         PAGE / "live.html",
         title=world.vehicle.card.title,
-        documents={"model": _model(world, name, draws)},
-        packed={WEB_ASSEMBLY: web_assembly(frame_code(world, crafts=2 + len(draws)))},
+        documents={"model": page_model(world, name=name)},
+        packed={WEB_ASSEMBLY: web_assembly(frame_code(world))},
         instead={"/page/connection.js": "/page/alone.js"},
         within={'<p id="folder"></p>': f'<p id="folder"></p>\n{_card(world.vehicle)}\n{_origin(made)}'},
     )
 
 
-def _model(world: World, name: str, draws: Sequence[Vehicle]) -> dict[str, Any]:
-    """All that `page/flight.js` must know."""
+def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
+    """All that `page/flight.js` must know beside the code.
+
+    Args:
+        world: what flies, at its start.
+        name: of the model.
+        more: of `hello`, what a server adds: what it estimates, where recordings go, the bar that it can take off.
+    """
     vehicle, pilot = world.vehicle, world.pilot
     names = vehicle.input_names
     nominal = world.nominal_voltage
-    around = world.environment()
+    around = world.environment
     law = pilot.decide.graph(len(vehicle.state_names) + 4, pilot.memory.size, pilot.gain_count)
     steps = world.steps_back
+    own = {"bar": False, "barred": False, "hows": [], "folder": "", "estimates": [], "learns": False}
     return {
         "name": name,
         "hello": {
@@ -61,8 +67,6 @@ def _model(world: World, name: str, draws: Sequence[Vehicle]) -> dict[str, Any]:
             "trust": vehicle.card.trust,
             "about": vehicle.traits.about,
             "wind": vehicle.traits.wind,
-            "bar": False,
-            "hows": [],
             "controller": pilot.title,
             "picture": picture(vehicle),
             "inputs": inputs_of(vehicle),
@@ -70,11 +74,10 @@ def _model(world: World, name: str, draws: Sequence[Vehicle]) -> dict[str, Any]:
             "decoupling": pilot.decouples,
             "voltages": None if nominal is None else [round(0.8 * nominal, 1), round(1.08 * nominal, 1)],
             "rate": 1.0 / world.period,
-            "folder": "",
-            "estimates": [],
-            "fan": len(draws),
+            "fan": len(world.draws),
             "fan_seconds": FAN_SECONDS,
-            "learns": False,
+            **own,
+            **more,
         },
         "states": [list(pair) for pair in zip(vehicle.state_names, vehicle.state_units, strict=True)],
         "period": world.period,
@@ -83,26 +86,27 @@ def _model(world: World, name: str, draws: Sequence[Vehicle]) -> dict[str, Any]:
             "carried": pilot.memory.size,
             "gains": pilot.gain_count,
             "draws": law.draws,
-            "crafts": 2 + len(draws),
+            "crafts": 2 + len(world.draws),
         },
         "back": steps.ravel().tolist(),
         "trim": {"x": world.trim.state.tolist(), "u": np.asarray(world.trim.inputs).tolist()},
         "carried": np.asarray(pilot.memory).tolist(),
         "card": parameter_row(vehicle, around).tolist(),
-        "draws": [parameter_row(one, around).tolist() for one in draws],
+        "draws": [parameter_row(one, around).tolist() for one in world.draws],
         "gains": {mode: [pilot.gains[mode, on].tolist() for on in (True, False)] for mode in pilot.modes},
-        "mode": world.setting.mode,
-        "voltage": world.setting.voltage,
+        "mode": world.mode,
+        "voltage": float(around.voltage),
         "speed": pilot.speed,
         "climb": pilot.climb,
         "turn": pilot.turn,
         "linear": vehicle.traits.linear,
         "ground": bool(vehicle.card.options.get("ground")),
         "fastest": vehicle.card.fastest,
+        "held": list(dict(vehicle.trim_held)),
         "largest": largest_states(vehicle).tolist(),
         "gusts": [
             {part: np.atleast_1d(value).tolist() for part, value in one._asdict().items()}
-            for one in gust_filters(1.0, rate=1.0 / world.period)
+            for one in gust_filters(rate=1.0 / world.period)
         ],
         "maneuvers": {kind: _shape(kind, world.period) for kind in _KINDS},
         "axes": {axis: _vector(world, axis, names) for axis in STICKS},
@@ -128,7 +132,7 @@ def _vector(world: World, axis: str, names: Sequence[str]) -> list[float]:
 
 def _pose(world: World) -> dict[str, Any]:
     """How rotors, bar and tail stand in the hover, and how states and inputs move that, to first order."""
-    pose, around = pose_of(world.vehicle), world.environment()
+    pose, around = pose_of(world.vehicle), world.environment
     x, u = np.array(world.trim.state, dtype=float), np.array(world.trim.inputs, dtype=float)
 
     def flat(row: Array) -> tuple[Array, dict[str, Any]]:

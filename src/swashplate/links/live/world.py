@@ -1,47 +1,35 @@
-"""The simulation behind the live page: one helicopter and perhaps its ghost, a controller step at a time."""
+"""What flies on the live page as it begins: hover, the pilot's law, how late inputs act."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
-from swashplate.engine.fly import FlightPlan, fly
-from swashplate.engine.trace import traced_force
-from swashplate.errors import ControllerError, SwashError
-from swashplate.flights.maneuvers.series import Maneuver
-from swashplate.links.live.flown import Craft, Moment, Setting
 from swashplate.links.live.picture import picture
-from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
+from swashplate.links.live.pilots import Mode, Pilot, pilot
 from swashplate.models.delays import input_delays
-from swashplate.models.doubts import doubts
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import Environment
 from swashplate.simulation.controller import Controller
-from swashplate.simulation.record import check_divergence
 from swashplate.simulation.stepping import LONGEST_STEP
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
-from swashplate.simulation.wind import GustFilter, Gusts, Turbulence, filters_of_gusts
+from swashplate.simulation.wind import GustFilter, Gusts, filters_of_gusts
 
 PHYSICS_RATE = 500.0
 """Runge-Kutta steps per second [Hz], in the air."""
 FAN_SECONDS = 2.0
 """How long drawn models fly on their own."""
+OPENS: Mode = "attitude"
+"""The mode in which a page opens, where the law flies it."""
 _GUST_LENGTH, _GUST_SPEED = 5.0, 2.0
-_LEAN = np.radians(60.0)
-_HELD_WITHIN = 3.0
-"""m from a place that is held, beyond which it is not."""
-"""Roll or pitch at which the flight of a linear model ends: its angles are small ones."""
 
 
 class World:
-    """Everything that moves. Not for several threads at once.
+    """What flies, at its start; the page flies it (`page/flight.js`).
 
     Args:
         vehicle: what flies.
@@ -49,7 +37,16 @@ class World:
         believed: what the pilot's law is made for; the vehicle where None.
         draws: models that a fit cannot tell from this one. They fly beside it under the same law and sticks, and begin
             anew where it is every `FAN_SECONDS`.
-        seed: of the gusts.
+
+    Attributes:
+        environment: of its hover. nominal_voltage: of its battery [V], None without.
+        start_height: of its hover [m]. trim: the hover. pilot: the law. mode: in which it begins.
+        substeps: of physics in one period of the law. period: of the law [s].
+        delays: from command to actuator [s], by input.
+        steps_back: how many periods ago the input was given that acts in a step, shape (substeps, n_inputs).
+
+    Raises:
+        SwashError: where it has no hover, or the controller is for another vehicle.
     """
 
     def __init__(
@@ -59,33 +56,20 @@ class World:
         controller: Controller | None = None,
         believed: Vehicle | None = None,
         draws: Sequence[Vehicle] = (),
-        seed: int = 0,
     ) -> None:
-        self.vehicle = vehicle
-        self._linear = vehicle.traits.linear
-        battery = vehicle.card.values().get("voltage_nominal")
-        self.nominal_voltage = battery
-        around = environment_of(vehicle)
+        self.vehicle, self.draws, self._controller = vehicle, tuple(draws), controller
+        self.nominal_voltage = vehicle.card.values().get("voltage_nominal")
+        self.environment = environment_of(vehicle)
         self.start_height = max(2.0, 8.0 * picture(vehicle)["size"])
-        self.trim: Trim = find_trim(vehicle, height=self.start_height, environment=around)
-        self._environment, self._seed, self._controller = around, seed, controller
+        self.trim: Trim = find_trim(vehicle, height=self.start_height, environment=self.environment)
         self.pilot: Pilot = self.law_for(believed or vehicle)
-        self.setting = Setting(voltage=float(around.voltage))
-        if self.setting.mode not in self.pilot.modes:
-            self.setting.mode = self.pilot.modes[-1]
-        self.latest = np.empty(0)
-        self._force = traced_force(equations_of(vehicle)) if self.pilot.feels else None
-        self._p = parameter_row(vehicle, around)
-        self._drawn = [parameter_row(one, around) for one in draws]
-        self._limits = np.array(vehicle.input_limits).T
+        self.mode = OPENS if OPENS in self.pilot.modes else self.pilot.modes[-1]
         # Skids and stopped rotors need the step that links take.
-        self._rate = 1.0 / LONGEST_STEP if vehicle.card.options.get("ground") else PHYSICS_RATE
-        self._substeps = round(self._rate / self.pilot.rate)
-        self.period = self._substeps / self._rate
-        self.delays = _delays(vehicle, self.pilot.delays)
-        self._back = _steps_back(self.delays, self._substeps, self._rate)
-        self._maneuver: tuple[Maneuver, int] | None = None
-        self.reset()
+        rate = 1.0 / LONGEST_STEP if vehicle.card.options.get("ground") else PHYSICS_RATE
+        self.substeps = round(rate / self.pilot.rate)
+        self.period = self.substeps / rate
+        self.delays = delays_of(vehicle, self.pilot.delays)
+        self.steps_back = steps_back(self.delays, self.substeps, rate)
 
     def law_for(self, vehicle: Vehicle) -> Pilot:
         """The pilot's law, made for the numbers of some vehicle of the same kind.
@@ -93,243 +77,21 @@ class World:
         Raises:
             SwashError: where it has no hover, or the controller is for another vehicle.
         """
-        about = find_trim(vehicle, height=self.start_height, environment=self._environment)
+        about = find_trim(vehicle, height=self.start_height, environment=self.environment)
         return pilot(vehicle, about, controller=self._controller)
 
-    @property
-    def steps_back(self) -> NDArray[np.int_]:
-        """How many periods ago the input was given that acts in a step, shape (steps of a period, inputs)."""
-        return self._back
 
-    # ---- what the pilot does -----------------------------------------------------------------------------------
-    def reset(self) -> None:
-        """Back to the hover in still air; switches stay, what was being recorded is kept up to here."""
-        self.ticks, self.trouble = 0, ""
-        self.setting.wind, self.setting.gusts = (0.0, 0.0, 0.0), 0.0
-        self._maneuver = None
-        self._crafts = {"own": self._fresh()}
-        if self.setting.ghost:
-            self._crafts["ghost"] = self._fresh()
-        self._turbulence: Turbulence | None = None
-        self._target = np.array(self.trim.state[[0, 1, 2, 8]])
-        self._begin_fan()
-
-    def _begin_fan(self) -> None:
-        self._fan: list[Craft | None] = [self._crafts["own"].copied() for _ in self._drawn]
-        self._fan_begun = self.ticks
-
-    def _fresh(self) -> Craft:
-        inputs = np.array(self.trim.inputs)
-        past = np.tile(inputs, (1 + int(self._back.max()), 1))
-        return Craft(np.array(self.trim.state), past, np.array(self.pilot.memory), inputs)
-
-    def set_mode(self, mode: Mode) -> None:
-        """Another mode in flight: it begins where the aircraft is.
-
-        Raises:
-            ControllerError: a mode that the controller does not fly.
-        """
-        if mode not in self.pilot.modes:
-            raise ControllerError(f"flies {', '.join(self.pilot.modes)} only, not {mode}.", where=self.pilot.title)
-        if mode != self.setting.mode:
-            self.setting.mode = mode
-            for craft in self._crafts.values():
-                craft.memory = np.array(self.pilot.memory)
-            self._begin_fan()
-            self._target = self._crafts["own"].x[[0, 1, 2, 8]].copy()
-
-    def set_ghost(self, on: bool) -> None:
-        """A second copy with the decoupling the other way, from where the first one is now."""
-        self.setting.ghost = on
-        own = self._crafts["own"]
-        self._crafts.pop("ghost", None)
-        if on:
-            self._crafts["ghost"] = own.copied()
-
-    def set_gusts(self, sigma: float) -> None:
-        """Turbulence of a standard deviation [m/s] across the wind; none at zero."""
-        self.setting.gusts = sigma
-        self._turbulence = None
-        if sigma > 0.0:
-            self._turbulence = Turbulence(_gusts(sigma), rate=1.0 / self.period, seed=self._seed)
-
-    def fly_maneuver(self, maneuver: Maneuver) -> None:
-        """Add a maneuver to the inputs from now on.
-
-        Raises:
-            ManeuverError: where the vehicle lacks what it moves.
-        """
-        maneuver.offsets(np.zeros(1), inputs=self.vehicle.input_names, axes=self.vehicle.stick_axes)
-        self._maneuver = (maneuver, self.ticks)
-
-    @property
-    def maneuver_left(self) -> float:
-        """Seconds until the maneuver is over; zero where none is flown."""
-        if self._maneuver is None:
-            return 0.0
-        maneuver, begun = self._maneuver
-        return max(0.0, maneuver.duration - (self.ticks - begun) * self.period)
-
-    # ---- time --------------------------------------------------------------------------------------------------
-    def step(self) -> None:
-        """One controller period further, for every copy; stands still where something went wrong."""
-        if self.trouble:
-            return
-        wanted, around, added = self._wanted(), self._around(), self._added()
-        before = self._crafts["own"].x
-        if self._fan and (self.ticks - self._fan_begun) * self.period >= FAN_SECONDS:
-            self._begin_fan()
-        flying = [(craft, self._p, self.setting.decoupled != (name == "ghost")) for name, craft in self._crafts.items()]
-        flying += [(c, p, self.setting.decoupled) for c, p in zip(self._fan, self._drawn, strict=True) if c is not None]
-        for craft, p, decoupled in flying:
-            self._advance(craft, p, self.pilot.gains[self.setting.mode, decoupled], wanted, around, added)
-        self._fan = [None if c is None or self._lost(c.x) else c for c in self._fan]
-        own = self._crafts["own"]
-        self._check(own, before)
-        if self.trouble:
-            return
-        self.latest = np.concatenate([before, own.inputs, around])
-        ghost = self._crafts.get("ghost")
-        if ghost is not None and self._lost(ghost.x):
-            self.set_ghost(False)
-        self.ticks += 1
-
-    def _advance(self, craft: Craft, p: Array, gains: Array, wanted: Array, around: Array, added: Array) -> None:
-        """One controller step of a copy: the law, then `_substeps` of physics with its inputs held."""
-        columns = np.arange(craft.past.shape[1])
-        acting = craft.past[len(craft.past) - 1 - self._back[-1], columns]
-        told = np.concatenate([craft.x, self._feel(craft.x, acting, around, p), around[-1:]])
-        craft.memory, command = self.pilot.decide(craft.memory, told, wanted, gains)
-        craft.inputs = np.clip(command + added, *self._limits)
-        craft.past = np.concatenate([craft.past[1:], craft.inputs[None]])
-        sent = craft.past[len(craft.past) - 1 - self._back, columns]
-        rows = np.concatenate([sent, np.tile(around, (len(sent), 1))], axis=1)
-        rows = np.concatenate([rows, rows[-1:]])
-        plan = FlightPlan(craft.x[:, None], p[:, None], rows[:, :, None], 1.0 / self._rate, keep=self._substeps)
-        craft.x = fly(self.vehicle, plan, quaternion=not self._linear)[0][-1, :, 0]
-
-    def _feel(self, x: Array, inputs: Array, around: Array, p: Array) -> Array:
-        """The specific force [m/s^2], where the law is told of it."""
-        if self._force is None:
-            return np.zeros(3)
-        return np.asarray(self._force(x, np.concatenate([inputs, around]), p))[:, 0]
-
-    def _lost(self, x: Array) -> bool:
-        """Whether a ghost has flown to where it shows nothing any more."""
-        if not np.all(np.isfinite(x)):
-            return True
-        return _leans_too_far(x) if self._linear else bool(x[2] >= 0.5 + self.start_height)
-
-    def _check(self, own: Craft, before: Array) -> None:
-        try:
-            check_divergence(self.vehicle, np.zeros(1), own.x[None], None)
-        except SwashError:
-            self.trouble = "The simulation left the range in which the equations hold. Reset to fly again."
-            own.x = before
-            return
-        if self._linear:
-            if _leans_too_far(own.x):
-                self.trouble = "Leans 60 deg, where a linear model tells nothing any more. Reset to fly again."
-                own.x = before
-            return
-        grounded = bool(self.vehicle.card.options.get("ground"))
-        if own.x[2] > 0.0 and not grounded:
-            sink = (own.x[2] - before[2]) / self.period
-            self.trouble = f"Touched the ground at {sink:.1f} m/s. Reset to fly again."
-            own.x = before
-
-    def _wanted(self) -> Array:
-        """The reference row: sticks move what is held, or go through."""
-        setting, law, s = self.setting, self.pilot, self.setting.sticks
-        row = dict.fromkeys(WANTED, 0.0)
-        if setting.mode == "raw":
-            self._target = self._crafts["own"].x[[0, 1, 2, 8]].copy()
-            row.update(yaw=s["yaw"], heave=s["heave"])
-        else:
-            height = self._target[2] - self.period * law.climb * s["heave"]
-            self._target[2] = height if self._linear else min(height, -0.2)
-            self._target[3] += self.period * law.turn * s["yaw"]
-        if setting.mode in ("raw", "held", "attitude"):
-            row.update(roll=s["roll"], pitch=s["pitch"])
-        else:
-            ahead, right = law.speed * s["pitch"], law.speed * s["roll"]
-            row.update(ahead=ahead, right=right)
-            c, n = np.cos(self._target[3]), np.sin(self._target[3])
-            self._target[:2] += self.period * np.array([c * ahead - n * right, n * ahead + c * right])
-        row.update(x=self._target[0], y=self._target[1], z=self._target[2], psi=self._target[3])
-        return np.array([row[name] for name in WANTED])
-
-    def _around(self) -> Array:
-        wind = np.array(self.setting.wind)
-        if self._turbulence is not None:
-            wind = wind + self._turbulence.sample()
-        return np.array([*wind, self.setting.voltage])
-
-    def _added(self) -> Array:
-        none = np.zeros(len(self.vehicle.input_names))
-        if self._maneuver is None:
-            return none
-        maneuver, begun = self._maneuver
-        now = (self.ticks - begun) * self.period
-        if now >= maneuver.duration:
-            self._maneuver = None
-            return none
-        offsets = maneuver.offsets(np.array([now]), inputs=self.vehicle.input_names, axes=self.vehicle.stick_axes)
-        return np.array([offsets[name][0] for name in self.vehicle.input_names])
-
-    # ---- looking -----------------------------------------------------------------------------------------------
-    def moment(self) -> Moment:
-        """What is flown now."""
-        crafts = {name: (craft.x, craft.inputs) for name, craft in self._crafts.items()}
-        around = np.array([*self.setting.wind, self.setting.voltage])
-        target, number = self._target.copy(), self.setting.stick_number
-        fan = tuple(None if craft is None else craft.x for craft in self._fan)
-        begun = self._fan_begun * self.period
-        return Moment(self.ticks * self.period, crafts, around, target, number, self.trouble, fan, begun)
-
-    def doubts(self) -> tuple[str, ...]:
-        """What the flight is not that the pilot may take it for, now: a place that is not held, a speed or a state
-        beyond what the vehicle holds for, in sentences."""
-        own, remarks = self._crafts["own"], []
-        off = float(np.hypot(*(own.x[:2] - self._target[:2])))
-        if self.setting.mode == "position" and off > _HELD_WITHIN:
-            ends = [
-                name
-                for name, value, (low, high) in zip(
-                    self.vehicle.input_names, own.inputs, self.vehicle.input_limits, strict=True
-                )
-                if (value <= low or value >= high) and name not in dict(self.vehicle.trim_held)
-            ]
-            why = f": {', '.join(ends)} at the limit" if ends else ""
-            if not ends and any(self.setting.wind):
-                why = ": the controller leans no more than it may, which is too little against this wind"
-            remarks.append(f"The place is not held, it is {off:.0f} m away{why}.")
-        if np.all(np.isfinite(own.x)):
-            said = doubts(self.vehicle, own.x, own.inputs, self.environment())
-            remarks += [f"{words[:1].upper()}{words[1:]}." for words in said]
-        return tuple(remarks)
-
-    def environment(self) -> Environment:
-        """The surroundings as the sliders have them, without gusts."""
-        row = [*self.setting.wind, self.setting.voltage]
-        return self._environment._replace(**dict(zip(SURROUNDINGS, row, strict=True)))
-
-    def keep_setting(self, other: World) -> None:
-        """Take over the switches of another world (a bar was put on or off)."""
-        self.setting = replace(other.setting, sticks=dict(other.setting.sticks))
-        self.reset()
+def gust_filters(*, rate: float) -> list[GustFilter]:
+    """White noise to the page's turbulence with a standard deviation of 1 m/s, at so many samples a second."""
+    return filters_of_gusts(page_gusts(1.0), rate)
 
 
-def _gusts(sigma: float) -> Gusts:
+def page_gusts(sigma: float) -> Gusts:
+    """The page's turbulence of a standard deviation [m/s]."""
     return Gusts((sigma, sigma, 0.6 * sigma), (_GUST_LENGTH,) * 3, _GUST_SPEED)
 
 
-def gust_filters(sigma: float, *, rate: float) -> list[GustFilter]:
-    """White noise to the page's turbulence of a standard deviation [m/s], at so many samples a second."""
-    return filters_of_gusts(_gusts(sigma), rate)
-
-
-def _delays(vehicle: Vehicle, delays: Array | None) -> Array:
+def delays_of(vehicle: Vehicle, delays: Array | None) -> Array:
     """From command to actuator [s], by input."""
     if delays is not None:
         return np.asarray(delays, dtype=np.float64)
@@ -337,11 +99,7 @@ def _delays(vehicle: Vehicle, delays: Array | None) -> Array:
     return np.array([late.get(name, 0.0) for name in vehicle.input_names])
 
 
-def _steps_back(delays: Array, substeps: int, rate: float) -> NDArray[np.int_]:
+def steps_back(delays: Array, substeps: int, rate: float) -> NDArray[np.int_]:
     """How many controller steps ago the input was given that acts in a substep, shape (substeps, n_inputs)."""
     waits = np.round(delays * rate).astype(np.int_)
     return np.asarray(np.maximum(0, -((np.arange(substeps)[:, None] - waits) // substeps)))
-
-
-def _leans_too_far(x: Array) -> bool:
-    return bool(np.max(np.abs(x[6:8])) > _LEAN)

@@ -19,7 +19,6 @@ from starlette.types import ASGIApp
 
 from swashplate.errors import SwashError
 from swashplate.links.web.connections import OneLine, Punctual
-from swashplate.links.web.priority import come_first
 from swashplate.systems import HANGUP
 
 _POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
@@ -80,11 +79,12 @@ class _Number(Convertor[int]):
 register_url_convertor("number", _Number())
 
 
-def page(path: Path) -> Callable[[Request], Response]:
-    """Answers with an HTML page that may load only what this server has."""
+def page(path: Path, *, code: bool = False) -> Callable[[Request], Response]:
+    """Answers with an HTML page that may load only what this server has; `code`: and compile WebAssembly of it."""
+    policy = f"{_POLICY}; script-src 'self' 'wasm-unsafe-eval'" if code else _POLICY
 
     def answer(_: Request) -> Response:
-        return FileResponse(path, headers={"content-security-policy": _POLICY})
+        return FileResponse(path, headers={"content-security-policy": policy})
 
     return answer
 
@@ -128,15 +128,12 @@ class _Server(uvicorn.Server):
                 signal.signal(HANGUP, before)
 
 
-def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0, first: bool = True) -> None:
+def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0) -> None:
     """Serve until interrupted; an interrupt is the ordinary end.
 
     Args:
         app, frame: as of `configured`.
-        first: ask the system to run this thread before others: a flight that is flown cannot wait.
     """
     config = configured(app, frame=frame)
-    if first:
-        come_first()  # the interpreter's lock must not be held by a thread that waits for a processor
     with contextlib.suppress(KeyboardInterrupt):
         _Server(config).run(sockets=[listening])

@@ -16,21 +16,9 @@ from swashplate.flights.flight import Flight
 from swashplate.links.live import recording as module
 from swashplate.links.live.recording import LiveRecording, recover
 from swashplate.links.live.session import LiveSession
+from told_rows import rows, told
 
 PERIOD = 0.01
-
-
-def rows(count: int) -> np.ndarray:
-    """So many periods of a CoaX that turns slowly, shape (n, states and inputs and surroundings)."""
-    vehicle = sp.vehicle("coax")
-    trim = sp.trim(vehicle)
-    width = len(vehicle.state_names) + len(vehicle.input_names)
-    row = np.concatenate([trim.state, trim.inputs, np.zeros(4)])
-    row[-1] = 12.0
-    table = np.tile(row, (count, 1))
-    table[:, vehicle.state_names.index("psi")] = np.linspace(0.0, 0.5, count)
-    assert table.shape[1] == width + 4
-    return table
 
 
 def begun(folder: Path, count: int = 300) -> tuple[LiveRecording, np.ndarray]:
@@ -38,6 +26,17 @@ def begun(folder: Path, count: int = 300) -> tuple[LiveRecording, np.ndarray]:
     for row in table:
         going.add(row)
     return going, table
+
+
+@pytest.fixture(autouse=True)
+def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No page flies here: rows are told to the session as a page tells them."""
+    monkeypatch.setattr("swashplate.links.live.session.web_assembly", lambda source: b"")
+
+
+def fly(session: LiveSession, count: int) -> None:
+    """So many periods more, as a page tells them."""
+    session.fly(told(session.version, session._tick + 1, count))
 
 
 def names(folder: Path) -> list[str]:
@@ -59,18 +58,15 @@ def test_every_row_is_on_disk_before_the_recording_ends(tmp_path: Path) -> None:
 def test_a_full_disk_ends_the_recording_with_what_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session = LiveSession(sp.vehicle("coax"), controller=None, folder=tmp_path)
     asyncio.run(session.obey({"type": "record", "value": True}))
-    for _ in range(250):
-        session._step()
+    fly(session, 250)
 
     def full(*_: object) -> int:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as during:
         during.setattr(os, "write", full)
-        for _ in range(50):
-            session._step()
-    assert session.world.ticks == 300, "the flight goes on"
-    notice = session.moment()["notice"]
+        fly(session, 50)
+    notice = session.told()["notice"]
     assert notice.startswith("The recording has stopped after 2.5 s: ")
     assert "No space left on device" in notice
     asyncio.run(session.obey({"type": "record", "value": False}))
@@ -88,8 +84,7 @@ def test_flights_that_cannot_be_written_leave_the_growing_file_for_the_next_sess
     told: list[str] = []
     session = LiveSession(sp.vehicle("coax"), controller=None, folder=tmp_path, tell=told.append)
     asyncio.run(session.obey({"type": "record", "value": True}))
-    for _ in range(250):
-        session._step()
+    fly(session, 250)
 
     def full(path: Path) -> None:
         raise WriteError("cannot be written: No space left on device.", where=path)
@@ -100,8 +95,7 @@ def test_flights_that_cannot_be_written_leave_the_growing_file_for_the_next_sess
             asyncio.run(session.obey({"type": "record", "value": False}))
         assert names(tmp_path) == ["card-1.toml", "recording-1.growing"]
         asyncio.run(session.obey({"type": "record", "value": True}))
-        for _ in range(250):
-            session._step()
+        fly(session, 250)
         session.close()
     assert names(tmp_path) == ["card-1.toml", "card-2.toml", "recording-1.growing", "recording-2.growing"]
     assert told[:2] == [f"Recording {n} grows in {tmp_path / f'recording-{n}.growing'}." for n in (1, 2)]
@@ -135,12 +129,10 @@ def test_a_second_press_on_record_loses_nothing_and_half_an_hour_is_the_end(
     session = LiveSession(sp.vehicle("coax"), controller=None, folder=tmp_path)
     for _ in range(2):
         asyncio.run(session.obey({"type": "record", "value": True}))
-        for _ in range(150):
-            session._step()
-    assert session.moment()["recording"] == 3.0
+        fly(session, 150)
+    assert session.told()["recording"] == 3.0
     monkeypatch.setattr(module, "LONGEST", 3.5)
-    for _ in range(100):
-        session._step()
-    assert session.moment()["notice"] == "The recording ends here: it has 3.5 s. Save it, and begin another one."
+    fly(session, 100)
+    assert session.told()["notice"] == "The recording ends here: it has 3.5 s. Save it, and begin another one."
     session.close()
     assert Flight.load(tmp_path / "recording-1-truth.nc").values("x").size == 350

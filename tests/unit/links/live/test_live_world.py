@@ -1,10 +1,8 @@
-"""What is flown on the live page: the same equations as offline, sticks that mean what they say, recordings, time."""
+"""What is flown on the live page: the same equations as offline, sticks that mean what they say, recordings."""
 
 from __future__ import annotations
 
-import os
 import threading
-import time
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,6 +12,7 @@ import scipy.linalg
 
 import swashplate as sp
 from flown_by_hand import U, V, X, Y, Z, flown_rows, fly, fresh, holds_what_is_held, moves_its_way, recorded
+from flown_here import World
 from swashplate.control.laws.linear_decoupling import static_decoupling
 from swashplate.control.lqg.design import design
 from swashplate.errors import ControllerError, FlightError
@@ -21,11 +20,9 @@ from swashplate.filtering.sensor_suite import suite
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
-from swashplate.links.live.clock import Clock
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
-from swashplate.links.live.world import FAN_SECONDS, Setting, World
-from swashplate.links.web.priority import come_first
+from swashplate.links.live.world import FAN_SECONDS
 from swashplate.models.card import packaged_cards
 from swashplate.simulation.wind import Gusts, Turbulence, dryden
 
@@ -154,8 +151,8 @@ def test_in_the_mode_it_opens_in_short_presses_and_long_ones_end_level(world: Wo
     assert np.max(np.abs(rests[[phi, theta]])) < np.radians(5.0)
 
 
-def test_it_opens_in_attitude() -> None:
-    assert Setting().mode == "attitude"
+def test_it_opens_in_attitude(world: World) -> None:
+    assert world.mode == "attitude"
 
 
 def test_modes_change_in_flight_without_a_jump(coax: World) -> None:
@@ -330,65 +327,6 @@ def test_every_card_has_a_picture_and_its_thrust_carries_the_weight(name: str) -
     # A lean, the fin and the drag of the downwash take a few per cent.
     assert lift == pytest.approx(shape["weight"], rel=0.12)
     assert (shape["bar"] is None) == (told["bar"] is None)
-
-
-def test_the_clock_keeps_time_and_counts_what_is_late() -> None:
-    took = []
-
-    def step() -> None:
-        took.append(time.perf_counter())
-        if len(took) == 20:
-            time.sleep(0.06)  # several periods
-
-    clock = Clock(step, period=0.01, lock=threading.Lock())
-    clock.start()
-    clock.go(True)
-    time.sleep(0.6)
-    clock.go(False)
-    time.sleep(0.05)
-    stopped = len(took)
-    time.sleep(0.05)
-    clock.close()
-    assert len(took) == stopped, "time stands still"
-    assert 4 <= clock.punctuality.late < stopped
-    span = took[-1] - took[0]
-    assert stopped == pytest.approx(span / 0.01 + 1, abs=6), "lost time is made up for"
-
-
-@pytest.mark.skipif(not hasattr(os, "SCHED_RR"), reason="this system has no SCHED_RR")
-def test_a_thread_comes_first_where_the_machine_allows_it_and_nothing_that_it_starts_does() -> None:
-    found: dict[str, object] = {}
-
-    def ask() -> None:
-        found["granted"] = come_first()
-        found["own"] = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
-        child = threading.Thread(target=lambda: found.setdefault("child", os.sched_getscheduler(0)))
-        child.start()
-        child.join()
-
-    thread = threading.Thread(target=ask)
-    thread.start()
-    thread.join()
-    assert found == {
-        "granted": found["granted"],
-        "own": os.SCHED_RR if found["granted"] else os.SCHED_OTHER,
-        "child": os.SCHED_OTHER,
-    }
-
-
-def test_what_fails_in_the_clock_is_told() -> None:
-    def step() -> None:
-        raise ZeroDivisionError("of the test")
-
-    clock = Clock(step, period=0.01, lock=threading.Lock())
-    clock.start()
-    clock.go(True)
-    for _ in range(100):
-        if clock.failure is not None:
-            break
-        time.sleep(0.01)
-    clock.close()
-    assert isinstance(clock.failure, ZeroDivisionError)
 
 
 def test_a_place_that_the_wind_takes_is_told_and_one_that_is_held_is_not(coax: World) -> None:

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from flown_here import World
+from swashplate import compiler
 from swashplate.errors import ExportError, MissingLibraryError
 from swashplate.links.live import frame_code
 from swashplate.links.live.single_page import single_page
-from swashplate.links.live.world import World
 from swashplate.links.web.libraries import PAGE
 
 NO_CODE = b"\0asm\1\0\0\0"
@@ -97,16 +98,19 @@ def test_what_is_no_vehicle_and_too_many_draws_are_refused() -> None:
 
 
 def test_without_ziglang_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(frame_code, "ziglang", lambda: None)
-    with pytest.raises(MissingLibraryError, match=r"a page that flies by itself needs .*swashplate\[compiler\]"):
+    monkeypatch.setattr(compiler, "ziglang", lambda: None)
+    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
+    with pytest.raises(MissingLibraryError, match=r"a page in which a model flies needs .*swashplate\[compiler\]"):
         frame_code.web_assembly("int one(void) { return 1; }", exports=["one"])
 
 
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="the extra 'compiler' is not installed")
-def test_a_module_imports_nothing_and_a_refusal_is_told(tmp_path: Path) -> None:
+def test_a_module_imports_mathematics_alone_and_a_refusal_is_told(tmp_path: Path) -> None:
     made = frame_code.web_assembly("double one(double x); double one(double x) { return x * 2; }", exports=["one"])
     assert made[:4] == b"\0asm"
     assert b"\x03one" in made
-    assert b"wasi_snapshot" not in made
+    assert b"math" not in made
+    sine = frame_code.web_assembly("#include <math.h>\ndouble one(double x) { return sin(x); }", exports=["one"])
+    assert b"\x04math\x03sin" in sine, "what it lacks is the browser's"
     with pytest.raises(ExportError, match="ziglang refused the model's C"):
         frame_code.web_assembly("no C", exports=["one"])

@@ -9,8 +9,8 @@ import pytest
 
 import swashplate as sp
 from flown_by_hand import fresh, holds_what_is_held, moves_its_way
+from flown_here import World
 from swashplate.links.live.axes import STICKS
-from swashplate.links.live.world import World
 from swashplate.simulation.standing import standing
 
 

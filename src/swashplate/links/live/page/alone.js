@@ -1,82 +1,27 @@
-// A page without a server: the model flies here, as WebAssembly, and says what the server of `swash live` says.
-import { Flight } from "./flight.js";
+// A page without a server: the model lies in the file, and what is recorded is saved to the downloads.
+import { Flown } from "./flown.js";
 
-const UPDATES = 1000 / 30, LONGEST = 0.25; // ms between what is told; s of flight that one turn may catch up with
 const FIELD = (name, unit) => (unit ? `${name} [${unit}]` : name);
 
-export class Connection {
+export class Connection extends Flown {
   constructor({ heard }) {
-    this.heard = heard;
-    this.model = JSON.parse(document.getElementById("model").textContent);
-    this.speed = 1;
-    this.runs = true;
-    this.busy = 0;
+    super({ heard });
     this.rows = null;
-    this.notice = "";
-    this.#begin();
+    this.begin(JSON.parse(document.getElementById("model").textContent), window.swashBytes.flight);
   }
 
-  async #begin() {
-    const module = await WebAssembly.compile(window.swashBytes.flight);
-    this.flight = new Flight(await WebAssembly.instantiate(module, {}), this.model);
-    this.heard({ type: "hello", version: 1, ...this.model.hello });
-    this.last = performance.now();
-    setInterval(() => this.#turn(), UPDATES);
+  kept(row) {
+    this.rows?.push([(this.rows.length * this.flight.period).toFixed(4), ...row]);
   }
 
-  // Time that a hidden page has slept through is not flown.
-  #turn() {
-    const at = performance.now();
-    const due = this.runs ? Math.min((at - this.last) / 1000, LONGEST) * this.speed : 0;
-    this.last = at;
-    this.left = (this.left ?? 0) + due;
-    const { period } = this.flight;
-    for (; this.left >= period; this.left -= period) this.#step();
-    this.busy = 0.95 * this.busy + (0.05 * (performance.now() - at)) / UPDATES;
-    this.heard(this.#moment());
+  more() {
+    return { notice: this.notice || this.flight.remark(), recording: this.rows ? this.rows.length * this.flight.period : null };
   }
 
-  #step() {
-    if (!this.flight.step()) return;
-    this.rows?.push([(this.rows.length * this.flight.period).toFixed(4), ...this.flight.latest]);
-  }
-
-  #moment() {
-    const { flight, speed, runs } = this;
-    const { setting } = flight;
-    return {
-      type: "moment", version: 1, t: flight.ticks * flight.period, ...flight.crafts(), fan: flight.fanned(), target: [...flight.target],
-      stick: setting.number, trouble: flight.trouble, notice: this.notice || flight.remark(), runs, speed, steps: flight.ticks, late: 0,
-      skipped: 0, busy: this.busy, maneuver: flight.maneuverLeft, recording: this.rows ? this.rows.length * flight.period : null,
-      recordings: [], job: null, frozen: "", estimates: [],
-      setting: { ...setting, bar: false },
-    };
-  }
-
-  say(type, fields = {}) {
-    const { flight } = this;
-    if (!flight) return;
-    const value = fields.value;
-    if (type !== "stick") this.notice = "";
-    const does = {
-      stick: () => flight.steer(fields),
-      mode: () => flight.setMode(value),
-      decoupled: () => (flight.setting.decoupled = value),
-      ghost: () => flight.setGhost(value),
-      wind: () => (flight.setting.wind = [fields.north, fields.east, fields.down]),
-      gusts: () => flight.setGusts(value),
-      voltage: () => (flight.setting.voltage = value),
-      maneuver: () => flight.flyManeuver(fields.kind, fields.axis, fields.size),
-      pause: () => (this.runs = !value),
-      step: () => {
-        this.runs = false;
-        this.#step();
-      },
-      speed: () => (this.speed = value),
-      reset: () => flight.reset(),
-      record: () => (value ? (this.rows = []) : this.#save()),
-    }[type];
-    does?.();
+  ask(type, { value }) {
+    if (type !== "record") return;
+    if (value) this.rows ??= [];
+    else this.#save();
   }
 
   // What was flown, as a table that `swash inspect` reads.

@@ -24,9 +24,22 @@ export class Flight {
     this.limits.set([...hello.inputs.map(({ low }) => low), ...hello.inputs.map(({ high }) => high)]);
     this.places.forEach(({ card }, i) => card.set(i < 2 ? model.card : model.draws[i - 2]));
     this.setting = { mode: model.mode, decoupled: true, ghost: false, wind: [0, 0, 0], gusts: 0, voltage: model.voltage,
-      sticks: { roll: 0, pitch: 0, yaw: 0, heave: 0 }, number: 0 };
+      sticks: { roll: 0, pitch: 0, yaw: 0, heave: 0 } };
     this.place = Object.fromEntries(["x", "y", "z", "u", "v", "w", "phi", "theta", "psi"].map((name) => [name, states.findIndex(([n]) => n === name)]));
     this.reset();
+  }
+
+  // The switches of the flight before; `goesOn` from where it is.
+  follow(old, goesOn) {
+    const { mode } = old.setting;
+    this.setting = { ...old.setting, mode: this.model.gains[mode] ? mode : this.model.mode };
+    this.reset();
+    if (!goesOn) return;
+    for (const craft of [0, 1]) for (const part of ["x", "past", "carried", "inputs"]) this.places[craft][part].set(old.places[craft][part]);
+    const { ticks, target, air, maneuver, trouble } = old;
+    Object.assign(this, { ticks, target, air, maneuver, trouble });
+    this.setting = { ...old.setting };
+    this.#beginFan();
   }
 
   // ---- what the pilot does
@@ -59,10 +72,6 @@ export class Flight {
     this.fan = this.model.draws.map((_, i) => i + 2);
     this.fan.forEach((craft) => this.#copy(craft));
     this.fanBegun = this.ticks;
-  }
-  steer(fields) {
-    for (const axis of Object.keys(this.setting.sticks)) this.setting.sticks[axis] = fields[axis];
-    this.setting.number = fields.number;
   }
   setMode(mode) {
     if (mode === this.setting.mode || !this.model.gains[mode]) return;
@@ -182,12 +191,18 @@ export class Flight {
     const discs = Array.from({ length: rotors }, (_, i) => flat.slice(6 * i, 6 * i + 6)), rest = flat.slice(6 * rotors);
     return { rotors: discs, bar: bar ? rest.slice(0, 2) : null, tail: tail ? rest.slice(-2) : null };
   }
-  remark() {
-    const { setting, model, place, target } = this, { x } = this.places[0], remarks = [];
+  // What the pilot must know of the flight as it is, "" for nothing; `air` where nobody else looks at its air speed.
+  remark(air = true) {
+    const { setting, model, place, target } = this, { x, inputs } = this.places[0], remarks = [];
     const off = Math.hypot(x[place.x] - target[0], x[place.y] - target[1]);
-    if (setting.mode === "position" && off > HELD) remarks.push(`The place is not held, it is ${off.toFixed(0)} m away.`);
+    if (setting.mode === "position" && off > HELD) {
+      const ends = model.hello.inputs.filter(({ name, low, high }, i) => (inputs[i] <= low || inputs[i] >= high) && !model.held.includes(name));
+      const why = ends.length ? `: ${ends.map(({ name }) => name).join(", ")} at the limit`
+        : setting.wind.some(Boolean) ? ": the controller leans no more than it may, which is too little against this wind" : "";
+      remarks.push(`The place is not held, it is ${off.toFixed(0)} m away${why}.`);
+    }
     const speed = this.airSpeed();
-    if (model.fastest !== null && speed > model.fastest) remarks.push(`Its air speed is ${speed.toFixed(1)} m/s: the card may be trusted up to ${model.fastest} m/s.`);
+    if (air && model.fastest !== null && speed > model.fastest) remarks.push(`Its air speed is ${speed.toFixed(1)} m/s: the card may be trusted up to ${model.fastest} m/s.`);
     return remarks.join(" ");
   }
   // Through the wind of the sliders, as `models/doubts.py` has it: velocity in body axes less the wind turned into them.

@@ -1,4 +1,4 @@
-// The live page: moments from the server to scene, instruments and charts; sticks and switches back.
+// The live page: sticks to the flight, one turn of it, and what it tells to scene, instruments and charts.
 import { Connection } from "./connection.js";
 import { Charts } from "./charts.js";
 import { Instruments } from "./instruments.js";
@@ -8,8 +8,8 @@ import { Scene } from "./scene.js";
 import { Sticks } from "./sticks.js";
 
 const $ = (id) => document.getElementById(id);
-const EXTRAPOLATED = 0.06; // s
-const CHARTS_EVERY = 100; // ms
+const TOLD_EVERY = 1 / 30; // s of flight between points of charts and trails
+const CHARTS_EVERY = 100, SHOWN_EVERY = 40; // ms: charts, and numbers beside the picture
 
 let scene;
 try {
@@ -19,12 +19,11 @@ try {
   $("trouble").textContent = "This browser draws no 3D (WebGL is off); charts, sticks and recordings work.";
 }
 const instruments = new Instruments($("instruments")), pace = new Pace(Boolean(scene?.software));
-let charts = null, hello = null, now = null, before = null, arrived = 0, drawn = 0, drawnTime = 0, chartsAt = 0;
+let charts = null, hello = null, now = null, before = null, charted = 0, drawn = 0, drawnTime = 0, chartsAt = 0, shownAt = 0;
 let fanBegun = null;
-let number = 0, sent = "", latency = null;
-const underway = new Map(); // stick messages by number and when they were sent
+let sent = "";
 
-const connection = new Connection({ heard, lost: () => ($("state").textContent = "connection lost, trying again …") });
+const connection = new Connection({ heard });
 const panel = new Panel((type, fields) => connection.say(type, fields), { view: (name) => scene && (scene.view = name) });
 const sticks = new Sticks($("sticks"), { onShortcut: (code) => panel.shortcut(code) });
 
@@ -37,29 +36,25 @@ function heard(message) {
     scene?.show(hello.picture);
     panel.hello(hello);
     now = before = null;
+    charted = -1;
     return;
   }
-  if (now && (message.t < now.t || message.version !== now.version)) {
+  if (now && message.t < now.t) {
     charts.clear();
     scene?.clearTrails();
     now = null;
+    charted = -1;
   }
-  before = now;
+  if (!now || message.t > now.t) before = now;
   now = message;
-  arrived = performance.now();
-  if (underway.has(now.stick)) {
-    const taken = arrived - underway.get(now.stick);
-    latency = latency === null ? taken : 0.9 * latency + 0.1 * taken;
-    for (const old of underway.keys()) if (old <= now.stick) underway.delete(old);
-  }
-  if (!before || now.t > before.t) {
+  if (now.t >= charted + TOLD_EVERY) {
+    charted = now.t;
     charts.add(now.t, now.own, now.ghost, now.estimates, now.fan?.x);
     for (const name of ["own", "ghost"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
     if (now.fan) scene?.leaveFan(now.fan.x, { anew: now.fan.begun !== fanBegun });
     fanBegun = now.fan?.begun ?? null;
   }
   panel.now = now; // what buttons act on is never older than what was heard
-  pace.told(now);
 }
 
 // Where a body state will be a few milliseconds after it was told, from its last two.
@@ -71,21 +66,26 @@ function ahead(name, seconds) {
 
 function draw() {
   if (!now) return;
-  const late = now.runs ? Math.min((performance.now() - arrived) / 1000, EXTRAPOLATED) * now.speed : 0;
+  const late = connection.left, begun = performance.now(); // what is flown is never further than a period behind
   const time = now.t + late, elapsed = Math.min(Math.max(time - drawnTime, 0), 0.1);
   drawnTime = time;
   const rows = {};
   for (const name of ["own", "ghost"]) if (now[name]) rows[name] = ahead(name, late);
   rows.fan = now.fan?.x;
   scene?.draw(rows, now, elapsed);
-  panel.show(now, latency);
-  instruments.show(now.own, hello.voltages ? `${now.setting.voltage.toFixed(2)} V` : "", hello.picture.rpm);
+  if (begun - shownAt >= SHOWN_EVERY) {
+    shownAt = begun;
+    panel.show(now);
+    instruments.show(now.own, hello.voltages ? `${now.setting.voltage.toFixed(2)} V` : "", hello.picture.rpm);
+  }
+  pace.took(performance.now() - begun);
   document.documentElement.dataset.drawn = String(Number(document.documentElement.dataset.drawn ?? 0) + 1);
 }
 
 function frame(at) {
   steer(Math.min((at - drawn) / 1000, 0.1));
   drawn = at;
+  connection.turn(at);
   if (!now || !hello) return;
   if (!pace.due(at)) return;
   draw();
@@ -102,11 +102,8 @@ function steer(elapsed) {
   panel.gamepad(sticks.gamepad);
   if (text === sent) return;
   sent = text;
-  number += 1;
-  underway.set(number, performance.now());
-  if (underway.size > 200) underway.clear();
-  connection.say("stick", { ...axes, number });
+  connection.say("stick", axes);
 }
 
-window.swash = { connection, sticks, scene, get now() { return now; }, get charts() { return charts; }, get latency() { return latency; }, pace };
+window.swash = { connection, sticks, scene, get now() { return now; }, get charts() { return charts; }, pace };
 pace.run(frame);

@@ -1,7 +1,6 @@
-// When the next picture is due: at every frame with a graphics card; where the processor that simulates also draws, ten a
-// second, and fewer while steps of the simulation come late.
+// When the next picture is due: at every frame with a graphics card; where the processor draws, ten a second, and fewer
+// where that takes it more than a third of the time.
 const FASTEST = 100, SLOWEST = 400; // ms between pictures
-const WINDOW = 100, MUCH = 0.005; // steps that are looked at, and the share of them that may be late
 const STEPPED = 33; // ms between looks at the sticks
 
 export class Pace {
@@ -9,16 +8,10 @@ export class Pace {
     this.software = software;
     this.interval = software ? FASTEST : 0;
     this.drawn = -1e9;
-    this.seen = null;
   }
-  // What the server counts, at every update.
-  told({ steps, late }) {
-    if (!this.seen || steps < this.seen.steps) this.seen = { steps, late };
-    const done = steps - this.seen.steps;
-    if (!this.software || done < WINDOW) return;
-    const share = (late - this.seen.late) / done;
-    this.interval = Math.min(SLOWEST, Math.max(FASTEST, share > MUCH ? 1.5 * this.interval : 0.97 * this.interval));
-    this.seen = { steps, late };
+  // A picture has taken so long [ms].
+  took(spent) {
+    if (this.software) this.interval = Math.min(SLOWEST, Math.max(FASTEST, 0.8 * this.interval + 0.6 * spent));
   }
   // True once each time a picture is due.
   due(at) {

@@ -116,7 +116,7 @@ export class Panel {
     write($("gamepad"), text);
   }
 
-  show(now, latency) {
+  show(now) {
     const { setting } = now;
     for (const button of document.querySelectorAll("[data-mode]"))
       press(button, button.dataset.mode === setting.mode);
@@ -140,11 +140,10 @@ export class Panel {
     const words = now.trouble || now.notice;
     $("trouble").hidden = !words;
     write($("trouble"), words);
-    const share = now.steps ? (100 * now.late) / now.steps : 0;
     const state = [
-      `${now.t.toFixed(1)} s`, now.runs ? "" : "paused", `late ${share.toFixed(2)} %`, `busy ${(100 * now.busy).toFixed(0)} %`,
+      `${now.t.toFixed(1)} s`, now.runs ? "" : "paused", `busy ${(100 * now.busy).toFixed(0)} %`,
+      now.skipped >= 0.1 ? `${now.skipped.toFixed(1)} s lost` : "",
       now.frozen ? `estimate stands still: ${now.frozen}` : "",
-      latency === null ? "" : `stick ${latency.toFixed(0)} ms`,
     ];
     write($("state"), state.filter(Boolean).join(" · "));
   }
