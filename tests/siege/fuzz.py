@@ -17,8 +17,8 @@ from .found import ROOT, Found, progress
 
 FUZZED = (sys.executable, "-m", "tests.siege.fuzzed")
 PLACES = (str(ROOT / "tests"), str(ROOT), os.environ.get("PYTHONPATH", ""))
-SLICE = 30.0
-"""s for a container at a time: the process is another one then, and takes up the inputs that were kept."""
+SLICE = 240.0
+"""s for a container at a time: then it is another process, which takes up the inputs that were kept."""
 
 
 class Fuzz:
