@@ -7,18 +7,10 @@ import numpy as np
 import pytest
 
 from swashplate.flights.conditioning.condition import condition, replay
-from swashplate.flights.conditioning.derive import derive
 from swashplate.flights.conditioning.ground import flying_interval
-from swashplate.flights.conditioning.lever_arm import lever_arm, move_to_cg, percussion_offset
 from swashplate.flights.conditioning.outliers import remove_outliers
-from swashplate.flights.conditioning.reconstruction import reconstruct
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
-
-# Card values (params_coax.csv): inertia, hub stiffness of both rotors, thrust times height of both rotors in hover.
-PERCUSSION = percussion_offset(
-    inertia=1.837e-3, hub_stiffness=0.1084 + 0.4278, thrust_moment=1.801 * 0.103 + 1.162 * 0.165
-)
 
 
 @cache
@@ -69,38 +61,3 @@ def test_the_history_redoes_it_from_the_file(name: str, request: pytest.FixtureR
     flight = conditioned(path)
     again = replay(read(path), flight.history)
     assert all(np.array_equal(again.values(c), flight.values(c)) for c in flight.channels)
-
-
-@pytest.mark.parametrize(("name", "least", "most"), [("flight_july", 0.15, 0.18), ("flight_august", 0.17, 0.21)])
-def test_the_tracked_point_lies_far_to_the_right(
-    name: str, least: float, most: float, request: pytest.FixtureRequest
-) -> None:
-    path = request.getfixturevalue(name)
-    found = lever_arm(conditioned(path), percussion=PERCUSSION)
-    assert least < found.y.value < most
-    assert found.y.t > 10
-    # Two independent equations: ax against the yaw acceleration, az against the roll acceleration.
-    for value, sigma, partial, coherence in found.y.equations.values():
-        assert least < value < most
-        assert value > 10 * sigma
-        assert partial > 0.5
-        assert coherence > 0.7
-    assert abs(found.x.value) < 0.04
-    assert abs(found.z.value) < 0.02
-    moved = derive(move_to_cg(condition(read(path), derive=False, cutoff=15.0), found.vector))
-    left = lever_arm(moved)
-    assert abs(left.y.value) < 0.01
-    assert np.std(moved.values("ax")) < 0.6 * np.std(conditioned(path).values("ax"))
-
-
-def test_both_flights_agree_on_the_height_of_the_tracked_point(flight_july: Path, flight_august: Path) -> None:
-    july, august = (lever_arm(conditioned(path)).z for path in (flight_july, flight_august))
-    assert abs(july.value - august.value) < 3 * np.hypot(july.sigma, august.sigma)
-
-
-def test_the_controller_is_seen_in_july(flight_july: Path) -> None:
-    found = reconstruct(conditioned(flight_july))
-    shifts = {(shift.source, shift.response): shift for shift in found.time_shifts}
-    assert not shifts["motor_lower", "r"].identifiable
-    assert not shifts["servo_roll", "p"].identifiable
-    assert not found.biases

@@ -16,7 +16,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.bench.lag import first_order, fit_lag
 from swashplate.bench.record import BenchRecord
-from swashplate.bench.result import BenchCheck, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchResult, Curve, weigh
 from swashplate.bench.virtual_bench import RecordSchedule
 from swashplate.errors import BenchError
 
@@ -71,16 +71,9 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 Curve(f"Bar angle {bar} in flight", "time [s]", "angle [deg]", time[::5],
                       np.degrees(record[bar][::5]), time[::5], np.degrees(fit.model[::5]))
             )  # fmt: skip
-    weights = np.array(sigmas) ** -2.0
     apart = (taus[0] - taus[1]) / np.hypot(sigmas[0], sigmas[1])
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        ("tau_f_upper",),
-        np.array([weights @ taus / weights.sum()]),
-        np.array([[1.0 / weights.sum()]]),
-        tuple(record.name for record in records),
-        (BenchCheck(f"Roll and pitch give time constants {apart:+.1f} sigmas apart.", good=abs(apart) < 3.5),),
-        tuple(curves),
+    tau, variance = weigh(taus, sigmas)
+    checks = [BenchCheck(f"Roll and pitch give time constants {apart:+.1f} sigmas apart.", good=abs(apart) < 3.5)]
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE), records, checks, curves, names=("tau_f_upper",), values=(tau,), covariance=(variance,)
     )

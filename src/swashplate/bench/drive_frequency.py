@@ -104,17 +104,16 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             where=", ".join(r.name for r in records),
             hint="Keep one of them, or record one longer.",
         )
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        tuple(names),
-        np.array(values),
-        np.diag(variances),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
-        records_of={name: (record.name,) for name, record in zip(names, records, strict=True)},
+    files = {name: (record.name,) for name, record in zip(names, records, strict=True)}
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE),
+        records,
+        checks,
+        curves,
+        names=names,
+        values=values,
+        covariance=variances,
+        records_of=files,
     )
 
 

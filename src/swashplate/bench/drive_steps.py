@@ -14,10 +14,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.bench.lag import LagFit, first_order, fit_lag
+from swashplate.bench.lag import LagFit, check_order, first_order, fit_lag, held_levels
 from swashplate.bench.record import BenchRecord
 from swashplate.bench.refusals import refuse_idle
-from swashplate.bench.result import BenchCheck, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchResult, Curve, weigh
 from swashplate.bench.virtual_bench import RecordSchedule, points
 from swashplate.errors import BenchError
 
@@ -39,12 +39,6 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
         words = f"{rotor} motor 0.50, 0.65, five times, 2 s each; {other} at hover"
         made.append(points(f"steps_{rotor}", (NAME,), steps, settle=0.0, hold=2.0, words=words))
     return made
-
-
-def held_levels(command: Array) -> Array:
-    """Indicator columns of the stretches over which a command stands still, shape (n, stretches)."""
-    stretch = np.cumsum(np.diff(command, prepend=command[0]) != 0.0)
-    return np.asarray(stretch[:, None] == np.arange(stretch[-1] + 1), dtype=np.float64)
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
@@ -78,32 +72,20 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         fits.setdefault(rotor, []).append(fit)
         files[f"tau_drive_{rotor}"] = (*files.get(f"tau_drive_{rotor}", ()), record.name)
         size = np.ptp(fit.linear)
-        checks += [_check_both_ways(record.name, rotor, fit, levels, record.dt), _check_order(record.name, fit, size)]
+        checks += [_check_both_ways(record.name, rotor, fit, levels, record.dt), check_order(record.name, fit, size)]
         shown = slice(0, min(speed.size, round(8.0 / record.dt)))
-        curves.append(
-            Curve(
-                f"Steps of the {rotor} motor",
-                "time [s]",
-                "rotor speed [rad/s]",
-                record["time"][shown],
-                speed[shown],
-                record["time"][shown],
-                fit.model[shown],
-            )
-        )
-    names = tuple(f"tau_drive_{rotor}" for rotor in fits)
-    weights = [np.array([fit.sigma**-2 for fit in group]) for group in fits.values()]
-    values = [float(w @ [fit.tau for fit in group] / w.sum()) for w, group in zip(weights, fits.values(), strict=True)]
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        names,
-        np.array(values),
-        np.diag([1.0 / w.sum() for w in weights]),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
+        at = record["time"][shown]
+        title = f"Steps of the {rotor} motor"
+        curves.append(Curve(title, "time [s]", "rotor speed [rad/s]", at, speed[shown], at, fit.model[shown]))
+    weighed = [weigh([fit.tau for fit in group], [fit.sigma for fit in group]) for group in fits.values()]
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE),
+        records,
+        checks,
+        curves,
+        names=[f"tau_drive_{rotor}" for rotor in fits],
+        values=[tau for tau, _ in weighed],
+        covariance=[variance for _, variance in weighed],
         records_of=files,
     )
 
@@ -122,15 +104,4 @@ def _check_both_ways(where: str, rotor: str, fit: LagFit, levels: Array, dt: flo
         f"{where}: the {rotor} rotor's residuals after steps up and down differ by {100 * (up - down) / size:+.1f} % "
         "of the step" + ("; one time constant does not hold for both ways." if differs else "."),
         good=not differs,
-    )
-
-
-def _check_order(where: str, fit: LagFit, size: float) -> BenchCheck:
-    """Whether one lag is enough, by what is left after it."""
-    left = float(np.sqrt(np.mean(np.convolve(fit.residuals, np.ones(10) / 10.0, mode="valid") ** 2)))
-    bad = left > 0.02 * size
-    return BenchCheck(
-        f"{where}: the smoothed residual is {100 * left / size:.1f} % of the steps"
-        + ("; a first-order lag does not describe them." if bad else "."),
-        good=not bad,
     )

@@ -102,15 +102,14 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                   1e3 * (fitted - line.residuals), blowing, 1e3 * density * line.values[0] * blowing * np.abs(blowing))
         )  # fmt: skip
     checks.append(BenchCheck("The mount's own drag is in these numbers unless it was measured alone and subtracted."))
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        tuple(names),
-        np.array(values),
-        np.diag(variances),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
-        records_of={name: (record.name,) for name, record in zip(names, records, strict=True)},
+    files = {name: (record.name,) for name, record in zip(names, records, strict=True)}
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE),
+        records,
+        checks,
+        curves,
+        names=names,
+        values=values,
+        covariance=variances,
+        records_of=files,
     )

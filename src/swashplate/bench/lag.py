@@ -14,6 +14,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from swashplate.arrays import Array
+from swashplate.bench.result import BenchCheck
 from swashplate.errors import BenchError
 from swashplate.identification.core import accuracy
 
@@ -112,3 +113,19 @@ def fit_lag(
 def _at(response: Callable[[float], tuple[Array, Sequence[Array]]], tau: float, linear: Array) -> Array:
     known, columns = response(tau)
     return np.asarray(known + np.column_stack(list(columns)) @ linear)
+
+
+def held_levels(command: Array) -> Array:
+    """Indicator columns of the stretches over which a command stands still, shape (n, stretches)."""
+    stretch = np.cumsum(np.diff(command, prepend=command[0]) != 0.0)
+    return np.asarray(stretch[:, None] == np.arange(stretch[-1] + 1), dtype=np.float64)
+
+
+def check_order(where: str, fit: LagFit, size: float, *, most: float = 0.02) -> BenchCheck:
+    """Whether one lag is enough, by what is left after it: at most this share of the steps."""
+    share = float(np.sqrt(np.mean(np.convolve(fit.residuals, np.ones(10) / 10.0, mode="valid") ** 2))) / size
+    return BenchCheck(
+        f"{where}: the smoothed residual is {100 * share:.1f} % of the steps"
+        + ("; a first-order lag does not describe them." if share > most else "."),
+        good=share <= most,
+    )

@@ -97,28 +97,19 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         )
     )
     ends = np.array([omega.min(), omega.max()])
-    curve = Curve(
-        "Phase lag of the lower rotor",
-        "rotor speed [rad/s]",
-        "phase lag offset [deg]",
-        omega,
-        np.degrees(lag),
-        ends,
-        np.degrees(line.values[0] * ends + line.values[1]),
-    )
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        ("k_zeta_lower",),
-        line.values[:1],
-        covariance[:1, :1],
-        tuple(record.name for record in records),
-        tuple(checks),
+    fitted = np.degrees(line.values[0] * ends + line.values[1])
+    axes = ("rotor speed [rad/s]", "phase lag offset [deg]")
+    curve = Curve("Phase lag of the lower rotor", *axes, omega, np.degrees(lag), ends, fitted)
+    offset = BenchFinding("o_zeta_lower on the bench", float(line.values[1]), float(np.sqrt(covariance[1, 1])), "rad")
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE),
+        records,
+        checks,
         (curve,),
-        findings=(
-            BenchFinding("o_zeta_lower on the bench", float(line.values[1]), float(np.sqrt(covariance[1, 1])), "rad"),
-        ),
+        names=("k_zeta_lower",),
+        values=line.values[:1],
+        covariance=covariance[:1, :1],
+        findings=(offset,),
     )
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
 from swashplate.bench.record import BenchRecord
@@ -116,31 +117,37 @@ class BenchResult:
     records_of: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod
-    def of_findings(
+    def of(
         cls,
-        procedure: str,
-        title: str,
-        source: str,
+        procedure: tuple[str, str, str],
         records: Sequence[BenchRecord],
         checks: Sequence[BenchCheck],
         curves: Sequence[Curve],
-        findings: Sequence[BenchFinding],
         *,
-        tables: Sequence[Rows] = (),
+        names: Sequence[str] = (),
+        values: ArrayLike = (),
+        covariance: ArrayLike | None = None,
+        **more: Any,
     ) -> BenchResult:
-        """What a procedure found that estimates no parameter of the card."""
+        """A procedure's result from lists.
+
+        Args:
+            procedure: its name, title and source.
+            records, checks, curves: as the attributes.
+            names, values: of parameters of the card; none where findings are all that there is.
+            covariance: of the values, shape (p, p), or their variances, shape (p,).
+            more: of the attributes that have defaults.
+        """
+        table = np.zeros((len(names),) * 2) if covariance is None else np.asarray(covariance, dtype=np.float64)
         return cls(
-            procedure,
-            title,
-            source,
-            (),
-            np.zeros(0),
-            np.zeros((0, 0)),
+            *procedure,
+            tuple(names),
+            np.asarray(values, dtype=np.float64),
+            np.diag(table) if table.ndim == 1 else table,
             tuple(record.name for record in records),
             tuple(checks),
             tuple(curves),
-            findings=tuple(findings),
-            tables=tuple(tables),
+            **more,
         )
 
     @property
@@ -151,6 +158,12 @@ class BenchResult:
         """Value and standard deviation of a parameter."""
         place = self.names.index(name)
         return float(self.values[place]), float(self.sigma[place])
+
+
+def weigh(values: Sequence[float], sigmas: Sequence[float]) -> tuple[float, float]:
+    """Mean of several estimates of one number by their standard deviations, and its variance."""
+    weights = np.array(sigmas) ** -2.0
+    return float(weights @ values / weights.sum()), float(1.0 / weights.sum())
 
 
 @dataclass(frozen=True)

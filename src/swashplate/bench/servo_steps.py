@@ -14,10 +14,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.bench.drive_steps import held_levels
-from swashplate.bench.lag import first_order, fit_lag
+from swashplate.bench.lag import check_order, first_order, fit_lag, held_levels
 from swashplate.bench.record import BenchRecord
-from swashplate.bench.result import BenchCheck, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchResult, Curve, weigh
 from swashplate.bench.virtual_bench import RecordSchedule, points
 from swashplate.errors import BenchError
 
@@ -70,34 +69,18 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         fit = fit_lag(response, main, dt=record.dt, bounds=(0.008, 1.0), where=record.name)
         taus.append(fit.tau)
         sigmas.append(fit.sigma)
-        smooth = np.convolve(fit.residuals, np.ones(10) / 10.0, mode="valid")
-        left, size = float(np.sqrt(np.mean(smooth**2))), float(np.ptp(fit.model))
-        checks.append(
-            BenchCheck(
-                f"{record.name}: the smoothed residual is {100 * left / size:.1f} % of the steps"
-                + ("; a first-order lag does not describe them." if left > 0.04 * size else "."),
-                good=left <= 0.04 * size,
-            )
-        )
+        checks.append(check_order(record.name, fit, float(np.ptp(fit.model)), most=0.04))
         shown = slice(0, min(time.size, round(5.0 / record.dt)))
         curves.append(
             Curve(f"Moment after steps of the {stepped[0].removeprefix('servo_')} servo", "time [s]", "moment [N mm]",
                   time[shown], 1e3 * main[shown], time[shown], 1e3 * fit.model[shown])
         )  # fmt: skip
-    weights = np.array(sigmas) ** -2.0
     if len(taus) > 1:
         apart = (taus[0] - taus[1]) / np.hypot(sigmas[0], sigmas[1])
         checks.append(
             BenchCheck(f"The two servos' time constants are {apart:+.1f} sigmas apart.", good=abs(apart) < 3.5)
         )
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        ("tau_f_lower",),
-        np.array([weights @ taus / weights.sum()]),
-        np.array([[1.0 / weights.sum()]]),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
+    tau, variance = weigh(taus, sigmas)
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE), records, checks, curves, names=("tau_f_lower",), values=(tau,), covariance=(variance,)
     )

@@ -104,16 +104,11 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             turning = np.linspace(0.0, steady[f"omega_{rotor}"].max(), 60)
             size, shown = (1.0, "N") if name == "thrust" else (1e3, "N mm")
             fitted = size * alone * squared
-            curves.append(
-                Curve(
-                    f"{name.capitalize()} of the {rotor} rotor alone",
-                    "rotor speed [rad/s]",
-                    f"{name} [{shown}]",
-                    steady[f"omega_{rotor}"],
-                    fitted + size * line.residuals,
-                    turning,
-                    size * alone * density * turning**2,
-                )
+            title, axes = (
+                f"{name.capitalize()} of the {rotor} rotor alone",
+                ("rotor speed [rad/s]", f"{name} [{shown}]"),
             )
+            measured, line_y = fitted + size * line.residuals, size * alone * density * turning**2
+            curves.append(Curve(title, *axes, steady[f"omega_{rotor}"], measured, turning, line_y))
     checks.append(BenchCheck("The bound of the interference does not hold what remounting the blades changes."))
-    return BenchResult.of_findings(NAME, TITLE, SOURCE, records, checks, curves, findings)
+    return BenchResult.of((NAME, TITLE, SOURCE), records, checks, curves, findings=tuple(findings))

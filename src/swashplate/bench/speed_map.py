@@ -157,19 +157,10 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         blocks.append(covariance)
         left_out += reasons
         ends = np.array([command[kept].min(), command[kept].max()])
-        curves.append(
-            Curve(
-                f"Speed map of the {rotor} rotor",
-                "motor command",
-                "rotor speed [rad/s]",
-                command[kept],
-                turned[kept],
-                ends,
-                found_values[0] * ends + found_values[1],
-                command[~kept],
-                turned[~kept],
-            )
-        )
+        fitted = found_values[0] * ends + found_values[1]
+        points_in, points_out = ((command[part], turned[part]) for part in (kept, ~kept))
+        axes = ("motor command", "rotor speed [rad/s]")
+        curves.append(Curve(f"Speed map of the {rotor} rotor", *axes, *points_in, ends, fitted, *points_out))
     if not names:
         raise BenchError(
             "sweeps no motor.", where=", ".join(r.name for r in records), hint="Vary one motor, hold the other."
@@ -177,17 +168,15 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     covariance = np.zeros((len(names), len(names)))
     for place, block in enumerate(blocks):
         covariance[2 * place : 2 * place + 2, 2 * place : 2 * place + 2] = block
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        tuple(names),
-        np.array(values),
-        covariance,
-        tuple(r.name for r in records),
-        tuple(checks),
-        tuple(curves),
-        tuple(left_out),
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE),
+        records,
+        checks,
+        curves,
+        names=names,
+        values=values,
+        covariance=covariance,
+        left_out=tuple(left_out),
         leans_on={"k_drive_voltage": np.array(leans)},
         records_of=files,
     )

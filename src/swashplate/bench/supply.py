@@ -16,7 +16,7 @@ from scipy import stats
 from swashplate.arrays import Array
 from swashplate.bench.checks import check_settled, check_structure
 from swashplate.bench.record import BenchRecord
-from swashplate.bench.result import BenchCheck, BenchFinding, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchFinding, BenchResult, Curve, weigh
 from swashplate.bench.steady import SteadyLine, fit_line, steady_points
 from swashplate.bench.virtual_bench import RecordSchedule, points
 from swashplate.errors import BenchError
@@ -46,11 +46,10 @@ def together(slopes: Sequence[float], sigmas: Sequence[float]) -> tuple[float, f
     Where they are apart by more than chance allows (1 %), the bound grows by the scale factor of the Particle Data
     Group (2022, sec. 5.2.2): one number cannot be better than the difference of what it stands for.
     """
-    weights = np.array(sigmas) ** -2.0
-    mean = float(weights @ slopes / weights.sum())
-    square = float(np.sum(weights * (np.array(slopes) - mean) ** 2))
+    mean, variance = weigh(slopes, sigmas)
+    square = float(np.sum((np.array(slopes) - mean) ** 2 / np.array(sigmas) ** 2))
     wider = square / (len(slopes) - 1) if stats.chi2.sf(square, len(slopes) - 1) < 0.01 else 1.0
-    return mean, float(np.sqrt(wider / weights.sum())), float((slopes[0] - slopes[1]) / np.hypot(sigmas[0], sigmas[1]))
+    return mean, float(np.sqrt(wider * variance)), float((slopes[0] - slopes[1]) / np.hypot(sigmas[0], sigmas[1]))
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
@@ -97,15 +96,13 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             good=abs(apart) < 3.0,
         )
     )
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        ("k_drive_voltage",),
-        np.array([mean]),
-        np.array([[sigma**2]]),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE),
+        records,
+        checks,
+        curves,
+        names=("k_drive_voltage",),
+        values=(mean,),
+        covariance=(sigma**2,),
         findings=tuple(findings),
     )

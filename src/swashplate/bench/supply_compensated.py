@@ -66,4 +66,4 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 Curve(f"Speed of the {rotor} rotor, compensated", "supply voltage [V]", "rotor speed [rad/s]", volts,
                       steady[f"omega_{rotor}"], ends, line.values[1] + left * (ends - volts.mean()))
             )  # fmt: skip
-    return BenchResult.of_findings(NAME, TITLE, SOURCE, records, checks, curves, findings)
+    return BenchResult.of((NAME, TITLE, SOURCE), records, checks, curves, findings=tuple(findings))

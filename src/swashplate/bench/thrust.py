@@ -75,20 +75,21 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     share_sigma = abs(share / cross.values[2]) * float(np.sqrt(cross.covariance[2, 2])) if at_hover else float("nan")
     covariance = np.zeros((4, 4))
     covariance[:2, :2], covariance[2:, 2:] = thrust.covariance[:2, :2], torque.covariance[:2, :2]
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        NAMES,
-        np.r_[thrust.values[:2], torque.values[:2]],
-        covariance,
-        tuple(record.name for record in records),
-        tuple(checks),
-        (
-            _curve("Total thrust", "thrust [N]", upper, lower, thrust, 1.0),
-            _curve("Total torque", "torque [N mm]", upper, -lower, torque, 1000.0),
-        ),
-        findings=(BenchFinding("thrust in Omega_up Omega_lw, share at hover", share, share_sigma),),
+    curves = (
+        _curve("Total thrust", "thrust [N]", upper, lower, thrust, 1.0),
+        _curve("Total torque", "torque [N mm]", upper, -lower, torque, 1000.0),
+    )
+    interference = BenchFinding("thrust in Omega_up Omega_lw, share at hover", share, share_sigma)
+    values = np.r_[thrust.values[:2], torque.values[:2]]
+    return BenchResult.of(
+        (NAME, TITLE, SOURCE),
+        records,
+        checks,
+        curves,
+        names=NAMES,
+        values=values,
+        covariance=covariance,
+        findings=(interference,),
     )
 
 

@@ -114,11 +114,6 @@ def _between(d: Mapping[str, Any]) -> str:
     return f"The part from {d['start']:.2f} to {d['stop']:.2f} s was taken."
 
 
-def _move_to_cg(d: Mapping[str, Any]) -> str:
-    arm = ", ".join(f"{value:.3f}" for value in d["lever_arm"])
-    return f"The motion was moved to the centre of gravity by the lever arm ({arm}) m in body axes."
-
-
 _STEPS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "remove_outliers": _outliers,
     "trim_ground": _ground,
@@ -126,7 +121,6 @@ _STEPS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "lowpass": _lowpass,
     "derive": _derive,
     "between": _between,
-    "move_to_cg": _move_to_cg,
     "observe": lambda d: f"Sensors were simulated: noise, gaps and outliers (seed {d.get('seed', '?')}).",
 }
 

@@ -119,7 +119,7 @@ class Inspect(FromLogs[Looked]):
     )
     per_turn: float = setting(default=1.0, help="with rotor_speed: vibrations per turn that cause the line")
     reconstruct: bool = option(
-        default=False, help="Compare rates and accelerations with attitude and position: biases, scale factors, delays."
+        default=False, help="Compare rates and accelerations with attitude and position: biases, scale factors."
     )
     rate: float = setting(default=100.0, help="with reconstruct: conditioned rate", unit="Hz", least=1.0, most=2000.0)
 

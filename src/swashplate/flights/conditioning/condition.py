@@ -13,7 +13,6 @@ from swashplate.flights.conditioning.derive import derive as derive_motion
 from swashplate.flights.conditioning.filters import lowpass
 from swashplate.flights.conditioning.ground import cut
 from swashplate.flights.conditioning.ground import trim_ground as trim
-from swashplate.flights.conditioning.lever_arm import move_to_cg
 from swashplate.flights.conditioning.outliers import remove_outliers
 from swashplate.flights.conditioning.reconstruction import correct_sensors
 from swashplate.flights.conditioning.resample import resample
@@ -110,7 +109,6 @@ _OPERATIONS: Mapping[str, tuple[Callable[..., Flight], tuple[str, ...]]] = {
     "resample": (resample, ("rate", "max_gap", "shortest_piece", "method", "straighten")),
     "lowpass": (lowpass, ("cutoff", "order")),
     "derive": (derive_motion, ("gravity",)),
-    "move_to_cg": (move_to_cg, ("lever_arm",)),
     "correct_sensors": (correct_sensors, ("biases", "scales")),
 }
 

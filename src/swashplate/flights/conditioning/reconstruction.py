@@ -15,21 +15,16 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import attitude_of, euler_from_quaternion, rotation
 from swashplate.flights.conditioning.derive import GRAVITY
 from swashplate.flights.conditioning.filters import uniform_rate
-from swashplate.flights.conditioning.lever_arm import LeverArm, lever_arm
-from swashplate.flights.conditioning.mean_wind import AIR_SPEED, VELOCITY, mean_wind
 from swashplate.flights.conditioning.regression import regress
-from swashplate.flights.conditioning.time_shift import TimeShift, time_shift
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, channel
 from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
 _FORCES = ("ax", "ay", "az")
-_DRIVES = (("servo_roll", "p"), ("servo_pitch", "q"), ("motor_lower", "r"), ("motor_upper", "r"))
 _SIGNIFICANT = 3.0
 _LEFT_OUT = (
     "The standard errors leave out the noise of the attitude that turns the rates: a bias of only a few of them "
@@ -61,18 +56,12 @@ class Reconstruction(Shown):
     Attributes:
         biases: per measured channel, in its unit.
         scales: per measured channel, dimensionless (0 is perfect).
-        time_shifts: of the inputs.
-        lever: from the centre of gravity to the tracked point, None where it cannot be told.
-        wind: mean, `wind_north` and `wind_east` [m/s], and in `scales` that of `airspeed`; empty where not told.
         notes: in words what could not be told and why.
     """
 
     biases: Mapping[str, SensorErrorEstimate] = field(default_factory=dict)
     scales: Mapping[str, SensorErrorEstimate] = field(default_factory=dict)
-    time_shifts: tuple[TimeShift, ...] = ()
-    lever: LeverArm | None = None
     notes: tuple[str, ...] = ()
-    wind: Mapping[str, SensorErrorEstimate] = field(default_factory=dict)
 
     def corrected(self, flight: Flight) -> Flight:
         """The flight with every channel's significant bias and scale factor taken out; its history says so.
@@ -87,13 +76,10 @@ class Reconstruction(Shown):
         return correct_sensors(flight, biases=bias, scales=scale)
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON types: values and standard errors by channel, time shifts and lever arm in words."""
+        """As JSON types: values and standard errors by channel."""
         return {
             "biases": {name: [e.value, e.sigma] for name, e in self.biases.items()},
             "scales": {name: [e.value, e.sigma] for name, e in self.scales.items()},
-            "time_shifts": [str(shift) for shift in self.time_shifts],
-            "lever": None if self.lever is None else str(self.lever),
-            "wind": {name: [e.value, e.sigma] for name, e in self.wind.items()},
             "notes": list(self.notes),
         }
 
@@ -105,12 +91,6 @@ class Reconstruction(Shown):
             both = [(f"{e.value:+.4g}", f"{e.sigma:.2g}") if e is not None else ("-", "-") for e in (b, s)]
             rows.append([name, channel(name).unit, *both[0], *both[1], " and ".join(told)])
         lines = [text_table(_HEAD, rows, left=(0, 1, 6)), _LEFT_OUT] if rows else []
-        if self.wind:
-            told = [f"{n.removeprefix('wind_')} {e.value:+.3g} +- {e.sigma:.2g} m/s" for n, e in self.wind.items()]
-            lines.append(f"mean wind, towards {', '.join(told)}; gusts are in the bounds")
-        lines += [str(shift) for shift in self.time_shifts]
-        if self.lever is not None:
-            lines.append(str(self.lever))
         return "\n".join([*lines, *self.notes])
 
 
@@ -170,11 +150,12 @@ def _estimates(
         both = np.column_stack([x, response.reshape(-1)])
         rest = both - free @ np.linalg.lstsq(free, both, rcond=None)[0]
         data.append((rest[:, :6], rest[:, 6]))
-    fit = regress(data, lag=round(3 * rate))  # the three axes lie next to each other: one second of samples
+    lag = round(3 * rate)  # the three axes lie next to each other: one second of samples
+    values, covariance = regress(data, lag=lag)
     biases, scales = {}, {}
     for k, name in enumerate(names):
-        gain, offset = fit.values[k], fit.values[3 + k]
-        block = fit.covariance[np.ix_([k, 3 + k], [k, 3 + k])]
+        gain, offset = values[k], values[3 + k]
+        block = covariance[np.ix_([k, 3 + k], [k, 3 + k])]
         slope = np.array([-offset / gain**2, 1.0 / gain])  # bias = offset / gain
         biases[name] = SensorErrorEstimate(float(offset / gain), float(np.sqrt(slope @ block @ slope)))
         scales[name] = SensorErrorEstimate(float(1.0 / gain - 1.0), float(np.sqrt(block[0, 0]) / gain**2))
@@ -235,13 +216,11 @@ def _derived(flight: Flight) -> set[str]:
     return {name for step in flight.history if step.operation == "derive" for name in step.details.get("derived", ())}
 
 
-def reconstruct(flight: Flight, *, band: tuple[float, float] = (0.3, 6.0), percussion: float = 0.0) -> Reconstruction:
+def reconstruct(flight: Flight) -> Reconstruction:
     """Everything that the flight can tell about its own sensors: each estimate with its bound, each gap in words.
 
     Args:
         flight: conditioned.
-        band: of time shifts and lever arm [Hz].
-        percussion: `percussion_offset` of the vehicle [m], 0 where unknown.
     """
     made = _derived(flight)
     notes: list[str] = []
@@ -261,27 +240,4 @@ def reconstruct(flight: Flight, *, band: tuple[float, float] = (0.3, 6.0), percu
             b, s = estimate(flight)
             biases.update(b)
             scales.update(s)
-    wind: dict[str, SensorErrorEstimate] = {}
-    if all(name in flight and name not in made for name in (AIR_SPEED, *VELOCITY)):
-        try:
-            values, covariance = mean_wind(flight)
-        except FlightError as error:
-            notes.append(f"wind: {error}")
-        else:
-            sigma = np.sqrt(np.diag(covariance))
-            north, east, scale = (SensorErrorEstimate(float(v), float(s)) for v, s in zip(values, sigma, strict=True))
-            wind = {"wind_north": north, "wind_east": east}
-            scales[AIR_SPEED] = SensorErrorEstimate(scale.value - 1.0, scale.sigma)
-    shifts: list[TimeShift] = []
-    for source, response in _DRIVES:
-        if source in flight and response in flight:
-            try:
-                shifts.append(time_shift(flight, source, response=response, band=band))
-            except FlightError as error:
-                notes.append(f"time shift {source} -> {response}: {error}")
-    lever: LeverArm | None = None
-    try:
-        lever = lever_arm(flight, band=band, percussion=percussion)
-    except FlightError as error:
-        notes.append(f"lever arm: {error}")
-    return Reconstruction(biases, scales, tuple(shifts), lever, tuple(notes), wind)
+    return Reconstruction(biases, scales, tuple(notes))

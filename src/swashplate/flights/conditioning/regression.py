@@ -3,34 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
-
-
-@dataclass(frozen=True)
-class Regression:
-    """Least squares with its bounds.
-
-    Attributes:
-        values: estimates, shape (k,).
-        covariance: corrected for coloured residuals, shape (k, k).
-        determination: R^2, the part of the response's variance that is explained.
-        partial: partial R^2 of each regressor, given all the others, shape (k,).
-    """
-
-    values: Array
-    covariance: Array
-    determination: float
-    partial: Array
-
-    @property
-    def sigma(self) -> Array:
-        """Standard errors, shape (k,)."""
-        return np.sqrt(np.diag(self.covariance))
 
 
 def coloured_covariance(pieces: Sequence[tuple[Array, Array]], *, lag: int) -> Array:
@@ -54,8 +31,8 @@ def coloured_covariance(pieces: Sequence[tuple[Array, Array]], *, lag: int) -> A
     return np.asarray(inverse @ middle @ inverse)
 
 
-def regress(pieces: Sequence[tuple[Array, Array]], *, lag: int) -> Regression:
-    """Ordinary least squares over unbroken pieces, with coloured-residual bounds.
+def regress(pieces: Sequence[tuple[Array, Array]], *, lag: int) -> tuple[Array, Array]:
+    """Ordinary least squares over unbroken pieces: estimates (k,) and their covariance (k, k) for coloured residuals.
 
     Args:
         pieces: per piece the regressors (n, k) and the response (n,), zero-mean or with a constant among them.
@@ -74,8 +51,4 @@ def regress(pieces: Sequence[tuple[Array, Array]], *, lag: int) -> Regression:
         )
     inverse = np.linalg.inv(x.T @ x)
     values = inverse @ x.T @ y
-    residual = y - x @ values
-    covariance = coloured_covariance([(a, b - a @ values) for a, b in pieces], lag=lag)
-    gain = values**2 / np.diag(inverse)  # what the residual's square sum would rise by without this regressor
-    rest = float(residual @ residual)
-    return Regression(values, covariance, 1.0 - rest / float(y @ y), gain / (gain + rest))
+    return values, coloured_covariance([(a, b - a @ values) for a, b in pieces], lag=lag)
