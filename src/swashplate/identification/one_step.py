@@ -202,7 +202,7 @@ def _with(fit: Result[Any, Any], effects: Sequence[PhysicalEffect]) -> list[Effe
     slope, whole = slope + by_prior, information + prior
     plain = accuracy.covariance(likelihood.row, information, prior)
     white, sensitivities, elsewhere = likelihood.whitened(row)
-    lags = round(LAGS / likelihood.pieces[0].dt)
+    lags = round(LAGS / likelihood.records[0].dt)
     corrected = accuracy.corrected_covariance(plain, elsewhere + prior, white, sensitivities, lags=lags)
     names, scale = list(likelihood.row.names), likelihood.row.scale
     stopped = {name for name in fit.names if fit[name].at_bound}

@@ -27,7 +27,7 @@ class Line:
     """Errors linear in the numbers, of unit variance: least squares is the likelihood."""
 
     def __init__(self, names: tuple[str, ...], slopes: dict[str, np.ndarray], errors: np.ndarray) -> None:
-        self.pieces = (SimpleNamespace(dt=0.01),)
+        self.records = (SimpleNamespace(dt=0.01),)
         self.row = Row(tuple(Entry(name, "parameter", 0.0, 2.0) for name in names))
         self.slopes, self.errors, self.all = np.stack([2.0 * slopes[n] for n in names]), errors, slopes
 

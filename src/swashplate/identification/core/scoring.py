@@ -28,7 +28,7 @@ _PROMISING = 50.0
 """Log-units that another delay may lie above the optimum before anything else has settled around it."""
 
 
-def minimise_over_valleys(likelihood: Likelihood, solver: Solver | None = None) -> Optimum:
+def minimise_over_valleys(likelihood: Sought, solver: Solver | None = None) -> Optimum:
     """`minimise`, and again from the best other value of every kinked entry where that is promising.
 
     Returns:
@@ -47,7 +47,7 @@ def minimise_over_valleys(likelihood: Likelihood, solver: Solver | None = None) 
     return best
 
 
-def _elsewhere(likelihood: Likelihood, best: Optimum, place: int) -> Array | None:
+def _elsewhere(likelihood: Sought, best: Optimum, place: int) -> Array | None:
     """The optimum with another value of one entry, None where no other promises anything."""
     low, high = (bound[place] for bound in likelihood.row.bounds())
     values = np.arange(max(low, -_FARTHEST), min(high, _FARTHEST) + 1e-9, _STEP)
@@ -64,7 +64,7 @@ Progress = Callable[[int, float], None]
 """Called after each iteration with its number and the cost."""
 
 
-class Likelihood(Protocol):
+class Sought(Protocol):
     """A negative log-likelihood of a row, priors not included."""
 
     @property
@@ -148,7 +148,7 @@ class Solver:
         return DampedSteps(row, cost, together=self.together, around=self.around)
 
 
-def minimise(likelihood: Likelihood, solver: Solver | None = None, *, start: Array | None = None) -> Optimum:
+def minimise(likelihood: Sought, solver: Solver | None = None, *, start: Array | None = None) -> Optimum:
     """The row of the highest posterior probability.
 
     Args:
@@ -205,12 +205,12 @@ def minimise(likelihood: Likelihood, solver: Solver | None = None, *, start: Arr
     return Optimum(at.row, at.cost, tuple(history), at.information[0], converged, at_bound)
 
 
-def _point(likelihood: Likelihood, row: Array) -> Point:
+def _point(likelihood: Sought, row: Array) -> Point:
     likelihood.refresh(row)
     return Point(row, *_posterior(likelihood, row))
 
 
-def _posterior(likelihood: Likelihood, row: Array) -> tuple[float, Array, tuple[Array, Array]]:
+def _posterior(likelihood: Sought, row: Array) -> tuple[float, Array, tuple[Array, Array]]:
     cost, gradient, information = likelihood.scores(row)
     prior_cost, prior_gradient, prior_information = likelihood.row.prior(row)
     return cost + prior_cost, gradient + prior_gradient, (information, information + prior_information)

@@ -13,7 +13,7 @@ from swashplate.filtering.nuisance import PUSHES
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.result import Constant, Estimate
-from swashplate.identification.core.scoring import Likelihood, Optimum
+from swashplate.identification.core.scoring import Optimum, Sought
 from swashplate.models.vehicle import Vehicle
 
 _UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad", **dict.fromkeys(PUSHES[:3], "m/s^2")}
@@ -66,7 +66,7 @@ class Found:
         return np.asarray(covariance[np.ix_(self.places, self.places)] * np.outer(scale, scale))
 
 
-class Criterion(Likelihood, Protocol):
+class Criterion(Sought, Protocol):
     """What was minimised: a likelihood, or errors some time ahead."""
 
     def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:

@@ -8,16 +8,15 @@ answers to the measured motion does not bias it as it biases output error.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import DELAYS, Nuisance
-from swashplate.identification.core import robust
+from swashplate.identification.core.likelihood import Errors, Likelihood, MovedErrors, factor_of
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Free, Parameterization
@@ -44,9 +43,6 @@ _NUISANCE = {
 }
 
 
-_Accumulated = tuple[Array, Array, list[Filtered], list[tuple[Array, Array]]]
-"""Gradient, information, runs, and by record slopes and the information in the covariance."""
-
 _KEPT = 2
 """Rows whose runs are kept: a search tries up to two, and goes on from one of them."""
 
@@ -69,7 +65,7 @@ def parameter_entries(table: Parameterization) -> list[Entry]:
     ]
 
 
-class FilterError:
+class FilterError(Likelihood):
     """The innovations' likelihood of some records as a function of parameters, nuisances and noise.
 
     Args:
@@ -90,7 +86,7 @@ class FilterError:
         nuisance: Nuisance | None = None,
     ) -> None:
         self.table = table
-        self.pieces = tuple(pieces)
+        self.records = tuple(pieces)
         self.noise = with_first_guesses(noise or Noise(), table.noises, pieces[0].output_names)
         self.estimate_noise = estimate_noise
         self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, noise=self.noise)
@@ -115,14 +111,14 @@ class FilterError:
             for log, piece, first in zip(self._log, pieces, seen, strict=True)
         )
         self._kept: dict[bytes, list[Filtered]] = {}
-        self._last: tuple[bytes, _Accumulated] | None = None
+        self._last: tuple[bytes, list[MovedErrors]] | None = None
         settled = round(SETTLING / self.model.dt)
         self.counted = tuple(piece.counts & (np.arange(piece.time.size) >= settled) for piece in pieces)
 
     def widened(self, added: Sequence[str]) -> FilterError:
         """The same likelihood with more of the vehicle's numbers free, under a constant gain."""
         table = self.table.wider(added)
-        return FilterError(table, self.pieces, noise=self.noise, estimate_noise=self.estimate_noise)
+        return FilterError(table, self.records, noise=self.noise, estimate_noise=self.estimate_noise)
 
     @property
     def constant(self) -> FilterError:
@@ -161,83 +157,35 @@ class FilterError:
         return [errors for errors, _ in told], [slopes[places] for _, slopes in told]
 
     # ---- likelihood --------------------------------------------------------------------------------------------
-    def cost(self, row: Array) -> float:
-        """Negative log-likelihood of the counted innovations (without its constant)."""
-        return self._cost(self.runs(row))
+    def errors_of(self, row: Array) -> list[Errors]:
+        return self._parts(self.runs(row))
 
-    def _cost(self, runs: Sequence[Filtered]) -> float:
-        total = 0.0
-        for run, counted in zip(runs, self.counted, strict=True):
-            nu, S = run.innovations[counted], np.asarray(run.begin.gain.covariance)
-            if not (np.isfinite(nu).all() and np.isfinite(S).all()):
-                return np.inf
-            try:
-                L = np.linalg.cholesky(S)
-            except np.linalg.LinAlgError:
-                return np.inf
-            total += robust.huber(np.asarray(np.linalg.solve(L, nu.T), dtype=np.float64)) + nu.shape[0] * float(
-                np.log(np.diag(L)).sum()
-            )
-        return total
+    def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
+        given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
+        return self._along(row, [run.filtered(*given) for run in self._runs])
 
-    def scores(self, row: Array) -> tuple[float, Array, Array]:
-        """Cost, gradient and Fisher information (the covariance's part included; Ljung 1999, sec. 9.4)."""
-        gradient, information, runs, _ = self._accumulate(row)
-        return self._cost(runs), gradient, information
+    def _parts(self, runs: Sequence[Filtered]) -> list[Errors]:
+        return [
+            Errors(number, run.innovations[counted], factor_of(np.asarray(run.begin.gain.covariance)))
+            for number, (run, counted) in enumerate(zip(runs, self.counted, strict=True))
+        ]
 
-    def _accumulate(self, row: Array) -> _Accumulated:
-        """Slopes at a row; those of the last one are kept, which a search ends with and its judges ask for."""
+    def _along(self, row: Array, runs: Sequence[Filtered]) -> Iterator[MovedErrors]:
+        places = np.arange(len(self.row))
+        for mine, run, counted, part in zip(self._runs, runs, self.counted, self._parts(runs), strict=True):
+            slopes, dS = mine.moved(run, self.table.card_row, row * self.row.scale, self.row.scale)
+            Li = np.linalg.inv(part.factor)
+            S = np.asarray(run.begin.gain.covariance)
+            telling = self._foreseen(slopes[:, counted], part.errors, dS, S, mine.log)
+            turned = Li @ dS @ Li.T
+            yield MovedErrors(part.number, part.errors, part.factor, places, slopes[:, counted], turned, telling)
+
+    def _moved_here(self, row: Array) -> Iterator[MovedErrors]:
+        """Those of the last row are kept, which a search ends with and its judges ask for."""
         asked = np.asarray(row, dtype=np.float64).tobytes()
         if self._last is None or self._last[0] != asked:
-            self._last = asked, self._accumulated(row)
-        return self._last[1]
-
-    def slope(self, row: Array) -> tuple[float, Array]:
-        """Cost and gradient, and nothing kept: for samplers, from several threads too."""
-        given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
-        runs, gradient = [run.filtered(*given) for run in self._runs], np.zeros(len(self.row))
-        cost = self._cost(runs)
-        if np.isfinite(cost):
-            for mine, run, counted in zip(self._runs, runs, self.counted, strict=True):
-                gradient += self._gradient(run, counted, *self._moved(mine, run, row))
-        return cost, gradient
-
-    def _gradient(self, run: Filtered, counted: NDArray[np.bool_], d_nu: Array, dS: Array) -> Array:
-        """A record's part, from the slopes of all its innovations and of their covariance."""
-        Li = np.linalg.inv(np.linalg.cholesky(np.asarray(run.begin.gain.covariance)))
-        white = run.innovations[counted] @ Li.T
-        weighted = white * robust.weights(white)
-        pull = np.zeros_like(run.innovations)
-        pull[counted] = weighted @ Li
-        dM = Li @ dS @ Li.T
-        gradient = d_nu.reshape(len(d_nu), -1) @ pull.ravel()
-        gradient += 0.5 * white.shape[0] * np.trace(dM, axis1=1, axis2=2)
-        # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
-        gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(Li))), weighted.T @ white)
-        return np.asarray(gradient)
-
-    def _accumulated(self, row: Array) -> _Accumulated:
-        p, runs = len(self.row), self.runs(row)
-        moved: list[tuple[Array, Array]] = []
-        gradient, information = np.zeros(p), np.zeros((p, p))
-        for mine, run, counted in zip(self._runs, runs, self.counted, strict=True):
-            S = np.asarray(run.begin.gain.covariance)
-            nu = run.innovations[counted]
-            if not np.isfinite(nu).all():
-                return gradient, information, runs, moved
-            d_nu, dS = self._moved(mine, run, row)
-            gradient += self._gradient(run, counted, d_nu, dS)
-            Li = np.linalg.inv(np.linalg.cholesky(S))
-            told, by_covariance = self._foreseen(d_nu[:, counted], nu, dS, S, mine.log)
-            told = (told.reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
-            moved.append((told, by_covariance))
-            weighted = told.reshape(p, -1) * np.sqrt(robust.weights(nu @ Li.T)).ravel()
-            information += weighted @ weighted.T + by_covariance
-        return gradient, information, runs, moved
-
-    def _moved(self, mine: RecordRun, run: Filtered, row: Array) -> tuple[Array, Array]:
-        """Slopes of a record's innovations (p, n, outputs) and of their covariance (p, outputs, outputs)."""
-        return mine.moved(run, self.table.card_row, row * self.row.scale, self.row.scale)
+            self._last = asked, list(self._along(row, self.runs(row)))
+        return iter(self._last[1])
 
     def _foreseen(self, d_nu: Array, nu: Array, dS: Array, S: Array, log: int) -> tuple[Array, Array]:
         """Slopes of innovations and the information in their covariance (p, p), without what only turns both.
@@ -262,9 +210,6 @@ class FilterError:
         mixed = np.outer(flat @ turned, heading.sum(axis=1))
         by_covariance += 0.5 * (turned @ turned * (heading @ heading.T) - mixed - mixed.T)
         return d_nu - heading[:, :, None] * (nu @ turn.T), by_covariance
-
-    def refresh(self, row: Array) -> None:
-        """Nothing is held between iterations: the noise is part of the row."""
 
     def unturned(self, innovations: Array, piece: Record) -> Array:
         """Innovations of a record with their horizontal part back in local axes."""
@@ -291,21 +236,8 @@ class FilterError:
                 sigma=np.sqrt(np.diag(run.begin.gain.covariance)),
                 states=run.states.x[:, kept],
             )
-            for piece, run, counted in zip(self.pieces, self.runs(row), self.counted, strict=True)
+            for piece, run, counted in zip(self.records, self.runs(row), self.counted, strict=True)
         )
-
-    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
-        """Per record: whitened innovations (n, outputs) and their sensitivities (p, n, outputs).
-
-        The last is the information (p, p) that lies in the innovations' covariance instead.
-        """
-        _, _, runs, moved = self._accumulate(row)
-        white, sensitivities, rest = [], [], np.zeros((len(self.row), len(self.row)))
-        for run, (d_white, by_covariance), counted in zip(runs, moved, self.counted, strict=True):
-            white.append(run.innovations[counted] @ np.linalg.inv(np.linalg.cholesky(run.begin.gain.covariance)).T)
-            sensitivities.append(d_white)
-            rest += by_covariance
-        return white, sensitivities, rest
 
 
 def _of_record(free: Free) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ off a record's first states may be, and goes on by itself where the pose was not
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +24,7 @@ from swashplate.filtering.filter_code import Followed, Following, RecordSeries, 
 from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import steady_gain
-from swashplate.identification.core import robust
+from swashplate.identification.core.likelihood import Errors, MovedErrors, factor_of
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Comparison, Record
 from swashplate.identification.time.beginning import (
@@ -56,7 +56,6 @@ class FollowingError(FilterError):
     def __init__(self, table: Parameterization, pieces: Sequence[Record], *, noise: Noise) -> None:
         super().__init__(table, pieces, noise=noise)
         self._constant = FilterError(table, pieces, noise=noise)
-        self._judgement: tuple[bytes, tuple[float, list[tuple[Array, Array, Array]]]] | None = None
         measured = [piece.measured for piece in pieces]
         self.counted = tuple(counted & seen for counted, seen in zip(self.counted, measured, strict=True))
         self._readings = tuple(
@@ -72,7 +71,7 @@ class FollowingError(FilterError):
     def _spread(self) -> tuple[Array, ...]:
         """How far off the states may be that each record begins with, (states, states)."""
         went = self._constant.runs(self.row.starts())
-        return tuple(_off(self.table.vehicle, *each) for each in zip(self.pieces, self._runs, went, strict=True))
+        return tuple(_off(self.table.vehicle, *each) for each in zip(self.records, self._runs, went, strict=True))
 
     def slope(self, row: Array) -> tuple[float, Array]:
         """Refused: samplers draw from a constant gain, which is another likelihood.
@@ -86,32 +85,32 @@ class FollowingError(FilterError):
             hint="Take 'laplace', or fit the flight without --wind.",
         )
 
-    def cost(self, row: Array) -> float:
-        """Negative log-likelihood of the counted innovations (without its constant)."""
-        return self._likelihood(self._followed([row]))
+    def errors_of(self, row: Array) -> list[Errors]:
+        return self._seen(self._followed([row]))
 
-    def scores(self, row: Array) -> tuple[float, Array, Array]:
-        """Cost, gradient and Fisher information; slopes are differences of whole runs."""
-        cost, judged = self._judged(row)
-        gradient, information = np.zeros(len(row)), np.zeros((len(row), len(row)))
-        for white, moved, by_covariance in judged:
-            weight = robust.weights(white)
-            turned = np.tril(by_covariance) * (1.0 - 0.5 * np.eye(white.shape[1]))  # as in FilterError
-            flat, covariance = moved.reshape(len(row), -1), by_covariance.reshape(len(row), -1)
-            gradient += flat @ (white * weight).ravel() + 0.5 * np.trace(by_covariance, axis1=2, axis2=3).sum(axis=1)
-            gradient -= np.einsum("pnij,ni,nj->p", turned, white * weight, white, optimize=True)
-            information += (flat * weight.ravel()) @ flat.T + 0.5 * covariance @ covariance.T
-        return cost, gradient, information
+    def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
+        """Slopes are differences of whole runs."""
+        runs, places = self._followed([row, *(row + step for step in _STEP * np.eye(len(row)))]), np.arange(len(row))
+        for run, counted, part in zip(runs, self.counted, self._seen(runs), strict=True):
+            nu, S = run.innovations[:, counted], run.covariances[:, counted]
+            slopes, Li = (nu[1:] - nu[0]) / _STEP, np.linalg.inv(part.factor)
+            turned = Li @ ((S[1:] - S[0]) / _STEP) @ np.swapaxes(Li, 1, 2)
+            flat = turned.reshape(len(row), -1)
+            yield MovedErrors(
+                part.number, part.errors, part.factor, places, slopes, turned, (None, 0.5 * flat @ flat.T)
+            )
 
-    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
-        """Per record: whitened innovations (n, outputs) and their sensitivities (p, n, outputs).
+    def _moved_here(self, row: Array) -> Iterator[MovedErrors]:
+        asked = np.asarray(row, dtype=np.float64).tobytes()
+        if self._last is None or self._last[0] != asked:
+            self._last = asked, list(self.moved_errors(row))
+        return iter(self._last[1])
 
-        The last is the information (p, p) that lies in the innovations' covariance instead.
-        """
-        _, by_record = self._judged(row)
-        by_covariance = [part.reshape(len(row), -1) for _, _, part in by_record]
-        rest = sum((0.5 * flat @ flat.T for flat in by_covariance), np.zeros((len(row), len(row))))
-        return [white for white, _, _ in by_record], [moved for _, moved, _ in by_record], np.asarray(rest)
+    def _seen(self, runs: Sequence[Followed]) -> list[Errors]:
+        return [
+            Errors(number, run.innovations[0][counted], factor_of(run.covariances[0][counted]))
+            for number, (run, counted) in enumerate(zip(runs, self.counted, strict=True))
+        ]
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside its one-step predictions; the bounds are those of the mean covariance."""
@@ -124,42 +123,8 @@ class FollowingError(FilterError):
                 sigma=np.sqrt(np.diag(run.covariances[0][counted].mean(axis=0))),
                 states=run.states[0][:, kept],
             )
-            for piece, run, counted in zip(self.pieces, self._followed([row]), self.counted, strict=True)
+            for piece, run, counted in zip(self.records, self._followed([row]), self.counted, strict=True)
         )
-
-    def _judged(self, row: Array) -> tuple[float, list[tuple[Array, Array, Array]]]:
-        """Cost and what `_whitened` says at a row; that of the last one is kept, as in FilterError."""
-        asked = np.asarray(row, dtype=np.float64).tobytes()
-        if self._judgement is None or self._judgement[0] != asked:
-            runs = self._followed([row, *(row + step for step in _STEP * np.eye(len(row)))])
-            self._judgement = asked, (self._likelihood(runs), self._whitened(runs))
-        return self._judgement[1]
-
-    def _likelihood(self, runs: Sequence[Followed]) -> float:
-        total = 0.0
-        for run, counted in zip(runs, self.counted, strict=True):
-            nu, S = run.innovations[0][counted], run.covariances[0][counted]
-            if not (np.isfinite(nu).all() and np.isfinite(S).all()):
-                return np.inf
-            try:
-                L = np.linalg.cholesky(S)
-            except np.linalg.LinAlgError:
-                return np.inf
-            total += robust.huber(np.linalg.solve(L, nu[..., None])[..., 0])
-            total += float(np.log(np.diagonal(L, axis1=1, axis2=2)).sum())
-        return total
-
-    def _whitened(self, runs: Sequence[Followed]) -> list[tuple[Array, Array, Array]]:
-        """Per record: whitened innovations (n, m), slopes of theirs (p, n, m) and L^-1 dS L^-T (p, n, m, m)."""
-        by_record = []
-        for run, counted in zip(runs, self.counted, strict=True):
-            nu, S = run.innovations[:, counted], run.covariances[:, counted]
-            Li = np.linalg.inv(np.linalg.cholesky(S[0]))
-            turn = np.swapaxes(Li, 1, 2)
-            white = (Li @ nu[0][..., None])[..., 0]
-            moved = (Li @ ((nu[1:] - nu[0]) / _STEP)[..., None])[..., 0]
-            by_record.append((white, moved, Li @ ((S[1:] - S[0]) / _STEP) @ turn))
-        return by_record
 
     def _followed(self, rows: Sequence[Array]) -> list[Followed]:
         """Every record's runs at some rows."""

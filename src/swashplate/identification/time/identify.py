@@ -259,7 +259,7 @@ def _together(
 ) -> tuple[L, Found, Array]:
     """The search that goes on with physics and residual free."""
     table = beside_physics(alone.table, residual)
-    likelihood = by.likelihood_of(table, alone.pieces, question)
+    likelihood = by.likelihood_of(table, alone.records, question)
     start = begun_where_it_ended(likelihood.row, alone.row, row, residual)
     likelihood.refresh(start)
     optimum = minimise(likelihood, _solver(question), start=start)
@@ -293,7 +293,7 @@ def _found_ahead(
     if horizon is None:
         return first, row
     criterion = MultiStepErrors(
-        likelihood, row, likelihood.pieces, horizon=horizon, settling=SETTLING, known=first.corrected
+        likelihood, row, likelihood.records, horizon=horizon, settling=SETTLING, known=first.corrected
     )
     ahead = minimise(criterion, _solver(question), start=criterion.start)
     ahead = replace(ahead, converged=ahead.converged and optimum.converged)

@@ -18,9 +18,9 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.riccati import white_noise_gain
+from swashplate.identification.core.likelihood import NOTHING, SPREAD, gust_entries
 from swashplate.identification.core.parameter_row import Entry
-from swashplate.identification.core.time_likelihood import NOTHING, SPREAD, gust_entries
-from swashplate.identification.time.linear_likelihood import Batch, OutputErrors
+from swashplate.identification.time.linear_likelihood import Batch, LinearErrors
 from swashplate.models.linear.state_space import StateSpaceModel
 
 VELOCITIES = ("u", "v", "w")
@@ -31,8 +31,8 @@ _LASTS, _MOVES, _SHAKES, _READS = 1.0, 0.3, 0.003, 0.03
 state's or an output's size."""
 
 
-class FilterErrors(OutputErrors):
-    """The likelihood of innovations under a Kalman filter's gain (arguments: `OutputErrors`)."""
+class FilterErrors(LinearErrors):
+    """The likelihood of innovations under a Kalman filter's gain (arguments: `LinearErrors`)."""
 
     def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
         return gust_entries(self.model.states, size)
@@ -50,7 +50,7 @@ class FilterErrors(OutputErrors):
 
 
 class GustErrors(FilterErrors):
-    """The likelihood of innovations where the air's velocity is a state too (arguments: `OutputErrors`).
+    """The likelihood of innovations where the air's velocity is a state too (arguments: `LinearErrors`).
 
     Each velocity of the air fades as gusts do, g' = -g / tau + noise, and acts as the body's: x' = A (x - g) + B u.
     Its deviation "air u" and time "fading u" are unknown, so is white noise on every rate and on every output. The gain
@@ -77,7 +77,7 @@ class GustErrors(FilterErrors):
         ]
 
     def _covariance(self, errors: Array) -> Array:
-        return OutputErrors._covariance(self, errors)
+        return LinearErrors._covariance(self, errors)
 
     def _matrices(self, numbers: Batch) -> tuple[Any, Any, Any, Any, Any]:
         a, b, c, d, h1 = super()._matrices(numbers)

@@ -13,10 +13,17 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.riccati import STEP
+from swashplate.identification.core.likelihood import (
+    NOTHING,
+    Errors,
+    MovedErrors,
+    OwnCovariance,
+    factor_of,
+    gain_entries,
+)
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.time_likelihood import NOTHING, Moved, TimeErrors, gain_entries
 from swashplate.identification.time.first_gain import first_gain, kalman_gains
 from swashplate.identification.time.linear_simulation import driven
 from swashplate.identification.time.linear_slopes import Coefficients, slopes_along
@@ -31,7 +38,7 @@ _FIRST_GUSTS = (0.3, 0.1, 0.03)
 """Shares of the states' sizes by which their rates are disturbed, in filters to begin with."""
 
 
-class OutputErrors(TimeErrors):
+class LinearErrors(OwnCovariance):
     """The likelihood of a linear model's output errors, or of its innovations.
 
     Args:
@@ -88,7 +95,8 @@ class OutputErrors(TimeErrors):
         def run(gain: Array) -> tuple[float, list[Array]]:
             with np.errstate(over="ignore", invalid="ignore"):
                 errors = self._plain(with_gain(gain))
-            return self._cost_of(errors), self._by_record(errors)
+            parts = [Errors(0, errors, factor_of(self.covariance))]
+            return self.cost_of(parts), self._by_record(errors)
 
         sizes = 10.0 * np.sqrt(np.diag(self.covariance))
         size = np.array([dict(zip(self.outputs, sizes, strict=True)).get(s, 1.0) for s in self.model.states])
@@ -104,7 +112,8 @@ class OutputErrors(TimeErrors):
         loops = self._loops(self._stepped(row, NOTHING))
         return np.concatenate([_ran(*(np.real(part) for part in one))[0] for (one,) in loops])
 
-    def _moved(self, row: Array) -> Iterator[Moved]:
+    def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
+        factor = factor_of(self.covariance)
         for number in range(len(self.records)):
             places, noises = self._own(number)
             base, moved = self._tangents(number, row, places, noises)
@@ -113,7 +122,7 @@ class OutputErrors(TimeErrors):
             errors, states = _ran(*base[:4], *self._driven(number, base, inputs))
             every = np.concatenate([places, noises])
             for part, slopes in slopes_along(base, moved, inputs, later, errors, states):
-                yield every, part, slopes
+                yield MovedErrors(number, part, factor, every, slopes)
 
     def _own(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Places of the entries that move a record's errors: by more than the gain, and by the gain alone."""

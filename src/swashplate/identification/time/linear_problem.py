@@ -24,7 +24,7 @@ from swashplate.identification.core.records import Record, uniform_table
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.estimators import GAINS, Question
 from swashplate.identification.time.linear_filter import VELOCITIES, FilterErrors, GustErrors
-from swashplate.identification.time.linear_likelihood import OutputErrors
+from swashplate.identification.time.linear_likelihood import LinearErrors
 from swashplate.identification.time.record_fit import RecordEstimator, RecordProblem
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -73,7 +73,7 @@ class LinearKind:
         )
 
 
-def _likelihood_of(model: StateSpaceModel, method: str, gusts: str | None) -> type[OutputErrors]:
+def _likelihood_of(model: StateSpaceModel, method: str, gusts: str | None) -> type[LinearErrors]:
     """By the gain, and where it comes from the noise by the gusts."""
     if gusts is not None and method != "filter-error":
         raise IdentificationError(
@@ -90,7 +90,7 @@ def _likelihood_of(model: StateSpaceModel, method: str, gusts: str | None) -> ty
             hint="Choose white gusts, or method prediction-error: its free gain knows any.",
         )
     if method != "filter-error":
-        return OutputErrors
+        return LinearErrors
     return GustErrors if gusts == "lasting" else FilterErrors
 
 

@@ -7,7 +7,7 @@ residuals (Jategaonkar 2015, ch. 4; Bock 1983 for the shooting).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import DELAYS, Nuisance
 from swashplate.identification.core import robust
+from swashplate.identification.core.likelihood import Errors, Likelihood, MovedErrors
+from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Comparison, Record, logs
@@ -61,7 +63,7 @@ A part in a thousand of one rotor's command turns the nose by 1.6 rad in 4 s.
 """
 
 
-class OutputError:
+class OutputError(Likelihood):
     """The residuals' likelihood of windows simulated from their own initial states.
 
     Args:
@@ -80,7 +82,7 @@ class OutputError:
         nuisances: Sequence[str] = tuple(_NUISANCE),
     ) -> None:
         self.table = table
-        self.pieces = tuple(pieces)
+        self.records = tuple(pieces)
         self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt)
         self.nuisances = tuple(nuisances)
         self.length = round(window / self.model.dt)
@@ -124,7 +126,7 @@ class OutputError:
     def _windows(self) -> Shooting:
         windows = []
         for number, first in self._places:
-            piece, here = self.pieces[number], slice(first, first + self.length)
+            piece, here = self.records[number], slice(first, first + self.length)
             value, rate = (part[0] for part in slopes(piece, np.array([first])))
             voltage = piece.voltage[here]
             seen = FirstMotion(value, rate, np.zeros(3), np.array([voltage[0]]), float(piece.time[first]))
@@ -156,22 +158,20 @@ class OutputError:
         return self._beside(flown)[0], -self._shooting.moved(row, flown)
 
     # ---- likelihood --------------------------------------------------------------------------------------------
-    def cost(self, row: Array) -> float:
-        """Negative log-likelihood with the covariance of the last accepted row."""
-        residual = np.asarray(self.residuals(row)[0])
-        return self._cost(residual)
+    def errors_of(self, row: Array) -> list[Errors]:
+        return [Errors(place, part, self._L) for place, part in enumerate(self.residuals(row)[0])]
 
-    def _cost(self, residual: Array) -> float:
-        flat = residual.reshape(-1, residual.shape[-1])
-        if not np.isfinite(flat).all():
-            return np.inf
-        white = np.linalg.solve(self._L, flat.T)
-        return robust.huber(np.asarray(white, dtype=np.float64)) + flat.shape[0] * float(np.log(np.diag(self._L)).sum())
+    def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
+        """Windows share only the first entries (an arrow-shaped matrix)."""
+        residual, slopes = self._with_slopes(row)
+        s, n = self._shared, len(self._own)
+        for place, (errors, moved) in enumerate(zip(residual, slopes, strict=True)):
+            own = np.concatenate([np.arange(s), s + place * n + np.arange(n)])
+            yield MovedErrors(place, errors, self._L, own, moved)
 
-    def slope(self, row: Array) -> tuple[float, Array]:
-        """Cost and gradient, for samplers, from several threads too."""
-        residual, gradient, _, _ = self._accumulate(row)
-        return self._cost(residual), gradient
+    def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
+        """It has no filter to predict from."""
+        raise IdentificationError("output error has no errors ahead.", channel="horizon")
 
     def refresh(self, row: Array) -> None:
         """Covariance of the residuals at an accepted row, outliers weighed down."""
@@ -184,44 +184,7 @@ class OutputError:
         floor = np.diag(np.full(R.shape[0], 1e-14))
         self._L = np.linalg.cholesky(0.5 * (R + R.T) + floor)
 
-    def scores(self, row: Array) -> tuple[float, Array, Array]:
-        """Cost, gradient and information; windows share only the first entries (an arrow-shaped matrix)."""
-        residual, gradient, information, _ = self._accumulate(row)
-        return self._cost(residual), gradient, information
-
-    def _accumulate(self, row: Array) -> tuple[Array, Array, Array, Array]:
-        with np.errstate(over="ignore", invalid="ignore"):  # far out it diverges: its cost is then infinite
-            residual, derivative = self._with_slopes(row)
-        p, s, n = len(self.row), self._shared, len(self._own)
-        gradient, information = np.zeros(p), np.zeros((p, p))
-        if not (np.isfinite(self._cost(residual)) and np.isfinite(derivative).all()):
-            return residual, gradient, information, np.zeros_like(derivative)
-        Li = np.linalg.inv(self._L)
-        white = residual @ Li.T
-        weight = robust.weights(white)
-        d_white = derivative @ Li.T
-        for place in range(len(self._places)):
-            own = np.concatenate([np.arange(s), s + place * n + np.arange(n)])
-            flat = d_white[place].reshape(s + n, -1)
-            gradient[own] += flat @ (white[place] * weight[place]).ravel()
-            information[np.ix_(own, own)] += (flat * weight[place].ravel()) @ flat.T
-        return residual, gradient, information, d_white
-
-    # ---- what the accuracy analysis and the report need --------------------------------------------------------
-    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
-        """Per window: whitened residuals (n, outputs), their sensitivities (p, n, outputs); no other information."""
-        residual, _, _, d_white = self._accumulate(row)
-        Li = np.linalg.inv(self._L)
-        p, s, n = len(self.row), self._shared, len(self._own)
-        white, sensitivities = [], []
-        for place in range(len(self._places)):
-            full = np.zeros((p, *d_white.shape[2:]))
-            full[:s] = d_white[place, :s]
-            full[s + place * n : s + (place + 1) * n] = d_white[place, s:]
-            white.append(residual[place] @ Li.T)
-            sensitivities.append(full)
-        return white, sensitivities, np.zeros((p, p))
-
+    # ---- what the report needs -------------------------------------------------------------------------------------
     @property
     def constant(self) -> OutputError:
         """Itself: it has no gain."""
@@ -243,7 +206,7 @@ class OutputError:
         residual, simulated = (np.asarray(item) for item in self.residuals(row))
         kept = [self.table.vehicle.index(name) for name in PREDICTED]
         sigma, made = np.sqrt(np.diag(self.covariance)), []
-        for number, piece in enumerate(self.pieces):
+        for number, piece in enumerate(self.records):
             model, counted = np.full_like(piece.outputs, np.nan), np.zeros(piece.time.size, dtype=bool)
             body = np.full((piece.time.size, len(PREDICTED)), np.nan)
             for place, (owner, first) in enumerate(self._places):

@@ -18,6 +18,7 @@ from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core import accuracy, stopping
+from swashplate.identification.core.likelihood import OwnCovariance
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameter_row import Row
@@ -25,7 +26,6 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.core.result import Constant, Estimate, Fitted, Result, correlation_of
 from swashplate.identification.core.scoring import Optimum, Solver, minimise
 from swashplate.identification.core.sources import scale_words, sources_of
-from swashplate.identification.core.time_likelihood import TimeErrors
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -71,7 +71,7 @@ class RecordProblem(Generic[Model]):
         around: whether entries that want to go too far are held at their reach, see `Solver`.
     """
 
-    likelihood: TimeErrors
+    likelihood: OwnCovariance
     start: Model
     units: Sequence[str]
     identified: Callable[[Mapping[str, Estimate]], Model]
@@ -194,7 +194,7 @@ def _solved(problem: RecordProblem[Any], solver: Solver, horizon: Horizon | None
     return Solved(named, optimum, plain * units, corrected * units, row, optimum.row)
 
 
-def _solved_ahead(likelihood: TimeErrors, first: Optimum, horizon: Horizon, known: Array, solver: Solver) -> Solved:
+def _solved_ahead(likelihood: OwnCovariance, first: Optimum, horizon: Horizon, known: Array, solver: Solver) -> Solved:
     """The optimum of the errors ahead, from that of the likelihood and beside what that knows (p, p)."""
     criterion = MultiStepErrors(likelihood, first.row, likelihood.records, horizon=horizon, known=known)
     optimum = minimise(criterion, solver, start=criterion.start)

@@ -17,11 +17,18 @@ from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, equations_of
 from swashplate.errors import IdentificationError
 from swashplate.filtering.riccati import STEP, white_noise_gain
 from swashplate.filtering.vehicle_filter import FORCES, Ran, VehicleFilter
+from swashplate.identification.core.likelihood import (
+    NOTHING,
+    MovedErrors,
+    OwnCovariance,
+    factor_of,
+    gain_entries,
+    gust_entries,
+)
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.time_likelihood import NOTHING, Moved, TimeErrors, gain_entries, gust_entries
 from swashplate.identification.estimators import Gain
 from swashplate.identification.time.filter_error import parameter_entries
 from swashplate.models.nesting import leaves
@@ -51,7 +58,7 @@ def check_predicted(vehicle: Vehicle, outputs: Sequence[str]) -> None:
         )
 
 
-class VehicleErrors(TimeErrors):
+class VehicleErrors(OwnCovariance):
     """The likelihood of a vehicle's output errors, or of its innovations.
 
     Args:
@@ -60,7 +67,7 @@ class VehicleErrors(TimeErrors):
         gain: "none", "from the noise" (of white noise on every state's rate; innovations count by their variances, as
             in Jategaonkar's program) or "free".
         environment: wind, density and gravity; the records have the voltage.
-        shifts, biases: see `TimeErrors`.
+        shifts, biases: see `OwnCovariance`.
 
     Raises:
         IdentificationError: an output that the equations do not predict.
@@ -107,11 +114,12 @@ class VehicleErrors(TimeErrors):
         every = range(len(self.records))
         return np.concatenate([self._ran(number, row, NOTHING)[0].errors for number in every])
 
-    def _moved(self, row: Array) -> Iterator[Moved]:
+    def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
+        factor = factor_of(self.covariance)
         for number in range(len(self.records)):
             own = [i for i, n in enumerate(self.row.names) if n.endswith(f"[{number}]") or not n.endswith("]")]
             ran, _ = self._ran(number, row, places := np.array(own, dtype=np.intp))
-            yield places, ran.errors, ran.errors_moved
+            yield MovedErrors(number, ran.errors, factor, places, ran.errors_moved)
 
     def _ran(self, number: int, row: Array, places: Places) -> tuple[Ran, Array]:
         """The filter along a record, and its numbers with those of its directions behind."""

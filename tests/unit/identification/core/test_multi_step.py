@@ -10,11 +10,11 @@ import pytest
 import swashplate as sp
 from rolling import SAME, TRUTH, gusty, rolling
 from swashplate.errors import IdentificationError
+from swashplate.identification.core.likelihood import OwnCovariance
 from swashplate.identification.core.multi_step import Horizon, MultiStepErrors
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.core.scoring import Solver, minimise
-from swashplate.identification.core.time_likelihood import TimeErrors
 from swashplate.identification.identify import identify
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors
 from swashplate.models.linear.state_space_file import parse
@@ -35,7 +35,7 @@ def test_a_horizon_is_two_times_or_one() -> None:
 
 
 @lru_cache(maxsize=1)
-def _filter_error() -> TimeErrors:
+def _filter_error() -> OwnCovariance:
     table = parameterize(rolling(), list(TRUTH))
     pieces = records([gusty()], rolling(), outputs=OUTPUTS)
     how = {"environment": Environment(), "shifts": True, "biases": ("ay",)}

@@ -107,7 +107,7 @@ def test_averages_over_the_air_speed_are_those_of_a_normal_distribution() -> Non
 def test_what_was_not_read_tells_nothing() -> None:
     """A bridge over a gap is no reading: it moves neither state nor covariance, and is not counted."""
     likelihood = _likelihood()
-    (piece,), beside = likelihood.pieces, _beside()
+    (piece,), beside = likelihood.records, _beside()
     before = beside.state
     beside.covariance = P = 1e-4 * np.eye(beside.covariance.shape[1])[None]
     nu, _ = beside.corrected(np.full_like(piece.outputs[100], np.nan))
@@ -126,7 +126,7 @@ def test_what_was_not_read_tells_nothing() -> None:
 def test_a_record_that_begins_in_a_maneuver_says_how_far_off_its_states_may_be() -> None:
     """Rates by a line through 0.15 s, rotors and bars as if settled, and air of which nothing is known."""
     likelihood = _likelihood()
-    run, (piece,), (spread,) = likelihood._runs[0], likelihood.pieces, likelihood._spread
+    run, (piece,), (spread,) = likelihood._runs[0], likelihood.records, likelihood._spread
     (went,) = likelihood.constant.runs(likelihood.row.starts())
     n, noise = len(spread), likelihood.noise
     off, sure = [], np.zeros(0)
@@ -154,7 +154,7 @@ def test_a_record_that_begins_in_a_maneuver_says_how_far_off_its_states_may_be()
 @pytest.mark.parametrize("name", [*FREE, "wind", "sensor_heading"])
 def test_scores_are_slopes_of_the_cost_whatever_the_filter(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Innovations and covariances that bend with all numbers, in the place of the filter's own."""
-    likelihood = FollowingError(_likelihood().table, _likelihood().pieces, noise=_likelihood().noise)
+    likelihood = FollowingError(_likelihood().table, _likelihood().records, noise=_likelihood().noise)
 
     def some(rows: list[Any]) -> list[Followed]:
         run, readings = likelihood._runs[0], likelihood._readings[0]
@@ -191,7 +191,7 @@ def test_the_gradient_is_the_slope_of_the_cost() -> None:
     cost, gradient, information = likelihood.scores(row)
     assert cost == pytest.approx(likelihood.cost(row), rel=1e-12)
     size = np.sqrt(np.diag(information))
-    for name in ("tau_f_upper", "wind", "line_angle"):
+    for name in ("tau_f_upper", "wind"):
         step = np.zeros(row.size)
         place = likelihood.row.names.index(name)
         step[place] = 1e-2 / max(size[place], 1.0)

@@ -177,10 +177,10 @@ def test_output_errors_are_as_large_as_their_covariance_says() -> None:
 def test_an_outlier_costs_its_distance_and_not_its_square() -> None:
     likelihood = _output_error()
     row = _somewhere(likelihood)
-    residual = np.asarray(likelihood.residuals(row)[0])
-    push = np.zeros_like(residual)
-    push[0, 50, 2] = 1000.0 * np.sqrt(likelihood.covariance[2, 2])
-    costs = [likelihood._cost(residual + size * push) for size in (0.0, 1.0, 2.0)]
+    first, *others = likelihood.errors_of(row)
+    push = np.zeros_like(first.errors)
+    push[50, 2] = 1000.0 * np.sqrt(likelihood.covariance[2, 2])
+    costs = [likelihood.cost_of([replace(first, errors=first.errors + size * push), *others]) for size in (0, 1, 2)]
     assert costs[2] - costs[1] == pytest.approx(costs[1] - costs[0], rel=0.05)
 
 
@@ -233,7 +233,7 @@ def test_innovations_turn_back_into_the_room() -> None:
 def test_what_is_left_out_passes_the_filter_and_counts_for_nothing() -> None:
     """The same run; cost, information and whitened innovations are those of the samples that are left."""
     whole = _filter_error()
-    row, piece = _somewhere(whole), whole.pieces[0]
+    row, piece = _somewhere(whole), whole.records[0]
     first, last = piece.time[0] + 2.0, piece.time[0] + 3.0
     parts = [
         FilterError(whole.table, [replace(piece, left_out=out)])

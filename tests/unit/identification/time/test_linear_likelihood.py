@@ -11,7 +11,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.time.linear_filter import FilterErrors
-from swashplate.identification.time.linear_likelihood import OutputErrors
+from swashplate.identification.time.linear_likelihood import LinearErrors
 from swashplate.identification.time.linear_problem import linear_records, torn
 from swashplate.identification.time.linear_simulation import driven
 from swashplate.models.linear.state_space_file import structure
@@ -34,7 +34,7 @@ def _flight(seed: int, seconds: float) -> Flight:
 def test_the_gradient_is_the_slope_of_the_cost_by_every_entry(method: str) -> None:
     outputs, biases = MODEL.outputs, MODEL.outputs[:1]
     pieces, delays = linear_records(MODEL, [_flight(1, 3.0), _flight(2, 2.4)], outputs, biases=biases)
-    kind = FilterErrors if method == "filter-error" else OutputErrors
+    kind = FilterErrors if method == "filter-error" else LinearErrors
     likelihood = kind(MODEL, outputs, pieces, True, biases, delays=delays, gain=method != "output-error")
     row = likelihood.row.starts() + 0.01 * np.random.default_rng(3).standard_normal(len(likelihood.row))
     for _ in range(1 if method != "filter-error" else 50):  # its gain depends on the covariance
@@ -65,12 +65,12 @@ def test_states_in_pieces_are_those_one_after_the_other(samples: int) -> None:
 
 def test_a_first_gain_is_likelier_and_moves_nothing_else() -> None:
     pieces, delays = linear_records(MODEL, [_flight(1, 3.0), _flight(2, 2.4)], MODEL.outputs, biases=())
-    likelihood = OutputErrors(MODEL, MODEL.outputs, pieces, True, (), delays=delays, gain=True)
+    likelihood = LinearErrors(MODEL, MODEL.outputs, pieces, True, (), delays=delays, gain=True)
     plain, begun = likelihood.row.starts(), likelihood.begun()
     assert likelihood.cost(begun) < likelihood.cost(plain)
     noise = np.array([entry.group == "noise" for entry in likelihood.row.entries])
     np.testing.assert_array_equal(begun[~noise], plain[~noise])
-    still = OutputErrors(MODEL, MODEL.outputs, pieces, True, (), delays=delays, gain=False)
+    still = LinearErrors(MODEL, MODEL.outputs, pieces, True, (), delays=delays, gain=False)
     np.testing.assert_array_equal(still.begun(), still.row.starts())
 
 

@@ -84,7 +84,7 @@ def test_steps_are_those_of_the_equations(name: str) -> None:
     run = likelihood.runs(_somewhere(likelihood))[0]
     gust = np.array([0.3, -0.2, 0.1, 1.0, -2.0, 0.5, 0.4, -0.3])
     states = run.states._replace(gust=np.tile(gust, (len(run.states.x), 1)))
-    commands, voltage = run.commands, likelihood.pieces[0].voltage
+    commands, voltage = run.commands, likelihood.records[0].voltage
     noise = np.array(Noise(wind=0.3), dtype=np.float64)
     numbers = FilterNumbers(run.numbers.parameters, noise, run.numbers.nuisance, run.numbers.inputs)
     found = record_filter(model).ahead_of(states, numbers, commands, voltage, np.array([100, 170]), 2)
@@ -154,7 +154,7 @@ def test_without_a_compiler_the_numbers_are_the_same(
     monkeypatch.setattr(libraries, "can_compile", lambda: False)
     _forget()
     try:
-        by_numpy = FilterError(in_c.table, in_c.pieces, noise=in_c.noise)
+        by_numpy = FilterError(in_c.table, in_c.records, noise=in_c.noise)
         theirs, (other,) = by_numpy.scores(row), by_numpy.runs(row)
         further = by_numpy.errors_ahead_moved(row, AHEAD, places)
         assert by_numpy.compiled_by == "NumPy"
