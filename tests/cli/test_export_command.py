@@ -129,3 +129,49 @@ def test_an_output_with_a_suffix_is_the_files_name(tmp_path: Path) -> None:
     told = one_message(swash("export", "raptor50", "--format", "control", "-o", tmp_path / "hover.mat"))
     assert "ends in '.mat', and the format writes hover_control.json. Give a folder, or a name that ends so." in told
     assert not (tmp_path / "hover.mat").exists()
+
+
+def test_a_log_becomes_a_page_and_says_what_is_in_it(tmp_path: Path) -> None:
+    outcome = swash("export", "examples/ordinary_flight@70-90", "--format", "web", "--out", tmp_path / "sent.html")
+    assert outcome.code == 0, outcome.err
+    assert [file.name for file in tmp_path.iterdir()] == ["sent.html"]
+    assert "Inside: 27 channels of 20.0 s" in outcome.err
+    assert "Left out: latitude, longitude, the map; serial numbers;" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("nosuch.bin", "--format", "web"), "nosuch.bin: there is no such file"),
+        (("broken.bin", "--format", "web"), "broken.bin"),
+        (("examples/coax_flight", "--format", "c"), "is a log: --format web writes its page"),
+        (("examples/coax_flight", "--format", "web", "--speed", "3"), "--speed: is for vehicles, and this is a log"),
+        (("examples/coax_flight@900-950", "--format", "web"), "holds nothing"),
+    ],
+)
+def test_a_log_that_becomes_no_page(
+    arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken.bin").write_bytes(b"\xa3\x95" * 40)
+    out = tmp_path / "out"
+    outcome = swash("export", *arguments, "--out", out)
+    assert outcome.code == 2
+    assert words in one_message(outcome)
+    assert not out.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limits of files")
+def test_a_full_disk_leaves_no_page(tmp_path: Path) -> None:
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+    try:
+        arguments = ("examples/ordinary_flight@70-80", "--format", "web", "--out", tmp_path / "sent.html")
+        outcome = swash("export", *arguments)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert outcome.code == 2
+    assert "sent.html: cannot be written" in one_message(outcome)
+    assert list(tmp_path.iterdir()) == []

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from swashplate.errors import FlightError
+from swashplate.flights.datasets import locate
 from swashplate.flights.flight import Flight
 
 _WINDOW = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d*)?)-(?P<stop>\d+(?:\.\d*)?)")
@@ -26,6 +27,18 @@ def split_log(text: str) -> tuple[str, int | None]:
     """`FILE#N` as the file and which of its logs is meant; a file of just this name wins."""
     match = _LOG.fullmatch(text)
     return (text, None) if match is None or Path(text).exists() else (match["file"], int(match["number"]))
+
+
+def is_log(named: object, *, matrices: bool) -> bool:
+    """Whether a text names a log and no model: by its ending, which a model's name lacks, or as a folder (rosbag2).
+
+    Args:
+        named: a text or a path. matrices: whether a .mat is an export's matrices, else it is a log.
+    """
+    if not isinstance(named, str | os.PathLike):
+        return False
+    file = Path(locate(split_log(split_window(named)[0])[0]))
+    return file.is_dir() or file.suffix.lower() not in ("", ".toml", ".json", *([".mat"] * matrices))
 
 
 def cut(flight: Flight, start: float, stop: float, *, where: str) -> Flight:

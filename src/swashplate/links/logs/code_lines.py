@@ -63,6 +63,10 @@ class Read:
             given.append(f"log={self.log}")
         return f"{name} = sp.read({', '.join(given)})"
 
+    def called(self, name: str) -> Read:
+        """The same of a file of another name, with a mapping that lies beside it."""
+        return replace(self, file=name, mapping="mapping.toml" if self.mapping else "")
+
     def with_mapping(self, mapping: str) -> Read:
         """The same by a mapping, which says the units."""
         return replace(self, mapping=mapping, options=Remedy({}, self.options.drop_bad_stamps))

@@ -80,6 +80,17 @@ class Opened:
     _groups: list[dict[str, Any]] = field(default_factory=list, repr=False)
     _gaps: dict[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
 
+    @classmethod
+    def of(cls, flight: Flight, read: Read, path: Path) -> Opened:
+        """A log that has been read, checked at once.
+
+        Raises:
+            SwashError: where it cannot be checked.
+        """
+        made = cls(1, path, read, READY, flight, inspect(flight), listed=True, version=1)
+        made._groups = groups(flight)
+        return made
+
     def load(self, read: Read) -> None:
         """Read the log, then check it in a thread; what cannot be read is said in `problem`, never raised.
 

@@ -10,6 +10,7 @@ import json
 import posixpath
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ def single_file(
     documents: Mapping[str, Any],
     packed: Mapping[str, bytes],
     folders: Mapping[str, Path] | None = None,
+    entry: str = "",
     instead: Mapping[str, str] | None = None,
     within: Mapping[str, str] | None = None,
 ) -> str:
@@ -40,6 +42,7 @@ def single_file(
         documents: what becomes JSON, by the id under which the page's modules find it.
         packed: bytes, gzipped, by id.
         folders: where addresses lead that the page's files ask for ("/open/"), besides "/page/".
+        entry: the module that begins, in the stead of the page's own.
         instead: modules that take the place of others, by address.
         within: HTML that takes the place of HTML of the page.
 
@@ -49,11 +52,11 @@ def single_file(
     check_page()
     places = {"/page/": PAGE, **(folders or {})}
     text = page.read_text(encoding="utf-8")
-    entry = _ENTRY.search(text)
-    assert entry is not None, page
+    begins = _ENTRY.search(text)
+    assert begins is not None, page
     styles = "".join(_text(address, places) for address in _STYLE.findall(text))
     modules: dict[str, str] = {}
-    _add(entry[1], modules, places, instead or {})
+    _add(entry or begins[1], modules, places, instead or {})
     script = (PAGE / "bundle.js").read_text(encoding="utf-8")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     allowed = {
@@ -68,10 +71,10 @@ def single_file(
     bodies = (
         *(f'<script type="application/json" id="{name}">{_json(one)}</script>' for name, one in documents.items()),
         *(f'<script type="text/plain" id="{name}">{_gzipped(one)}</script>' for name, one in packed.items()),
-        f'<script type="text/plain" id="modules">{_gzipped(json.dumps(list(modules.items())).encode())}</script>',
+        f'<script type="text/plain" id="modules">{_packed_modules(json.dumps([*modules.items()]).encode())}</script>',
         f"<script>{script}</script>",
     )
-    text = text.replace(entry[0], "\n".join(bodies))
+    text = text.replace(begins[0], "\n".join(bodies))
     text = _STYLE.sub("", text).replace("</head>", f"<style>{styles}</style>\n</head>")
     text = re.sub("<title>.*?</title>", lambda _: f"<title>{html.escape(title)}</title>", text, count=1)
     head = '<meta charset="utf-8">'
@@ -103,6 +106,10 @@ def _add(address: str, modules: dict[str, str], places: Mapping[str, Path], inst
 
 def _gzipped(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+
+
+_packed_modules = lru_cache(maxsize=2)(_gzipped)
+"""The same modules for every page of a kind; the libraries among them take half a second."""
 
 
 def _json(document: Any) -> str:

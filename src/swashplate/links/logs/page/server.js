@@ -1,13 +1,5 @@
 // What the server is asked. An answer that refuses is thrown with its words.
-export class Refused extends Error {
-  constructor({ problem, hint }) {
-    super(problem);
-    this.hint = hint ?? "";
-  }
-  get words() {
-    return this.hint ? `${this.message}\n${this.hint}` : this.message;
-  }
-}
+import { Refused } from "./refused.js";
 
 async function answer(response) {
   let told;
