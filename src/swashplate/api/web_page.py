@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-
 from swashplate.errors import ExportError
 from swashplate.export.formats import Export, ExportRequest
-from swashplate.extras import version_of
 from swashplate.links.live.single_page import single_page
 from swashplate.links.live.world import World
 from swashplate.models.linear.linear_vehicle import linear_vehicle
@@ -32,10 +29,9 @@ def web(request: ExportRequest) -> Export:
     if len(request.draws) > MOST_DRAWS:
         raise ExportError(f"is {len(request.draws)}, expected {MOST_DRAWS} at most.", channel="draws")
     world = World(model, controller=request.controller, draws=request.draws)
-    made = (f"swashplate {version_of('swashplate')}, card {card_digest(model)} of {model.name}: {model.card.title}.",)
     late = {name: delay for name, delay in (request.late or {}).items() if delay}
     not_flown = ", ".join(f"{name} {1e3 * delay:.3g} ms" for name, delay in late.items())
-    page = single_page(world, name=request.name, made=made)
+    page = single_page(world, name=request.name, made=request.origin)
     drawn = f"; {len(request.draws)} models drawn from the fit" if request.draws else ""
     inside = f"the equations and numbers of {model.name}, its card's sources, {world.pilot.title}{drawn}"
     return Export(
@@ -45,9 +41,3 @@ def web(request: ExportRequest) -> Export:
             *((f"The page's pilot flies without the identified delays ({not_flown}).",) if not_flown else ()),
         ),
     )
-
-
-def card_digest(model: Vehicle) -> str:
-    """Twelve digits of the SHA-256 of a card's numbers and options, by which exports of one model are known."""
-    told = repr((sorted(model.card.values().items()), sorted(map(repr, dict(model.card.options).items()))))
-    return hashlib.sha256(told.encode()).hexdigest()[:12]

@@ -1,13 +1,13 @@
 """A linear model as JSON for python-control, and back: names, units, delays and trim come along, nothing is pickled.
 
-{"kind": "state-space", "schema": 1, "name": ..., "A": [[...]], "B": ..., "C": ..., "D": ..., "dt": 0,
+{"kind": "state-space", "schema": 1, "name": ..., "origin": [...], "A": [[...]], "B": ..., "C": ..., "D": ..., "dt": 0,
  "states": [...], "inputs": [...], "outputs": [...], "units": {...}, "delays": {...}, "about": {...}}
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +22,15 @@ SCHEMA = 1
 KIND = "state-space"
 
 
-def control_json(model: Linear) -> str:
-    """The text of the file; numbers come back to the last bit."""
+def control_json(model: Linear, *, origin: Sequence[str] = ()) -> str:
+    """The text of the file; numbers come back to the last bit. `origin`: what it was made from, a line each."""
     document = {
         "kind": KIND,
         "schema": SCHEMA,
         "name": model.name,
         "title": model.title,
         "trust": model.trust,
+        "origin": list(origin),
         "dt": 0,
         **{name: getattr(model, name).tolist() for name in "ABCD"},
         "states": list(model.states),
@@ -72,6 +73,7 @@ def read_linear(path: str | Path) -> Linear:
         {name: str(unit) for name, unit in _table(document, "units", path).items()},
         {name: _number(value, f"delays.{name}", path) for name, value in _table(document, "delays", path).items()},
         {name: _number(value, f"about.{name}", path) for name, value in _table(document, "about", path).items()},
+        tuple(str(line) for line in document.get("origin") or ()),
     )
 
 

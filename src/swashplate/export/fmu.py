@@ -61,7 +61,7 @@ def description(model: Traced, *, guid: str, version: str, sources: tuple[str, .
         fmiVersion="2.0",
         modelName=_plain(model.name),
         guid=guid,
-        description=_plain(f"{model.title}. Starts at: {model.about}."),
+        description=_plain(" ".join([f"{model.title}. Starts at: {model.about}.", *model.origin])),
         generationTool=f"swashplate {version}",
         variableNamingConvention="structured",
         numberOfEventIndicators="0",

@@ -11,6 +11,7 @@ from swashplate.atomic import folder_when_complete, write_bytes
 from swashplate.engine.c_text import Precision, identifier
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear, logged_delays, of_state_space, of_vehicle
+from swashplate.export.origin import origin_of
 from swashplate.models.delays import input_delays
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -58,14 +59,14 @@ def control(asked: ExportRequest) -> Export:
     """JSON for python-control."""
     from swashplate.export.control_json import control_json
 
-    return Export(_encoded({f"{asked.name}_control.json": control_json(asked.linear())}))
+    return Export(_encoded({f"{asked.name}_control.json": control_json(asked.linear(), origin=asked.origin)}))
 
 
 def matlab(asked: ExportRequest) -> Export:
     """A `.mat` file of matrices and names."""
     from swashplate.export import matlab as files
 
-    return Export({f"{asked.name}.mat": files.matlab(asked.linear())})
+    return Export({f"{asked.name}.mat": files.matlab(asked.linear(), origin=asked.origin)})
 
 
 def _traced(asked: ExportRequest) -> Traced:
@@ -73,9 +74,9 @@ def _traced(asked: ExportRequest) -> Traced:
 
     model, about = asked.model, asked.about
     if not isinstance(model, Vehicle):
-        return trace_linear(asked.linear(), name=asked.name)
+        return replace(trace_linear(asked.linear(), name=asked.name), origin=asked.origin)
     assert about is not None
-    return trace_vehicle(model, about, name=asked.name, delays=asked.late)
+    return replace(trace_vehicle(model, about, name=asked.name, delays=asked.late), origin=asked.origin)
 
 
 def _encoded(texts: Mapping[str, str]) -> dict[str, bytes]:
@@ -117,6 +118,7 @@ class ExportRequest:
         precision: of numbers in C.
         controller: what flies it where the format is flown; None for the page's own.
         draws: models that a fit cannot tell from it, for formats that show them.
+        origin: commit, card and data that it was made from, a line each.
     """
 
     model: Model
@@ -126,6 +128,7 @@ class ExportRequest:
     precision: Precision
     controller: Controller | None = None
     draws: tuple[Vehicle, ...] = ()
+    origin: tuple[str, ...] = ()
 
     def linear(self) -> Linear:
         """The model as matrices."""
@@ -190,7 +193,7 @@ def export_model(
     if (controller or draws) and form != "web":
         raise ExportError(f"'{form}' holds no controller and no drawn models.", channel="--format", hint="web does.")
     flying = model if isinstance(model, Vehicle) and model.structure is None else None
-    late, left_out, about = None, "", trim
+    late, left_out, about, origin = None, "", trim, origin_of(model)
     if flying is None:
         model = model.structure or model if isinstance(model, Vehicle) else model
         if trim is not None:
@@ -208,7 +211,7 @@ def export_model(
             left_out = f"Left out: the identified delays of the inputs ({told})."
         about = trim or find_trim(flying)
     called = identifier(name)
-    made = FORMATS[form](ExportRequest(model, called, about, late, precision, controller, tuple(draws)))
+    made = FORMATS[form](ExportRequest(model, called, about, late, precision, controller, tuple(draws), origin))
     return replace(made, notes=(*made.notes, left_out)) if left_out else made
 
 

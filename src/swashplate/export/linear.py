@@ -27,6 +27,7 @@ class Linear:
         units: by name.
         delays: [s] by input, or by "output/input" for one response.
         about: states and inputs by name at the flight that deviations count from; empty where that is not known.
+        origin: what its file says that it was made from, a line each; empty where it says nothing.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Linear:
     units: Mapping[str, str]
     delays: Mapping[str, float] = field(default_factory=dict)
     about: Mapping[str, float] = field(default_factory=dict)
+    origin: tuple[str, ...] = ()
 
     def delay(self, output: str, input: str) -> float:
         """Delay of one response [s]."""

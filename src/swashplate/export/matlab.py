@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,12 @@ from swashplate.flights.readers.source import open_source
 _HEADER = 116  # bytes of free text that a level 5 file begins with
 
 
-def matlab(model: Linear) -> bytes:
+def matlab(model: Linear, *, origin: Sequence[str] = ()) -> bytes:
     """The file (MATLAB level 5), the same bytes for the same model.
 
     Variables: A B C D; state_names input_names output_names and state_units input_units output_units as cell arrays of
     text; io_delay [s], (outputs, inputs), for `ss(...).IODelay`; state_start and input_start, the flight that
-    deviations count from; name, title, trust.
+    deviations count from; name, title, trust; origin, what it was made from, a line each.
     """
     from scipy.io import savemat
 
@@ -43,6 +43,7 @@ def matlab(model: Linear) -> bytes:
         "name": model.name,
         "title": model.title,
         "trust": model.trust,
+        "origin": _cells(origin),
     }
     buffer = io.BytesIO()
     savemat(buffer, content, do_compression=False)
@@ -86,6 +87,7 @@ def read_matlab(path: str | Path) -> Linear:
         units,
         {f"{o}/{i}": float(delays[a, b]) for a, o in enumerate(outputs) for b, i in enumerate(inputs) if delays[a, b]},
         {name: float(value) for name, value in starts} if any(value for _, value in starts) else {},
+        _texts(variables, "origin", path) if "origin" in variables else (),
     )
 
 

@@ -199,6 +199,7 @@ def _heading(model: Traced) -> str:
         words(f"{model.name}: {model.title}"),
         words(f"Trust: {model.trust}") if model.trust else "",
         words(f"Starts: {model.about}"),
+        *(words(line) for line in model.origin),
         *(words(note) for note in late_notes(model)),
         "",
         "Written by swashplate from the equations that it simulates with. SI units, radians; body axes",

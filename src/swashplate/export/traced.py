@@ -54,6 +54,7 @@ class Traced:
         jacobians: A and B, the rates by state and by input; of nothing where they were left out.
         looped: the rates again, with the roots in them found in loops; None where there are none.
         delays: of each input [s]; empty where there are none. The functions do not have them.
+        origin: commit, card and data that it was made from, a line each.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Traced:
     jacobians: Any = field(repr=False)
     looped: Looped | None = field(default=None, repr=False)
     delays: tuple[float, ...] = ()
+    origin: tuple[str, ...] = ()
 
 
 def late_notes(model: Traced) -> tuple[str, ...]:
