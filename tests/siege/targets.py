@@ -19,6 +19,7 @@ import made_blackbox_logs
 import made_logs
 import swashplate as sp
 from made_results import result
+from made_telemetry import telemetry
 from swashplate.bench.record_files import is_bench, read_bench
 from swashplate.control.controller_file import read_controller, save_controller
 from swashplate.control.draws.robustness import draw_models
@@ -264,6 +265,7 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
         lambda: (made_autopilot_logs.dataflash(made_autopilot_logs.px4_rows(20), made_autopilot_logs.PX4LOG),),
         ".px4log",
     ),
+    "telemetry": _logs(lambda: (_written("a.tlog", lambda path: telemetry(path, seconds=3.0)),), ".tlog"),
     "PX4 ULog": _logs(lambda: (made_autopilot_logs.ulog(15), made_autopilot_logs.ulog(15, dropout=True)), ".ulg"),
     "Blackbox log": _logs(_blackbox, ".bbl"),
     "ROS bag, first form": _logs(lambda: bags(1), ".bag"),

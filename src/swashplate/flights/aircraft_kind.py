@@ -86,7 +86,9 @@ _LEAST = 3
 def aircraft_kind(flight: Flight) -> AircraftKind | None:
     """What the log says that flew; None where it does not."""
     said = flight.provenance
-    told = _ardupilot(said.vehicle, said.parameters) if said.reader == "ardupilot" else None
+    told = _ardupilot(said.vehicle, said.parameters) if said.reader in ("ardupilot", "tlog") else None
+    if said.reader == "tlog" and not said.parameters.get("Q_ENABLE"):
+        told = _of_parameter(said.parameters, "MAV_TYPE", _MAV_TYPES) or told
     if said.reader in ("ulog", "px4log"):
         told = _of_parameter(said.parameters, "CA_AIRFRAME", _CONTROL_ALLOCATION)
         told = told or _of_parameter(said.parameters, "MAV_TYPE", _MAV_TYPES)
@@ -108,6 +110,8 @@ def _ardupilot(vehicle: str, parameters: Mapping[str, float]) -> Told | None:
         return None
     if parameters.get("Q_ENABLE", 0.0) > 0.0:
         return _VTOL, f"{firmware}, Q_ENABLE"
+    if kind[1] == "Rover" and parameters.get("FRAME_CLASS") == 2:
+        return _BOAT, f"{firmware}, FRAME_CLASS 2"
     if kind[1] in _FIRMWARES:
         return _FIRMWARES[kind[1]], firmware
     if (named := frame.strip().partition("/")[0].upper()) in _FRAMES:

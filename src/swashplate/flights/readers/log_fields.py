@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
-from swashplate.flights.readers import clocked, dataflash, dataflash_text, ulog
+from swashplate.flights.readers import clocked, dataflash, dataflash_text, tlog, ulog
 from swashplate.flights.readers.ardupilot_events import seconds
 from swashplate.flights.readers.dataflash import MessageKind, MessageTable
 from swashplate.flights.readers.source import open_source
@@ -83,9 +83,13 @@ def log_fields(path: Path) -> LogFields | None:
             return _Binary(path, source.content)
         if source.content.startswith(ulog.MAGIC):
             return _Decoded(_topics(source.content, source.name))
+        if tlog.recognises(source):
+            tables = tlog.tables_of(source)
+            numbers = {n: (t.place, t.time, tlog.number_columns(t)) for n, t in tables.items()}
+            return _Decoded(numbers, {n: t.units for n, t in tables.items()})
         if dataflash_text.is_dataflash_text(source.text):
-            tables = dataflash_text.messages(source.text or "").tables
-            return _Decoded({name: _columns(table) for name, table in tables.items() if name not in _DESCRIBE})
+            texts = dataflash_text.messages(source.text or "").tables
+            return _Decoded({name: _columns(table) for name, table in texts.items() if name not in _DESCRIBE})
     return None
 
 
@@ -244,10 +248,10 @@ Columns = tuple[NDArray[np.int64], Array, Mapping[str, Array]]
 
 
 class _Decoded(LogFields):
-    def __init__(self, messages: Mapping[str, Columns]) -> None:
+    def __init__(self, messages: Mapping[str, Columns], units: Mapping[str, Mapping[str, str]] | None = None) -> None:
         self._messages = messages
         fields = [
-            LogField(name, field, "", time.size, _rate(time))
+            LogField(name, field, (units or {}).get(name, {}).get(field, ""), time.size, _rate(time))
             for name, (_, time, columns) in messages.items()
             for field in columns
         ]

@@ -38,6 +38,7 @@ _OURS = (
     "ardupilot",
     "px4log",
     "blackbox",
+    "tlog",
     "ulog",
     "rosbag",
     "mat_table",
@@ -47,6 +48,7 @@ _OURS = (
     "optitrack",
     "vicon",
     "blackbox_csv",
+    "xplane",
     "delimited",
 )
 _LAST = "delimited"  # nearly any text looks like a plain table
@@ -71,11 +73,12 @@ def read(
     bad_stamps: str = "error",
     log: int | None = None,
 ) -> Flight:
-    """Reads a flight log: ArduPilot DataFlash (`.bin`, `.log`), PX4 ULog (`.ulg`) or `.px4log`, Blackbox of Rotorflight
-    and Betaflight (`.bbl`, `.bfl`, or exported as CSV), a ROS bag (1 or 2), MATLAB files (`.mat`), tables of
-    text (CSV), a NanoBench CSV file, a swashplate netCDF file, a Vicon or OptiTrack CSV export.
+    """Reads a flight log: ArduPilot DataFlash (`.bin`, `.log`), PX4 ULog (`.ulg`) or `.px4log`, a ground station's
+    telemetry (`.tlog`), Blackbox of Rotorflight and Betaflight (`.bbl`, `.bfl`, or exported as CSV), a ROS bag (1 or
+    2), MATLAB files (`.mat`), tables of text (CSV), X-Plane's Data.txt, a NanoBench CSV file, a swashplate netCDF file,
+    a Vicon or OptiTrack CSV export.
 
-    ULog files and ROS bags need `pip install 'swashplate[logs]'`.
+    ULog files and ROS bags need `pip install 'swashplate[logs]'`, telemetry `swashplate[link]`.
 
     Args:
         path_or_name: the file, or the folder of a rosbag2; or a file of a public data set as
@@ -179,7 +182,7 @@ def _whole(
     raise FlightError(
         f"is no flight log that is known; it starts with {source.content[:8]!r}.",
         where=source.path,
-        hint="Known are ArduPilot (.bin, .log), PX4 (.ulg, .px4log), Blackbox (.bbl), ROS bags, MATLAB (.mat), "
-        "NanoBench CSV, swashplate netCDF (.nc), CSV (columns parted by comma, semicolon or tab), and the exports of "
-        "Vicon and OptiTrack.",
+        hint="Known are ArduPilot (.bin, .log), PX4 (.ulg, .px4log), telemetry (.tlog), Blackbox (.bbl), ROS bags, "
+        "MATLAB (.mat), X-Plane's Data.txt, NanoBench CSV, swashplate netCDF (.nc), CSV (columns parted by comma, "
+        "semicolon or tab), and the exports of Vicon and OptiTrack.",
     )
