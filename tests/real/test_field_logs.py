@@ -52,6 +52,14 @@ def test_modes_of_planes_rovers_and_subs(field: Path, log: str, modes: list[str]
 
 
 # ---- 05: stamps in ROS bags ------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("log", "what"), [("plane", "a plane"), ("rover", "a rover"), ("sub", "a submarine")])
+def test_a_vehicle_that_is_no_helicopter_is_told_what_is_made_for_it(field: Path, log: str, what: str) -> None:
+    notes = sp.inspect(sp.read(field / "03-plane-modes" / f"{log}.bin")).notes
+    (told,) = (text for text in notes if text.startswith(what))
+    assert "plotted" in told
+    assert "for helicopters and multirotors only" in told
+
+
 @pytest.mark.parametrize(
     ("bag", "lost"), [("duplicate", 50.0), ("restart", 50.0), ("disorder", 2.0), ("ok_mcap", 0.0), ("ok_sqlite", 0.0)]
 )

@@ -50,6 +50,10 @@ def test_parameters_say_it_where_names_do_not() -> None:
         told = aircraft_kind(log("ArduCopter V4.5.7", FRAME_CLASS=number))
         assert told is not None
         assert (told.words, told.told) == (words, f"FRAME_CLASS {number:g}")
+    for number, words in ((1.0, "a rover"), (2.0, "a boat")):
+        told = aircraft_kind(log("ArduRover V4.5.7", FRAME_CLASS=number))
+        assert told is not None
+        assert told.words == words
     told = aircraft_kind(log("ArduPlane V4.5.7", Q_ENABLE=1.0))
     assert told is not None
     assert told.words == "a plane that takes off vertically"

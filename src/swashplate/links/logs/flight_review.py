@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from swashplate.flights.aircraft_kind import aircraft_kind
 from swashplate.flights.review.review import LoopReview, review
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.opened import Opened
@@ -21,10 +22,12 @@ def review_of(opened: Opened) -> dict[str, Any]:
         SwashError: where the log is not ready.
     """
     flight = opened.ready
+    kind = aircraft_kind(flight)
     told = review(flight, swept=opened.inspection.sweeps if opened.inspection else None)
     return {
         "tells": told.tells,
         "vehicle": told.vehicle,
+        "made_for": kind.made_for if kind is not None else "",
         "lists": [[heading, list(lines)] for heading, lines in told.lists()],
         "incidents": [
             {"kind": each.kind, "start": each.start, "stop": each.stop, "text": each.text} for each in told.incidents

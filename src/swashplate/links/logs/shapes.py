@@ -16,6 +16,43 @@ from swashplate.models.usual import BY_ROTORS, HELICOPTER, USUAL
 _ARM = 0.35
 """m: from the middle to a rotor of an aircraft whose size is not known."""
 
+_Part = tuple[str, list[float], list[float], str]
+
+
+def _crossed(x: float, span: float) -> list[_Part]:
+    """Planes of a tail, level and upright."""
+    return [("box", [x, 0.0, 0.0], [0.1, span, 0.02], "dark"), ("box", [x, 0.0, 0.0], [0.1, 0.02, span], "dark")]
+
+
+_PLANE: list[_Part] = [
+    ("ball", [0.0, 0.0, 0.0], [0.55, 0.08, 0.08], "paint"),
+    ("ball", [0.2, 0.0, -0.05], [0.16, 0.06, 0.06], "glass"),
+    ("box", [0.08, 0.0, -0.02], [0.18, 1.3, 0.02], "paint"),
+    ("box", [-0.48, 0.0, -0.02], [0.12, 0.42, 0.015], "dark"),
+    ("box", [-0.48, 0.0, -0.12], [0.14, 0.015, 0.2], "dark"),
+]
+_FORMS: dict[str, list[_Part]] = {
+    "a plane": _PLANE,
+    "a plane that takes off vertically": _PLANE,
+    "a rover": [
+        ("box", [0.0, 0.0, -0.12], [0.8, 0.36, 0.14], "paint"),
+        ("box", [-0.08, 0.0, -0.25], [0.36, 0.3, 0.14], "glass"),
+        *(("wheel", [0.28 * x, 0.24 * y, -0.02], [0.13, 0.09, 0.13], "dark") for x in (-1, 1) for y in (-1, 1)),
+    ],
+    "a boat": [
+        ("ball", [0.0, 0.0, 0.0], [0.6, 0.2, 0.12], "paint"),
+        ("box", [-0.1, 0.0, -0.14], [0.3, 0.2, 0.12], "glass"),
+        ("box", [0.05, 0.0, -0.3], [0.02, 0.02, 0.34], "dark"),
+    ],
+    "a submarine": [
+        ("ball", [0.0, 0.0, 0.0], [0.6, 0.14, 0.14], "paint"),
+        ("box", [0.05, 0.0, -0.18], [0.2, 0.06, 0.14], "dark"),
+        *_crossed(-0.5, 0.36),
+    ],
+    "a blimp": [("ball", [0.0, 0.0, 0.0], [0.6, 0.24, 0.24], "paint"), *_crossed(-0.5, 0.5)],
+}
+"""Of what carries no rotors, by the words for it: form, middle, size and look of each part, over the shape's size."""
+
 
 def shape_of(flight: Flight) -> tuple[dict[str, Any], str]:
     """What is drawn (as of `swashplate.links.live.picture`), and a sentence where it is not the log's own vehicle."""
@@ -31,6 +68,8 @@ def shape_of(flight: Flight) -> tuple[dict[str, Any], str]:
         return _packaged(BY_ROTORS[kind.rotors], words)
     if kind.multirotor:
         return plain(kind.rotors or 4), f"{words}: a plain one is drawn."
+    if kind.words in _FORMS:
+        return {**plain(0), "parts": _FORMS[kind.words]}, f"{words}: a plain one is drawn."
     return plain(0), f"{words}: no shape of its kind is known here, a plain body shows how it stood."
 
 

@@ -42,18 +42,22 @@ def test_a_packaged_vehicle_of_the_kind_is_drawn(vehicle: str, reader: str, moto
     assert words == (f"The log {told}: the shape of {drawn} is drawn." if told else "")
 
 
+KINDS = {"ArduPlane V4.5.7": "a plane", "ArduRover V4.5.7": "a rover", "ArduSub V4.5.7": "a submarine"}
+
+
 @pytest.mark.parametrize(
     ("vehicle", "kind"),
-    [("ArduPlane V4.5.7", "a plane"), ("ArduRover V4.5.7", "a rover"), ("ArduSub V4.5.7", "a submarine")],
+    KINDS.items(),
 )
-def test_what_no_rotor_carries_is_a_plain_body(vehicle: str, kind: str) -> None:
+def test_what_no_rotor_carries_has_a_form_of_its_own(vehicle: str, kind: str) -> None:
     shape, words = shape_of(log(vehicle, "ardupilot", 0))
+    parts = shape.pop("parts")
     assert shape == plain(0)
     assert (shape["rotors"], shape["tail"], shape["skids"]) == ([], None, None)
-    assert (
-        words
-        == f"The log is of {kind} ({vehicle}): no shape of its kind is known here, a plain body shows how it stood."
-    )
+    assert words == f"The log is of {kind} ({vehicle}): a plain one is drawn."
+    others = [shape_of(log(other, "ardupilot", 0))[0]["parts"] for other in KINDS if other != vehicle]
+    assert parts not in others
+    assert {form for form, *_ in parts} <= {"ball", "box", "wheel"}, "what the page can draw"
 
 
 @pytest.mark.parametrize(

@@ -62,14 +62,16 @@ export class Helicopter {
     const paint = material(color, ghost), dark = material(0x333a40, ghost);
     const coaxial = picture.tail === null;
 
-    const body = new THREE.Mesh(new THREE.SphereGeometry(1, 24, 16), paint);
-    body.scale.set(0.5 * R, 0.17 * R, coaxial ? 0.26 * R : 0.2 * R);
-    if (!coaxial) body.position.x = 0.1 * R;
-    this.group.add(body);
-    const glass = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), material(0x87b5d6, ghost));
-    glass.scale.set(0.24 * R, 0.145 * R, 0.14 * R);
-    glass.position.set(coaxial ? 0.25 * R : 0.38 * R, 0, -0.05 * R);
-    this.group.add(glass);
+    // What has no rotors says its parts; a fuselage is two balls, over the rotor's radius.
+    const looks = { paint, dark, glass: material(0x87b5d6, ghost) };
+    const forms = { ball: () => new THREE.SphereGeometry(1, 24, 16), box: () => new THREE.BoxGeometry(1, 1, 1), wheel: () => new THREE.CylinderGeometry(1, 1, 1, 20) };
+    const fuselage = [["ball", [coaxial ? 0 : 0.1, 0, 0], [0.5, 0.17, coaxial ? 0.26 : 0.2], "paint"], ["ball", [coaxial ? 0.25 : 0.38, 0, -0.05], [0.24, 0.145, 0.14], "glass"]];
+    for (const [form, middle, size, look] of picture.parts ?? fuselage) {
+      const part = new THREE.Mesh(forms[form](), looks[look]);
+      part.position.set(...middle).multiplyScalar(R);
+      part.scale.set(...size).multiplyScalar(R);
+      this.group.add(part);
+    }
 
     const top = Math.min(...picture.rotors.map((r) => r.hub[2]), picture.bar ? picture.bar.hub[2] : 0);
     for (const { hub } of picture.rotors) this.group.add(tube([0, 0, 0], [hub[0], hub[1], coaxial ? top : hub[2]], 0.018 * R, dark));
@@ -79,7 +81,7 @@ export class Helicopter {
       for (const end of [-0.5, 0.5])
         this.group.add(tube([end * length, side * 0.1 * R, 0.1 * R], [end * length, side * width, depth], 0.013 * R, dark));
     }
-    if (coaxial) {
+    if (coaxial && !picture.parts) {
       const fin = new THREE.Mesh(new THREE.BoxGeometry(0.2 * R, 0.02 * R, 0.22 * R), dark);
       fin.position.set(-0.55 * R, 0, -0.08 * R);
       this.group.add(fin);

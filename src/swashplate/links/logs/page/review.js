@@ -52,6 +52,7 @@ function draw() {
   if (!found) return;
   if (found.problem) return home.replaceChildren(make("h2", {}, log.name), make("p", { class: "soft" }, found.problem));
   home.replaceChildren(make("h2", {}, `${log.name}${found.vehicle ? `: ${found.vehicle}` : ""}`));
+  if (found.made_for) home.append(make("p", { class: "why", "data-made-for": "" }, found.made_for));
   home.append(make("h3", {}, "What happened"), found.incidents.length
     ? make("table", {}, make("tbody", {}, ...found.incidents.map((one) => incident(log, one))))
     : make("ul", { class: "cards" }, make("li", { class: "fine" }, "Nothing: no oscillation, saturation, strong vibration, clipping, loss of GPS or power, no gap.")));
