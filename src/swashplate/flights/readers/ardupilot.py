@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers import ardupilot_chirp
@@ -117,6 +118,10 @@ _MESSAGES = (
 _STORIES = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "MODE", "EV", "ERR", "ARM", "SIDS")
 
 
+_LONG = 1_000_000
+"""Messages."""
+
+
 def recognises(source: Source) -> bool:
     """A DataFlash file, binary or text, with ArduPilot's stamps (each message carries its own)."""
     if source.content[:2] == dataflash.HEAD or source.path.suffix.lower() == ".bin":
@@ -208,7 +213,10 @@ def _stamped(log: Messages, source: Source) -> tuple[Messages, tuple[str, ...]]:
 def _one_run(log: Messages) -> tuple[Messages, float, str]:
     """The messages of the longest run between clock resets, its last stamp [s], and what was left out."""
     timed = [(table.place, seconds(table)) for table in log.tables.values()]
-    timed = [(place[np.isfinite(t)], t[np.isfinite(t)]) for place, t in timed]
+    timed = [(place, t) if (good := np.isfinite(t)).all() else (place[good], t[good]) for place, t in timed]
+    # Of a long log every kind has many messages: where no clock of one falls back nothing needs one row of all.
+    if sum(t.size for _, t in timed) > _LONG and all((t[1:] >= t[:-1]).all() for _, t in timed):
+        return log, _last_stamp(np.concatenate([t for _, t in timed]) if timed else np.zeros(0)), ""
     place = np.concatenate([p for p, _ in timed]) if timed else np.zeros(0, np.int64)
     time = np.concatenate([t for _, t in timed]) if timed else np.zeros(0)
     order = np.argsort(place, kind="stable")
@@ -216,9 +224,12 @@ def _one_run(log: Messages) -> tuple[Messages, float, str]:
     if said:
         cut = {name: t.rows((t.place >= first) & (t.place < last)) for name, t in log.tables.items()}
         log = Messages({name: t for name, t in cut.items() if len(t)}, log.notes, log.damage)
-    inside = time[(place >= first) & (place < last)]
-    # The largest of many stamps may be a damaged one.
-    return log, float(np.quantile(inside, 0.999)) if inside.size > 2000 else float(inside.max(initial=0.0)), said
+    return log, _last_stamp(time[(place >= first) & (place < last)]), said
+
+
+def _last_stamp(time: Array) -> float:
+    """The largest of many stamps may be a damaged one."""
+    return float(np.quantile(time, 0.999)) if time.size > 2000 else float(time.max(initial=0.0))
 
 
 def _chosen(table: MessageTable, wanted: tuple[tuple[str, ...], int] | None) -> MessageTable:

@@ -270,11 +270,11 @@ def made_stream(
     if not good.all():
         lost = share(int(good.size - good.sum()), good.size)
         told.damage.append(f"{name}: {lost} are lost because a number is missing or not finite")
-    twice = copies(time[good], [values[good] for values, _ in channels.values()])
+    twice = copies(_rows(time, good), (_rows(values, good) for values, _ in channels.values()))
     if twice.any():
         told.notes.append(f"{name}: {share(int(twice.sum()), good.size)} are copies of the one before them: left out")
     good[good] = ~twice
-    rising = longest_increasing(time[good])
+    rising = longest_increasing(_rows(time, good))
     if not rising.all():
         lost = share(int(rising.size - rising.sum()), rising.size)
         told.damage.append(f"{name}: {lost} are lost because their time repeats or goes backwards")
@@ -283,7 +283,12 @@ def made_stream(
         return None
     known = {key: channel(key).unit for key in channels}
     labels = {key: unit for key, (_, unit) in channels.items() if not known[key]}
-    return stream(time[good], {key: values[good] for key, (values, _) in channels.items()}, labels)
+    return stream(_rows(time, good), {key: _rows(values, good) for key, (values, _) in channels.items()}, labels)
+
+
+def _rows(values: Array, chosen: Mask) -> Array:
+    """What is chosen; the values themselves where all are, for a log of a gigabyte has no room for copies."""
+    return np.ascontiguousarray(values) if chosen.all() else values[chosen]
 
 
 def unread(counts: Mapping[str, int], read: Sequence[str]) -> tuple[str, ...]:

@@ -115,7 +115,7 @@ class _Frames(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Table:
+class TelemetryTable:
     """The messages of one kind: places, times [s] and columns, shape (n,) or (n, k); texts are bytes."""
 
     place: NDArray[np.int64]
@@ -190,12 +190,12 @@ def read(source: Source, options: Options) -> Flight:
     return Flight(streams, provenance)
 
 
-def tables_of(source: Source) -> Mapping[str, Table]:
+def tables_of(source: Source) -> Mapping[str, TelemetryTable]:
     """All messages of the vehicle in a telemetry log, by name."""
     return _tables(source)[0]
 
 
-def number_columns(table: Table) -> dict[str, NDArray[Any]]:
+def number_columns(table: TelemetryTable) -> dict[str, NDArray[Any]]:
     """Its fields that are a number a message, without its times."""
     return {
         name: values
@@ -266,7 +266,7 @@ def _sound(content: NDArray[np.uint8], frames: _Frames, chosen: NDArray[np.int64
     return sound
 
 
-def _tables(source: Source) -> tuple[dict[str, Table], clocked.Remarks, list[str]]:
+def _tables(source: Source) -> tuple[dict[str, TelemetryTable], clocked.Remarks, list[str]]:
     """Messages of the vehicle in the longest run of its clock, what is lost, and how late they came, in words."""
     dialect = library("pymavlink.dialects.v20.ardupilotmega", what="a telemetry log (.tlog)", where=source.path)
     content, frames, told = np.frombuffer(source.content, np.uint8), _frames(source.content), clocked.Remarks()
@@ -338,7 +338,7 @@ def _timed(
     raw: Mapping[str, tuple[NDArray[np.int64], dict[str, NDArray[Any]], Mapping[str, str]]],
     frames: _Frames,
     told: clocked.Remarks,
-) -> tuple[dict[str, Table], clocked.Remarks, list[str]]:
+) -> tuple[dict[str, TelemetryTable], clocked.Remarks, list[str]]:
     """The messages of the longest run, on the autopilot's clock, and in words how late they came."""
     own = {name: columns["time_boot_ms"] / 1e3 for name, (_, columns, _) in raw.items() if "time_boot_ms" in columns}
     received = {name: frames.stamp[at] / 1e6 for name, (at, *_) in raw.items()}
@@ -365,7 +365,9 @@ def _timed(
             micro = columns["time_usec"] / 1e6
             good = np.abs(micro - time) < 60.0
             time = micro if own and good.all() else time
-        tables[name] = Table(frames.place[at][kept], time[kept], {k: v[kept] for k, v in columns.items()}, units)
+        tables[name] = TelemetryTable(
+            frames.place[at][kept], time[kept], {k: v[kept] for k, v in columns.items()}, units
+        )
     late = np.quantile(came - boot - offset, 0.95) if own else 0.0
     words = f"what has no time of its own is stamped where it came in: up to {1e3 * late:.0f} ms later (95 %)"
     return {name: t for name, t in tables.items() if t.place.size}, told, [words] if own else []
@@ -391,7 +393,7 @@ def _text(value: bytes) -> str:
     return value.split(b"\0")[0].decode("utf-8", "replace").strip()
 
 
-def _vehicle(tables: Mapping[str, Table]) -> tuple[int | None, str]:
+def _vehicle(tables: Mapping[str, TelemetryTable]) -> tuple[int | None, str]:
     """MAV_TYPE, and the firmware as a message says it, or as its kind is called; "" where none is known."""
     beats, texts = tables.get("HEARTBEAT"), tables.get("STATUSTEXT")
     if beats is None:
@@ -402,7 +404,7 @@ def _vehicle(tables: Mapping[str, Table]) -> tuple[int | None, str]:
     return kind, next(filter(is_firmware, said), firmware)
 
 
-def _parameters(table: Table | None) -> dict[str, float]:
+def _parameters(table: TelemetryTable | None) -> dict[str, float]:
     """As they were first told; PX4 sends the bytes of whole numbers, which are left out."""
     told: dict[str, float] = {}
     if table is None:
@@ -416,7 +418,7 @@ def _parameters(table: Table | None) -> dict[str, float]:
     return told
 
 
-def _modes(table: Table | None, firmware: str) -> Iterator[Event]:
+def _modes(table: TelemetryTable | None, firmware: str) -> Iterator[Event]:
     if table is None:
         return
     before: tuple[int | None, bool] = (None, False)
@@ -438,7 +440,7 @@ def _mode(number: int, firmware: str) -> str:
     return mode_name(firmware if is_firmware(firmware) else f"{firmware} V0", number)
 
 
-def _texts(table: Table | None) -> Iterator[Event]:
+def _texts(table: TelemetryTable | None) -> Iterator[Event]:
     if table is not None:
         for time, value in zip(table.time.tolist(), table.columns["text"].tolist(), strict=True):
             if text := _text(value):
