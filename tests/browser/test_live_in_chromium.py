@@ -180,6 +180,23 @@ def test_nothing_is_between_a_stick_and_the_model(visit_: Any, coax: str) -> Non
     visit.done()
 
 
+def test_the_land_lies_still_and_its_posts_are_a_metre_high(visit_: Any, coax: str) -> None:
+    """Speed and height are seen against what does not move with the helicopter."""
+    visit = visit_(coax).flies()
+    places = """far => {
+      const { land } = swash.scene, { array } = land.posts.instanceMatrix;
+      land.around({ x: far, y: 2, z: 0 }, { x: far, y: 2, z: 0 });
+      const posts = Array.from({ length: land.posts.count }, (_, k) => array[16 * k + 12]);
+      return { posts, foot: array[13] - 0.5, ground: land.ground.position.x, cell: land.cell };
+    }"""
+    before, after = (visit.page.evaluate(places, far) for far in (0.0, 9.0))
+    assert (before["foot"], before["cell"]) == (0.0, 1)
+    assert {x % 4.0 for x in before["posts"] + after["posts"]} == {2.0}, "the same places, seen from further on"
+    assert max(after["posts"]) > max(before["posts"])
+    assert (before["ground"], after["ground"]) == (0.0, 8.0), "a whole pattern of fields"
+    visit.done()
+
+
 def test_a_recording_is_on_the_server_s_disk(browser: Any, visit_: Any, tmp_path: Path) -> None:
     """All of it, without a gap, and what the equations of this machine make of its inputs."""
     with _served("live", "coax", cwd=tmp_path) as url:

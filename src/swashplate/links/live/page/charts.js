@@ -79,7 +79,8 @@ class Chart {
     for (let i = 0; i < n; i++) series.push(line(panel.band && i < 3 ? 0 : i, dash(i)));
     if (panel.ghost) for (let i = 0; i < n; i++) series.push(line(i, [5, 4]));
     if (this.fan) for (let i = 0; i < 2 * n; i++) series.push({ points: { show: false } }); // lowest and highest of all
-    const axis = { stroke: "#444", font: "11px system-ui", grid: { stroke: "#e3e6e8" }, ticks: { show: false } };
+    const paint = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+    const axis = { stroke: () => paint("--soft"), font: "11px system-ui", grid: { stroke: () => paint("--grid") }, ticks: { show: false } };
     const make = () => new uPlot({
       width: 300, height: 110, legend: { show: false }, cursor: { show: false }, series,
       bands: panel.band ? [{ series: [3, 2], fill: `${COLORS[0]}2e` }]
@@ -105,7 +106,7 @@ class Chart {
     if (this.marker === undefined) return;
     const x = Math.round(plot.valToPos(this.marker, "x", true)), { top, height, left, width } = plot.bbox;
     if (x < left || x > left + width) return;
-    plot.ctx.fillStyle = "#111";
+    plot.ctx.fillStyle = getComputedStyle(document.documentElement).color;
     plot.ctx.fillRect(x, top, 1.5, height);
   }
   told(values) {

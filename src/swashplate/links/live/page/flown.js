@@ -74,6 +74,7 @@ export class Flown {
       reset: () => {
         this.say("record", { value: false });
         flight.reset();
+        this.skipped = 0;
       },
     }[type];
     if (does) does();

@@ -1,7 +1,8 @@
-// The scene: ground and grid, one or two helicopters with trails and shadows, and three cameras.
+// The scene: the land, one or two helicopters with trails and shadows, and three cameras.
 import * as THREE from "./vendor/three.module.min.js";
 import { Fan } from "./fan.js";
 import { Helicopter } from "./helicopter.js";
+import { Land } from "./land.js";
 import { Trail } from "./trail.js";
 
 const COLORS = { own: 0xd55e00, ghost: 0x56b4e9 };
@@ -78,21 +79,11 @@ export class Scene {
     this.fan = null;
     this.picture = picture;
     this.size = picture.size;
-    if (this.grid) this.scene.remove(this.grid, this.ground);
+    this.land?.remove();
     this.cell = picture.size < 0.4 ? 1 : picture.size < 2 ? 5 : 50;
-    this.grid = new THREE.GridHelper(60 * this.cell, 60, 0x6f8a70, 0x9db09a);
-    this.ground = new THREE.Mesh(
-      new THREE.PlaneGeometry(400 * this.cell, 400 * this.cell),
-      new THREE.MeshBasicMaterial({ color: 0xb9c8ae }),
-    );
     this.floor = picture.floor ?? 0; // down [m]: a log whose origin is the hover began on its ground, not in it
-    this.ground.rotation.x = -Math.PI / 2;
-    this.ground.position.y = -this.floor - 0.004 * this.cell;
-    this.grounded = picture.ground ?? true; // without one the grid is a level to look at, and may be flown through
-    this.ground.visible = this.grounded;
-    this.scene.add(this.ground, this.grid);
-    this.scene.fog.near = 12 * this.cell;
-    this.scene.fog.far = 34 * this.cell;
+    this.grounded = picture.ground ?? true;
+    this.land = new Land(this.scene, this);
   }
 
   #remove(name) {
@@ -154,9 +145,6 @@ export class Scene {
 
   #look(x) {
     const at = new THREE.Vector3(x[0], -x[2], x[1]), { turn, lift, zoom } = this.orbit;
-    this.grid.position.set(Math.round(at.x / this.cell) * this.cell, -this.floor, Math.round(at.z / this.cell) * this.cell);
-    this.ground.position.x = at.x;
-    this.ground.position.z = at.z;
     if (this.view === "above") {
       this.camera.position.set(at.x, at.y + 55 * this.size * zoom + 2, at.z);
       this.camera.up.set(1, 0, 0);
@@ -173,5 +161,6 @@ export class Scene {
       this.camera.up.set(0, 1, 0);
     }
     this.camera.lookAt(at);
+    this.land.around(at, this.camera.position);
   }
 }
