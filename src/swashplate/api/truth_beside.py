@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.api.fit_ss import fit_ss
 from swashplate.api.fit_tf import fit_tf
+from swashplate.api.linear_study import LinearStudy
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.conditioning.uniform_records import uniform_records
@@ -21,6 +23,8 @@ from swashplate.identification.responses.frequency_response import TWO_PI, Frequ
 from swashplate.identification.responses.respond import respond
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES
 from swashplate.links.ardupilot.trial import TrialLine
+from swashplate.models.linear.composition import is_composed
+from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.transfer_function import TransferFunction
 
 GAIN, PHASE, SIGMAS = 1.0, 7.0, 3.0
@@ -35,8 +39,20 @@ _SURE = 0.01
 """Random error that an exact response is given."""
 _LEAST_SHARE = 0.7
 """Share of the band that must be coherent, else the sweep has told too little."""
-STRUCTURES: Mapping[tuple[str, ...], str] = {("roll", "pitch"): "rotor_body", ("yaw",): "yaw", ("heave",): "heave"}
-"""Ready structures by the axes that they describe."""
+STRUCTURES: Mapping[tuple[str, ...], tuple[str, ...]] = {
+    ("roll", "pitch"): (
+        "rotor_body",
+        "compose:body+flap+Lp+Llat+Mq+Mlon",  # a rotor and part of one, or two rotors, and their speeds
+        "compose:cyclic+bar_rotor+actuators",  # the CoaX: the lower rotor lags its servos, the upper follows its bar
+        "compose:body+flap+bar+hub",
+        "compose:body+actuators+Yp+Xq",  # motors of a light multirotor, whose rotors feel its rates
+    ),
+    ("yaw",): ("yaw", "compose:yaw+reaction"),  # motors, whose reaction comes before the torque of their rotors
+    ("heave",): ("heave", "compose:heave+actuators", "compose:heave+lead"),  # motors; two inflows or motors
+}
+"""Structures by the axes that they describe, the simplest first: the first that follows a vehicle is fitted to it."""
+_COMPOSED = {"lateral": "roll", "longitudinal": "pitch", "pedal": "yaw", "collective": "heave"}
+"""The axis of each input of a composed structure."""
 FORMS: Mapping[str, tuple[str, ...]] = {
     "roll": ("0/2", "1/3"),
     "pitch": ("0/2", "1/3"),
@@ -148,21 +164,21 @@ def _judge(
     forms = [_form(exact, axis) for axis in axes]
     simple = [_fitted(responses, axis, form) for axis, form in zip(axes, forms, strict=True)]
     comparison.models += [f"{axis}, fit-tf: {each!r}" for axis, each in zip(axes, simple, strict=True)]
-    name = STRUCTURES.get(tuple(axes))
-    fit = None if name is None else fit_ss(name, responses)
-    fitted = None if fit is None else fit.structure
-    if fit is not None and fit.fit is not None:
-        comparison.structures[" and ".join(axes)] = fit.fit.estimates
+    told = following_structure(exact, axes)
+    fitted = None
+    if told is not None:
+        study = _study(told.name, responses, axes)
+        fitted = study.structure
+        if study.fit is not None:
+            comparison.structures[" and ".join(axes)] = study.fit.estimates
     for place, (axis, a) in enumerate(zip(axes, named, strict=True)):
         h, coherence, error = responses.pair(a.output, a.input)
         good = np.isfinite(h) & (coherence >= COHERENT)
         true = truth(axis, a.output, responses.omega)
         curves = {"truth": (responses.omega, true), "respond": (responses.omega, np.where(good, h, np.nan))}
         share = float(np.mean(good))
-        told = f"{100 * share:.0f} % of the band"
-        comparison.lines.append(
-            TrialLine(f"{axis}: coherent", told, f"{100 * _LEAST_SHARE:.0f} % of the band", share >= _LEAST_SHARE)
-        )
+        found, least = (f"{100 * part:.0f} % of the band" for part in (share, _LEAST_SHARE))
+        comparison.lines.append(TrialLine(f"{axis}: coherent", found, least, share >= _LEAST_SHARE))
         limit = ROUNDED + np.degrees(0.5 / loop * responses.omega)
         comparison.lines.append(_verdict(f"{axis}: respond beside truth", h, true, error, good, limit))
         estimate = np.asarray(simple[place].response(responses.omega))
@@ -171,31 +187,65 @@ def _judge(
         line = _verdict(f"{axis}: fit-tf beside truth", estimate, true, error, good, limit + _misses(exact, axis, best))
         follows = _follows(exact, axis, best)
         comparison.lines.append(line if follows else _told(line, f"no form of {', '.join(FORMS[axis])} follows"))
-        if fitted is not None:
-            o, i = list(fitted.outputs).index(a.output), list(fitted.inputs).index(a.input)
-            estimate = fitted.response(responses.omega)[:, o, i]
+        if fitted is not None and told is not None:
+            estimate, best = _answer(fitted, axis, responses.omega), told.answers[place]
             curves["fit-ss"] = (responses.omega, estimate)
-            what = f"{axis}: fit-ss beside truth"
-            line = _verdict(what, estimate, true, error, good, limit)
-            if not line.passed:  # only then is it asked whether the structure could have done it
-                assert name is not None
-                structure = fit_ss(name, exact).structure
-                assert structure is not None
-                best = structure.response(responses.omega)[:, o, i]
-                line = _verdict(what, estimate, true, error, good, limit + _misses(exact, axis, best))
-                line = line if _follows(exact, axis, best) else _told(line, f"the structure {name} does not follow")
-            comparison.lines.append(line)
+            line = _verdict(
+                f"{axis}: fit-ss beside truth", estimate, true, error, good, limit + _misses(exact, axis, best)
+            )
+            none = f"no structure of {', '.join(STRUCTURES[tuple(axes)])} follows"
+            comparison.lines.append(line if told.follows else _told(line, none))
         comparison.curves[(a.output, a.input)] = curves
         comparison.lines.append(_lateness(axis, h, true, responses, good))
 
 
 def _exact(responses: FrequencyResponse, axes: Sequence[str], own: Truth) -> FrequencyResponse:
-    """The vehicle's own responses at the same frequencies, all of them as coherent and as sure."""
+    """The vehicle's own responses at the same frequencies, all as sure, and fitted where the measured ones are."""
     columns = [[own(axis, output, responses.omega) for axis in axes] for output in responses.outputs]
     h = np.moveaxis(np.array(columns), -1, 0)
-    ones = np.ones(h.shape)
-    multiple = np.ones(h.shape[:2])
-    return replace(responses, response=h, coherence=ones, error=_SURE * ones, multiple=multiple, direct=None)
+    sure = _SURE * np.ones(h.shape)
+    return replace(responses, response=h, error=sure, multiple=np.ones(h.shape[:2]), direct=None, shared=None)
+
+
+class FollowingStructure(NamedTuple):
+    """A structure that was fitted to a vehicle's own responses.
+
+    Attributes:
+        name: of it.
+        answers: of its axes, each of shape (n_f,).
+        follows: whether it is within half of what an estimate may be off; where none is, it is the first one.
+    """
+
+    name: str
+    answers: tuple[Complex, ...]
+    follows: bool
+
+
+def following_structure(exact: FrequencyResponse, axes: Sequence[str]) -> FollowingStructure | None:
+    """The first of `STRUCTURES` that follows a vehicle's own responses; None where no structure has these axes."""
+    tried: list[FollowingStructure] = []
+    for name in STRUCTURES.get(tuple(axes), ()):
+        structure = _study(name, exact, axes).structure
+        if structure is not None:
+            answers = tuple(_answer(structure, axis, exact.omega) for axis in axes)
+            follows = all(_follows(exact, axis, answer) for axis, answer in zip(axes, answers, strict=True))
+            tried.append(FollowingStructure(name, answers, follows))
+            if follows:
+                return tried[-1]
+    return tried[0] if tried else None
+
+
+def _study(name: str, responses: FrequencyResponse, axes: Sequence[str]) -> LinearStudy:
+    composed = {ours: MIXER_AXES[axis].input for ours, axis in _COMPOSED.items() if axis in axes}
+    return fit_ss(name, responses, names=composed if is_composed(name) else None)
+
+
+def _answer(structure: StateSpaceModel, axis: str, omega: Array) -> Complex:
+    """A structure's response of one axis, shape (n_f,)."""
+    a = MIXER_AXES[axis]
+    named = {a.input, *(ours for ours, its in _COMPOSED.items() if its == axis)}
+    i = next(k for k, name in enumerate(structure.inputs) if name in named)
+    return structure.response(omega)[:, list(structure.outputs).index(a.output), i]
 
 
 def _fitted(responses: FrequencyResponse, axis: str, form: str) -> TransferFunction:
@@ -220,8 +270,10 @@ def _misses(exact: FrequencyResponse, axis: str, best: Complex) -> Array:
 
 def _follows(exact: FrequencyResponse, axis: str, estimate: Complex) -> bool:
     a = MIXER_AXES[axis]
-    gain, phase = gain_and_phase_off(estimate, exact.pair(a.output, a.input)[0])
-    return bool(gain.max() <= _FOLLOWS * GAIN and phase.max() <= _FOLLOWS * PHASE)
+    h, coherence, _ = exact.pair(a.output, a.input)
+    gain, phase = gain_and_phase_off(estimate, h)
+    judged = coherence >= COHERENT
+    return not np.any(judged & ((gain > _FOLLOWS * GAIN) | (phase > _FOLLOWS * PHASE)))
 
 
 def _told(line: TrialLine, who: str) -> TrialLine:

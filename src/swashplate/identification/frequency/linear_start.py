@@ -3,7 +3,7 @@
 Where outputs and kinematics give the responses of all states, M jw X = F X + G U e^(-jw tau) is linear in the entries
 of F and G, row by row (equation error in the frequency domain: Klein and Morelli 2006, sec. 7.3; as starting values:
 Tischler and Remple 2012, ch. 13). Where some states are hidden (a rotor), only the controls' columns are matched in
-sign and size.
+sign and size; or the lags of the hidden states are held, with which the inputs and the other states make them.
 
 Start values of a composed structure: from a relative that is fitted, or from its core and the responses.
 
@@ -145,6 +145,9 @@ LINES = 40
 DELAYS = np.linspace(0.0, 0.12, 13)
 """Delays tried for each input [s]."""
 
+HELD_LAGS = (0.5, 1.0, 2.0, 4.0)
+"""Of a lag's start value, at which hidden states are held."""
+
 _WORST = 1e4
 _ROUNDS, _FLOOR = 5, 0.03
 
@@ -161,7 +164,23 @@ def other_starts(
         "regression on the responses": by_regression(model, responses, band=band),
         "controls matched to the responses": by_controls(model, targets),
     }
+    if starts["regression on the responses"] is None:
+        for share, held in _lags_held(model).items():
+            known = by_regression(held, responses, band=band)
+            if known is not None:
+                words = f"regression with lags at {share:g} of their start values"
+                starts[words] = model.with_values({n: known.parameters[n].value for n in model.free})
     return {name: one for name, one in starts.items() if one is not None}
+
+
+def _lags_held(model: StateSpaceModel) -> dict[float, StateSpaceModel]:
+    """The model with its states' time constants held, by the share of their start values; none without any."""
+    lags = {n for e in model.elements if e.matrix == "M" for n in e.expression.names} & set(model.free)
+    values = {n: model.parameters[n].value for n in lags}
+    return {
+        k: model.with_values(_bounded(model, {n: k * v for n, v in values.items()}), free=False)
+        for k in (HELD_LAGS if lags else ())
+    }
 
 
 def by_regression(

@@ -304,6 +304,29 @@ PARTS: Mapping[str, StructurePart] = {
         why="it is fed by the yaw rate",
         absent={"Nrfb": 0.0},
     ),
+    "bar_rotor": StructurePart(
+        "second rotor that follows its stabilizer bar alone: the bar's tilt against the body turns it, also across",
+        states={"bar_pitch": "rad", "bar_roll": "rad"},
+        equations={
+            "p": {"bar_roll": "Lbar", "bar_pitch": "Lacross"},
+            "q": {"bar_pitch": "Mbar", "bar_roll": "Macross"},
+            "bar_pitch": {"q": "-tau_bar", "bar_pitch": "-1"},
+            "bar_roll": {"p": "-tau_bar", "bar_roll": "-1"},
+        },
+        left={"bar_pitch": {"bar_pitch": "tau_bar"}, "bar_roll": {"bar_roll": "tau_bar"}},
+        needs=("body", "cyclic"),
+        why="the bar's tilt shows in roll and pitch",
+        absent={"Lbar": 0.0, "Lacross": 0.0, "Mbar": 0.0, "Macross": 0.0},
+        holds="below one rotor revolution",
+    ),
+    "reaction": StructurePart(
+        "pedal to torque by a lead-lag of first order: motors that speed rotors up and down, felt at once",
+        states={"ped_lag": "1"},
+        equations={"r": {"ped_lag": "Nlag"}, "ped_lag": {"ped_lag": "-rate_ped", "pedal": "rate_ped"}},
+        needs=("body", "yaw"),
+        why="torque shows in yaw",
+        absent={"Nlag": 0.0},
+    ),
     "actuators": StructurePart(
         "first-order lags of the actuators: one time constant for swashplate and collective, one for the tail",
         states={},
@@ -316,6 +339,7 @@ SERVO = {"lateral": "tau_servo", "longitudinal": "tau_servo", "collective": "tau
 
 _R50 = "that of a 50 kg helicopter (R-50: Mettler, Tischler and Kanade 1999), rounded"
 _ORDER = "an order of magnitude for helicopters of 5 to 100 kg"
+_COAX = "that of a coaxial of 0.2 kg (CoaX: Fankhauser et al. 2011), rounded"
 _ZERO = "not known: begins at zero"
 _G = "standard gravity"
 _TRIM = "hover; from the flights' means, or given"
@@ -351,6 +375,10 @@ NUMBERS: Mapping[str, StartNumber] = {
     "rate_omega": StartNumber(1.0, "1/s", _ORDER, 0.05, 50.0),
     "Nengine": StartNumber(-5.0, "rad/s", _ORDER), "rate_engine": StartNumber(2.0, "1/s^2", _ORDER, lower=0.0),
     "Nrfb": StartNumber(-50.0, "1/s^2", _ORDER), "Krfb": StartNumber(8.0, "1/s", _ORDER, lower=0.01),
+    "Lbar": StartNumber(100.0, "1/s^2", _COAX, lower=0.0), "Mbar": StartNumber(100.0, "1/s^2", _COAX, lower=0.0),
+    "tau_bar": StartNumber(1.5, "s", _COAX, 0.05, 20.0),
+    "Lacross": StartNumber(0.0, "1/s^2", _ZERO), "Macross": StartNumber(0.0, "1/s^2", _ZERO),
+    "Nlag": StartNumber(5.0, "rad/s^2", _ORDER), "rate_ped": StartNumber(8.0, "1/s", _ORDER, 0.1, 100.0),
     "tau_servo": StartNumber(0.04, "s", "a usual servo", 0.002, 0.5),
     "tau_tail": StartNumber(0.03, "s", "a usual servo", 0.002, 0.5),
     **{f"tau_{short}": StartNumber(0.02, "s", "links and computers", 0.0, 0.5) for short in SHORT.values()},
