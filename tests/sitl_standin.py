@@ -261,7 +261,7 @@ class Firmware(HeliAutopilot):
             flaps = tuple(min(1.0, max(-1.0, each / over)) for each in (roll, pitch))
             motors = tuple(self._motor(thrust + half * yaw) for half in (0.5, -0.5))
         right, up = (500.0 * flap for flap in flaps)
-        servos = [round(1500.0 + x) for x in (right, up, -right, -up)]
+        servos = [1500 + int(x) for x in (right, up, -right, -up)]  # cut off towards the trim
         return [*servos, *(round(1000.0 + 1000.0 * motor) for motor in motors), 0, 0]
 
     @staticmethod

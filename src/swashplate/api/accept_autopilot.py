@@ -19,7 +19,7 @@ from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
 from swashplate.control.laws.ardupilot.law import GRAVITY, RATE_OF_LOOPS
-from swashplate.control.laws.ardupilot.outputs import HELD, LOGGED, output_delays
+from swashplate.control.laws.ardupilot.outputs import CUT_AT_TRIM, HELD, LOGGED, output_delays
 from swashplate.control.laws.ardupilot.parameters import known
 from swashplate.errors import SwashError
 from swashplate.extras import library
@@ -36,7 +36,7 @@ from swashplate.links.ardupilot.sitl import Sitl
 from swashplate.links.ardupilot.trial import Background, Piloted, Trial, TrialEndedError, TrialLine, TrialPlan
 from swashplate.links.ardupilot.trial_parameters import trial_parameters
 from swashplate.links.ardupilot.trial_pilot import PLACE, SPEED, TrialPilot
-from swashplate.links.ardupilot.trial_sweeps import gentle_sweep
+from swashplate.links.ardupilot.trial_sweeps import RESOLVED, RESOLVED_AT_TRIM, gentle_sweep
 from swashplate.links.mavlink.commanding import Commanding
 from swashplate.links.mavlink.comparison import compared, rate_problems
 from swashplate.links.mavlink.connection import Connection
@@ -145,10 +145,14 @@ def accept_autopilot(
         say("searching gains with margins")
         gains = gains_to_write(mapping, flying, level, notice=lambda text: say(text))
     used, pull = {**law.parameters, **gains, **yours}, float(around.gravity)
+    at_trim = CUT_AT_TRIM.get(law.frame, ())
     chirps = {
-        axis: gentle_sweep(model, moves[axis], axis, used, band=band, seconds=seconds, gravity=pull, mapping=mapping)
+        axis: gentle_sweep(
+            model, moves[axis], axis, used, band=band, seconds=seconds, gravity=pull, mapping=mapping,
+            least=RESOLVED_AT_TRIM if axis in at_trim else RESOLVED,
+        )
         for axis in axes
-    }
+    }  # fmt: skip
     shown = next(iter(chirps.values()), Chirp.planned(10, 0.05, band, record=seconds, fade=1.0))
     with listen_udp("127.0.0.1", sitl.physics_port) as bound:
         say("compiling the vehicle")

@@ -28,7 +28,7 @@ from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.links.ardupilot import sitl, trial
 from swashplate.links.ardupilot.gains import ardupilot_law
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, mixed, mixer_response
-from swashplate.links.ardupilot.trial_sweeps import gentle_sweep, largest_pulse
+from swashplate.links.ardupilot.trial_sweeps import RESOLVED_AT_TRIM, gentle_sweep, largest_pulse
 from swashplate.links.servos import servo_mapping
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.standing import airborne
@@ -407,6 +407,11 @@ def test_a_sweep_begins_where_its_outputs_are_resolved() -> None:
     sweep = planned(held, band=(0.4, 8.0))
     assert 0.4 < sweep.start_hz < 1.5
     assert planned(held, band=(3.0, 8.0)).start_hz == 3.0
+    rolls = mixed(law.mixer, hover, law.parameters, inputs=flying.input_names)["roll"]
+    damped = gentle_sweep(
+        model, rolls, "roll", held, band=(0.4, 8.0), seconds=40.0, gravity=9.81, mapping=mapping, least=RESOLVED_AT_TRIM
+    )
+    assert damped.magnitude > 0.05, "the derivative damps the bar's resonance; 0.01 were planned without it"
     with pytest.raises(sp.SwashError, match="no gentle sweep of yaw moves an output by 4 us"):
         planned({**held, "ATC_RAT_YAW_P": 3.0}, band=(0.4, 2.0))
 

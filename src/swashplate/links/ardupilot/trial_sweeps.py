@@ -21,6 +21,8 @@ _MOST = 0.2
 RESOLVED = 4.0
 """us: the least amplitude of the output that moves most. Pulses are whole microseconds; rounding a sine of 4 changes
 it by at most 0.4 dB and 2.7 degrees, one of 1 by 2.7 dB and 21 degrees (its describing function), and coherently."""
+RESOLVED_AT_TRIM = 14.0
+"""us: of an output that the firmware cuts off towards its trim: a sine of 14 loses 0.5 dB, one of 4 loses 2."""
 
 
 def gentle_sweep(
@@ -33,19 +35,21 @@ def gentle_sweep(
     seconds: float,
     gravity: float,
     mapping: ServoMapping,
+    least: float = RESOLVED,
 ) -> Chirp:
     """The largest sweep that stays gentle, by the linear model under the autopilot's loops without their filters.
 
     The loops hold against the sweep, most where it is slow: it begins where what they leave of it still moves
-    an output by `RESOLVED`.
+    an output by `least`.
 
     Args:
         model: about hover. moved: how far a unit of the mixer's command moves its inputs. axis: that is swept.
         gains: of the loops, by ArduPilot's names.
         band: asked for [Hz]. seconds: of the sweep. gravity: [m/s^2]. mapping: from outputs to inputs.
+        least: amplitude of the output that moves most [us].
 
     Raises:
-        LinkError: where it is resolved nowhere in the lower half of the band.
+        LinkError: where it is resolved nowhere in the lower two thirds of the band.
     """
     a = MIXER_AXES[axis]
     omega = 2.0 * np.pi * np.geomspace(*band, 60)
@@ -55,16 +59,16 @@ def gentle_sweep(
     quick, far = _GENTLE[a.output]
     pulse = largest_pulse(mapping, moved)
     size, start = 0.0, 0
-    while start < omega.size // 2:
+    while start < 2 * omega.size // 3:
         part = slice(start, None)
         size = min(_MOST, quick / float(answer[part].max()), far / float((answer / omega)[part].max()))
-        unseen = np.flatnonzero(size * left[part] * pulse < RESOLVED)
+        unseen = np.flatnonzero(size * left[part] * pulse < least)
         if not unseen.size:
             low = band[0] if start == 0 else float(f"{omega[start] / (2.0 * np.pi):.2g}")
             return Chirp.planned(a.number, float(f"{size:.2g}"), (low, band[1]), record=seconds, fade=1.0)
         start += int(unseen[-1]) + 1
     raise LinkError(
-        f"no gentle sweep of {axis} moves an output by {RESOLVED:g} us in the lower half of "
+        f"no gentle sweep of {axis} moves an output by {least:g} us in the lower two thirds of "
         f"{band[0]:g} to {band[1]:g} Hz: pulses are whole microseconds.",
         channel="--axes",
         hint="Leave the axis out, sweep higher (band), or give gains that hold less against it (defaults).",
@@ -90,6 +94,6 @@ def _feedback(axis: str, gains: Mapping[str, float], omega: Array) -> Complex:
     if axis == "heave":
         return np.zeros(omega.size, dtype=complex)
     name, s = {"roll": "RLL", "pitch": "PIT", "yaw": "YAW"}[axis], 1j * omega
-    p, i, forward = (gains[f"ATC_RAT_{name}_{end}"] for end in ("P", "I", "FF"))
+    p, i, d, forward = (gains.get(f"ATC_RAT_{name}_{end}", 0.0) for end in ("P", "I", "D", "FF"))
     angle = gains[f"ATC_ANG_{name}_P"] / s
-    return np.asarray((p + i / s) * (1.0 + angle) + forward * angle)
+    return np.asarray((p + i / s + d * s) * (1.0 + angle) + forward * angle)
