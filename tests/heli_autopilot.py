@@ -344,4 +344,4 @@ class HeliAutopilot:
             for at in (-60.0, 60.0, 180.0)
         ]
         pulses = [int(1000 + 1000 * min(1.0, max(0.0, s))) for s in servos]
-        return [*pulses, int(1500 + 500 * yaw), 0, 0, 0, int(1000 + 1000 * SETPOINT * self._ramp)]
+        return [*pulses, 1500 + int(500 * yaw), 0, 0, 0, int(1000 + 1000 * SETPOINT * self._ramp)]

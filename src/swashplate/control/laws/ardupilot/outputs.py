@@ -31,9 +31,9 @@ LOOPS_LATER: Mapping[LawFirmware, Mapping[str, tuple[float, ...]]] = {
     "px4": dict.fromkeys(("swashplate", "two swashplates", "two motors"), _TOGETHER),
 }
 """Loops between the computing and the output, by the vehicle's inputs, by `Traits.servo_layout`."""
-CUT_AT_TRIM: Mapping[str, tuple[str, ...]] = {"two motors": ("roll", "pitch")}
-"""Axes by frame whose pulses ArduPilot cuts off towards their trim, where they stand (`SRV_Channel::pwm_from_angle`): a
-coaxial's flaps. A tail is cut off too, but stands off its trim in hover; `rc_write` cuts off downwards all the time."""
+CUT_AT_TRIM: Mapping[str, tuple[str, ...]] = {"swashplate": ("yaw",), "two motors": ("roll", "pitch")}
+"""Axes by frame whose pulses ArduPilot cuts off towards their trim (`SRV_Channel::pwm_from_angle`), near which they
+hover: a tail, and a coaxial's flaps. Those of `rc_write` are cut off downwards, which leaves a sine as large."""
 HELD = 0.5
 """Loops by which a command is late because it stands until the next one."""
 LOGGED = 0.5
