@@ -23,6 +23,8 @@ from swashplate.flights.review.tracking import Octave, tracking
 from swashplate.shown import Shown
 
 NO_LOOP = "the log has neither a rate's target nor an autopilot's parameters"
+_ASKED = np.radians(0.5)
+"""rad/s: the rms target of an octave from which on an error says something; below it nobody asks for anything."""
 _SHORTEST = 4.1  # s: a window, and what is looked at before and behind it
 
 
@@ -47,7 +49,7 @@ class LoopReview:
         worst = [
             f"{o.low:g}-{o.high:g} Hz {100.0 * o.error / o.target:.0f} %"
             for o in self.octaves
-            if o.high <= self.coherent
+            if o.high <= self.coherent and o.target >= _ASKED
         ]
         return "; ".join([*lines, *([f"tracking error {', '.join(worst)} of the target"] if worst else [])])
 
