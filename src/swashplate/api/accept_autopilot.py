@@ -36,7 +36,7 @@ from swashplate.links.ardupilot.sitl import Sitl
 from swashplate.links.ardupilot.trial import Background, Piloted, Trial, TrialEndedError, TrialLine, TrialPlan
 from swashplate.links.ardupilot.trial_parameters import trial_parameters
 from swashplate.links.ardupilot.trial_pilot import PLACE, SPEED, TrialPilot
-from swashplate.links.ardupilot.trial_sweeps import RESOLVED, RESOLVED_AT_TRIM, gentle_sweep
+from swashplate.links.ardupilot.trial_sweeps import OF_TWO_MOTORS, RESOLVED, RESOLVED_AT_TRIM, gentle_sweep
 from swashplate.links.mavlink.commanding import Commanding
 from swashplate.links.mavlink.comparison import compared, rate_problems
 from swashplate.links.mavlink.connection import Connection
@@ -150,6 +150,7 @@ def accept_autopilot(
         axis: gentle_sweep(
             model, moves[axis], axis, used, band=band, seconds=seconds, gravity=pull, mapping=mapping,
             least=RESOLVED_AT_TRIM if axis in at_trim else RESOLVED,
+            quickest=OF_TWO_MOTORS if law.frame == "two motors" and axis in ("roll", "pitch") else math.inf,
         )
         for axis in axes
     }  # fmt: skip

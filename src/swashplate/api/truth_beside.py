@@ -177,8 +177,8 @@ def _judge(
         true = truth(axis, a.output, responses.omega)
         curves = {"truth": (responses.omega, true), "respond": (responses.omega, np.where(good, h, np.nan))}
         share = float(np.mean(good))
-        found, least = (f"{100 * part:.0f} % of the band" for part in (share, _LEAST_SHARE))
-        comparison.lines.append(TrialLine(f"{axis}: coherent", found, least, share >= _LEAST_SHARE))
+        has, least = (f"{100 * part:.0f} % of the band" for part in (share, _LEAST_SHARE))
+        comparison.lines.append(TrialLine(f"{axis}: coherent", has, least, share >= _LEAST_SHARE))
         limit = ROUNDED + np.degrees(0.5 / loop * responses.omega)
         comparison.lines.append(_verdict(f"{axis}: respond beside truth", h, true, error, good, limit))
         estimate = np.asarray(simple[place].response(responses.omega))

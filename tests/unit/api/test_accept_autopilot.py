@@ -409,7 +409,15 @@ def test_a_sweep_begins_where_its_outputs_are_resolved() -> None:
     assert planned(held, band=(3.0, 8.0)).start_hz == 3.0
     rolls = mixed(law.mixer, hover, law.parameters, inputs=flying.input_names)["roll"]
     damped = gentle_sweep(
-        model, rolls, "roll", held, band=(0.4, 8.0), seconds=40.0, gravity=9.81, mapping=mapping, least=RESOLVED_AT_TRIM
+        model,
+        rolls,
+        "roll",
+        held,
+        band=(0.4, 8.0),
+        seconds=40.0,
+        gravity=9.81,
+        mapping=mapping,
+        least=RESOLVED_AT_TRIM,
     )
     assert damped.magnitude > 0.05, "the derivative damps the bar's resonance; 0.01 were planned without it"
     with pytest.raises(sp.SwashError, match="no gentle sweep of yaw moves an output by 4 us"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -16,6 +17,10 @@ from swashplate.simulation.linearize import LinearModel
 
 _GENTLE: Mapping[str, tuple[float, float]] = {"p": (0.4, 0.1), "q": (0.4, 0.1), "r": (1.2, 0.4), "az": (2.5, 0.7)}
 """Most rate [rad/s] and angle [rad] that a sweep may make, or acceleration [m/s^2] and speed [m/s]."""
+OF_TWO_MOTORS = 0.2
+"""rad/s: the most rate of roll and pitch of a coaxial by two motors. The truth is linear, but the CoaX flaps with the
+square of its rate (Fankhauser et al. 2011): at 0.4 rad/s that damped it by 0.7 /s more than in hover, and turned its
+response by 6 degrees above the resonance of its bar."""
 _MOST = 0.2
 """Of a mixer's command."""
 RESOLVED = 4.0
@@ -36,6 +41,7 @@ def gentle_sweep(
     gravity: float,
     mapping: ServoMapping,
     least: float = RESOLVED,
+    quickest: float = math.inf,
 ) -> Chirp:
     """The largest sweep that stays gentle, by the linear model under the autopilot's loops without their filters.
 
@@ -46,7 +52,7 @@ def gentle_sweep(
         model: about hover. moved: how far a unit of the mixer's command moves its inputs. axis: that is swept.
         gains: of the loops, by ArduPilot's names.
         band: asked for [Hz]. seconds: of the sweep. gravity: [m/s^2]. mapping: from outputs to inputs.
-        least: amplitude of the output that moves most [us].
+        least: amplitude of the output that moves most [us]. quickest: rate, below what is gentle [rad/s].
 
     Raises:
         LinkError: where it is resolved nowhere in the lower two thirds of the band.
@@ -61,7 +67,7 @@ def gentle_sweep(
     size, start = 0.0, 0
     while start < 2 * omega.size // 3:
         part = slice(start, None)
-        size = min(_MOST, quick / float(answer[part].max()), far / float((answer / omega)[part].max()))
+        size = min(_MOST, min(quick, quickest) / float(answer[part].max()), far / float((answer / omega)[part].max()))
         unseen = np.flatnonzero(size * left[part] * pulse < least)
         if not unseen.size:
             low = band[0] if start == 0 else float(f"{omega[start] / (2.0 * np.pi):.2g}")
