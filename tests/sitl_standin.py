@@ -28,6 +28,8 @@ from made_autopilot_logs import Row, dataflash
 from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
 
 COAXIAL = 9
+DENSER = 1.225 / 1.2
+"""Air at sea level over the CoaX's: what the firmware multiplies commands to motors by."""
 SPIN_ARM, SPIN_MIN, SPIN_MAX, EXPO, HEADROOM = 0.1, 0.15, 0.95, 0.65, 0.2
 """MOT_ parameters of a multicopter, with their defaults."""
 STABILIZE, ALT_HOLD, LOITER, LAND, SYSTEM_ID = 0, 2, 5, 9, 25
@@ -243,7 +245,8 @@ class Firmware(HeliAutopilot):
         """A helicopter's, or from AP_MotorsCoax: flaps 1 to 4 over the thrust, motors 5 and 6 by thrust and yaw."""
         if not self.coaxial:
             return super()._mixed(mixer, collective)
-        roll, pitch, yaw = map(float, mixer)
+        roll, pitch, yaw = (DENSER * float(each) for each in mixer)
+        collective = DENSER * collective
         yaw = -yaw if "backwards" in self.faults else yaw
         if not self.lift_off:
             idle = SPIN_ARM if self.armed else 0.0

@@ -18,7 +18,7 @@ from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.arrays import Array
 from swashplate.control.analysis.cascade_gains import judge_cascade
 from swashplate.control.laws.ardupilot.law import RATE_OF_LOOPS, ArduPilotLaw
-from swashplate.control.laws.ardupilot.outputs import HELD, LOGGED, output_delays
+from swashplate.control.laws.ardupilot.outputs import HELD, LOGGED, density_gain, output_delays
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.sweeps import sweeps
@@ -44,7 +44,9 @@ class Flown:
         given = read_parameter_file(folder / parameters) if parameters else {}
         self.law: ArduPilotLaw = ardupilot_law(servo_mapping(name, self.vehicle), self.vehicle, self.hover, given=given)
         self.model = sp.linearize(self.vehicle, self.hover)
-        self.moves = mixed(self.law.mixer, self.hover, self.law.parameters, inputs=self.vehicle.input_names)
+        gain = density_gain(self.law.frame, self.hover.environment.air_density)
+        moves = mixed(self.law.mixer, self.hover, self.law.parameters, inputs=self.vehicle.input_names)
+        self.moves = {axis: gain * moved for axis, moved in moves.items()}
         self.flight: Flight = sp.read(folder / log)
         told = {sweep.axis: sweep for sweep in sweeps(self.flight) if sweep.source == "log"}
         planned = {

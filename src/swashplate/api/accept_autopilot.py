@@ -19,7 +19,7 @@ from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
 from swashplate.control.laws.ardupilot.law import GRAVITY, RATE_OF_LOOPS
-from swashplate.control.laws.ardupilot.outputs import CUT_AT_TRIM, HELD, LOGGED, output_delays
+from swashplate.control.laws.ardupilot.outputs import CUT_AT_TRIM, HELD, LOGGED, density_gain, output_delays
 from swashplate.control.laws.ardupilot.parameters import known
 from swashplate.errors import SwashError
 from swashplate.extras import library
@@ -139,7 +139,8 @@ def accept_autopilot(
     mixing = {key: value for key, value in yours.items() if key.startswith(_MIXING)}
     law, expected = ardupilot_law(mapping, flying, level, given=mixing), parameters(mapping, flying, level)
     mixer, names = law.mixer, flying.input_names
-    moves = mixed(mixer, level, law.parameters, inputs=names)
+    denser = density_gain(law.frame, float(around.air_density))
+    moves = {axis: denser * moved for axis, moved in mixed(mixer, level, law.parameters, inputs=names).items()}
     gains: Parameters = {}
     if not any(key.startswith("ATC_RAT_") for key in yours):
         say("searching gains with margins")
@@ -181,7 +182,8 @@ def accept_autopilot(
     if flown:
         loop = values.get("SCHED_LOOP_RATE", RATE_OF_LOOPS)
         late = (HELD + LOGGED) / loop + output_delays("ardupilot", law.frame, len(names), loop)
-        moved = mixed(mixer, other.trim, _mixing(values, law.parameters, law.frame), inputs=names)
+        mixing = _mixing(values, law.parameters, law.frame)
+        moved = {axis: denser * each for axis, each in mixed(mixer, other.trim, mixing, inputs=names).items()}
 
         def response(linear: LinearModel, axis: str, output: str, omega: Array) -> Complex:
             return mixer_response(linear, moved[axis], output, omega, late=late, gravity=float(around.gravity))

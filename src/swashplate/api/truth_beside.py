@@ -51,6 +51,10 @@ STRUCTURES: Mapping[tuple[str, ...], tuple[str, ...]] = {
     ("heave",): ("heave", "compose:heave+actuators", "compose:heave+lead"),  # motors; two inflows or motors
 }
 """Structures by the axes that they describe, the simplest first: the first that follows a vehicle is fitted to it."""
+_ANSWERS = {"heave": "yaw"}
+"""Whose loop answers an axis' sweep with a command of its own: to speed up two motors turns the vehicle."""
+_ACTS = 0.05
+"""Share of an axis' own response from which on that command's part in it is told apart, by the other's sweep."""
 _COMPOSED = {"lateral": "roll", "longitudinal": "pitch", "pedal": "yaw", "collective": "heave"}
 """The axis of each input of a composed structure."""
 FORMS: Mapping[str, tuple[str, ...]] = {
@@ -109,7 +113,8 @@ def beside_truth(
     axes = [axis for axis in MIXER_AXES if axis in by_axis]
     for together in _grouped(axes):
         try:
-            _judge(flight, [by_axis[axis] for axis in together], together, flown, truth, own, rate, loop, comparison)
+            parts, others = [by_axis[axis] for axis in together], _answering(together, by_axis, flown, own)
+            _judge(flight, parts, others, together, flown, truth, own, rate, loop, comparison)
         except SwashError as error:
             comparison.lines.append(TrialLine(f"{' and '.join(together)}: estimate", str(error), "an estimate", False))
     return comparison
@@ -120,6 +125,21 @@ def _grouped(axes: Sequence[str]) -> list[tuple[str, ...]]:
     groups = [group for group in STRUCTURES if set(group) <= set(axes)]
     taken = {axis for group in groups for axis in group}
     return [*groups, *((axis,) for axis in axes if axis not in taken)]
+
+
+def _answering(
+    axes: Sequence[str], by_axis: Mapping[str, Sweep], flown: Mapping[str, Chirp], own: Truth
+) -> dict[str, Sweep]:
+    """Sweeps of other axes whose commands move along and act on what these axes answer with."""
+    answering = {}
+    for axis in axes:
+        other = _ANSWERS.get(axis)
+        if other in by_axis:
+            omega = TWO_PI * np.geomspace(flown[axis].start_hz, flown[axis].stop_hz, 20)
+            output = MIXER_AXES[axis].output
+            if np.median(np.abs(own(other, output, omega) / own(axis, output, omega))) > _ACTS:
+                answering[other] = by_axis[other]
+    return answering
 
 
 def _sweeps_by_axis(flight: Flight, flown: Mapping[str, Chirp], comparison: TruthBeside) -> dict[str, Sweep]:
@@ -138,6 +158,7 @@ def _sweeps_by_axis(flight: Flight, flown: Mapping[str, Chirp], comparison: Trut
 def _judge(
     flight: Flight,
     parts: Sequence[Sweep],
+    others: Mapping[str, Sweep],
     axes: Sequence[str],
     flown: Mapping[str, Chirp],
     truth: Truth,
@@ -152,12 +173,14 @@ def _judge(
     logged = {a.output: a.logged if a.logged in flight else a.output for a in named}
     if missing := [name for name in (*inputs, *logged.values()) if name not in flight]:
         raise FlightError("is not in the log.", channel=", ".join(missing))
-    pieces = [flight.between(part.start, part.stop) for part in parts]
+    pieces = [flight.between(part.start, part.stop) for part in (*parts, *others.values())]
     swept = (_SWEPT,) if _SWEPT in flight else ()
-    records = uniform_records(pieces, (*inputs, *outputs, *swept), rate=rate, names=logged)
+    along = [MIXER_AXES[axis].input for axis in others]
+    records = uniform_records(pieces, (*inputs, *along, *outputs, *swept), rate=rate, names=logged)
     low, high = max(flown[a].start_hz for a in axes), min(flown[a].stop_hz for a in axes)
     band = (1.25 * low, 0.75 * high)
-    responses = respond(records, inputs=inputs, outputs=outputs, references=swept, band=band)
+    responses = respond(records, inputs=(*inputs, *along), outputs=outputs, references=swept, band=band)
+    responses = responses.select(outputs=tuple(outputs), inputs=tuple(inputs))
     words = f"{' and '.join(axes)}: "
     comparison.remarks += [words + text for text in (*responses.warnings, *responses.problems)]
     exact = _exact(responses, axes, own)

@@ -4,7 +4,8 @@ A change between two samples stands out where it is far outside the scatter of a
 Takeoffs, steps and touch-downs stand out too, so what stands out is told only where it cannot be motion:
 
 * a place, a velocity or an attitude, where it takes an acceleration that no aircraft survives;
-* anything, where the next samples take it back, and the inertial sensors felt nothing of it.
+* anything, where the next samples take it back, and the inertial sensors felt nothing of it; but no command of a loop
+  where the mode changes, when another loop takes over.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ _BRIEF = 2  # samples: what lasts longer is no spike
 _TAKEN_BACK = 0.3  # of a spike: what may be left of it behind it
 _BEYOND = 2.0  # ranges of the samples around it that a spike reaches
 _TOGETHER = 0.05  # s, and one and a half steps: jumps of other channels that are the same event
+_SWITCHED = 0.25  # s after a change of mode: another loop takes over with a command of its own
 _INERTIAL = (*RATES, "ax", "ay", "az")
 _OTHERS = ("_imu2", "_imu3")
 """Ends of the channels of other sensors than the first."""
@@ -73,9 +75,16 @@ def jumps(flight: Flight) -> dict[str, int]:
             told = out & _impossible(changes[name], "attitude" if name in groups else _base(name))
             if name not in groups:
                 told |= _spikes(name, changes[name], out, felt)
+            if name.startswith("mixer_") or name.endswith("_demand"):
+                later = changes[name][0][1:, None] - _changes_of_mode(flight)
+                told &= ~np.any((later >= 0.0) & (later <= _SWITCHED), axis=1)
             if count := int(np.sum(told)):
                 counts[name] = count
     return counts
+
+
+def _changes_of_mode(flight: Flight) -> Array:
+    return np.array([event.time for event in flight.provenance.events if event.kind == "mode"])
 
 
 def _base(name: str) -> str:

@@ -22,7 +22,7 @@ pytest.importorskip("pymavlink")
 import swashplate as sp
 from swashplate.api.acceptance import Acceptance
 from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
-from swashplate.control.laws.ardupilot.outputs import HELD, LOGGED, output_delays
+from swashplate.control.laws.ardupilot.outputs import HELD, LOGGED, density_gain, output_delays
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.links.ardupilot import sitl, trial
@@ -161,7 +161,8 @@ def truth_of(vehicle: Vehicle, *, name: str, rate: float = 200.0) -> Truth:
     hover = sp.trim(flying)
     model = sp.linearize(flying, hover)
     law = ardupilot_law(servo_mapping(name, flying), flying, hover, given={})
-    moves = mixed(law.mixer, hover, law.parameters, inputs=flying.input_names)
+    gain = density_gain(law.frame, hover.environment.air_density)
+    moves = {k: gain * v for k, v in mixed(law.mixer, hover, law.parameters, inputs=flying.input_names).items()}
 
     def truth(axis: str, output: str, omega: np.ndarray) -> np.ndarray:
         late = (HELD + LOGGED) / rate + output_delays("ardupilot", law.frame, len(flying.input_names), rate)

@@ -139,6 +139,17 @@ def test_a_heading_that_passes_south_does_not_jump() -> None:
     assert any("psi: 2 jumps" in text for text in inspect(_flight(psi=wrapped)).problems)
 
 
+def test_a_loops_command_may_spike_where_the_mode_changes_and_nowhere_else() -> None:
+    """As ArduPilot's did from LOITER to STABILIZE in a log of its own."""
+    spiked = 0.001 * np.sin(np.arange(N))
+    spiked[50] += 0.2
+    flight = _flight(mixer_collective=spiked)
+    told = ("mixer_collective: 2 jumps beyond 12 robust sigmas (outliers?)",)
+    for at, problems in ((0.45, ()), (0.1, told), (0.6, told)):
+        provenance = replace(flight.provenance, events=(Event(at, "mode", "STABILIZE"),))
+        assert inspect(replace(flight, provenance=provenance)).problems == problems
+
+
 def test_a_command_may_step_but_not_spike_and_not_leave_its_range() -> None:
     stepped, spiked, wild = (0.001 * np.sin(np.arange(N)) for _ in range(3))
     stepped[100:200] += 0.2

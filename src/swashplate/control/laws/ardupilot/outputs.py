@@ -41,6 +41,12 @@ LOGGED = 0.5
 of angle over its time (mode_systemid.cpp)."""
 
 
+def density_gain(frame: str, density: float) -> float:
+    """By what ArduPilot multiplies every command to motors in air of a density [kg/m^3]: 1.225 over it
+    (`Thrust_Linearization::get_compensation_gain`); a helicopter's it leaves."""
+    return 1.225 / density if frame == "two motors" else 1.0
+
+
 def output_delays(firmware: LawFirmware, frame: str, inputs: int, rate: float) -> Array:
     """From the end of a loop to the output [s], shape (inputs,), of loops at `rate` [Hz]."""
     return np.array(LOOPS_LATER[firmware][frame][:inputs]) / rate
