@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from swashplate.api.campaigns import worker
 from swashplate.api.campaigns.engine import TaskOutcome, Work
 from swashplate.api.campaigns.pool import in_words
 from swashplate.api.campaigns.program import program
@@ -21,7 +22,8 @@ def numbers(task: CampaignTask) -> Columns:
     """Normal numbers of the task's seed; what `settings` says happens first.
 
     `fail`: rows that always fail. `die`: rows that end their worker. `die_once`: as `die`, once, told by a file in
-    `folder`. `wait`: seconds. `pids`: a folder that is told which process did which rows.
+    `folder`. `wait`: seconds. `pids`: a folder that is told which process did which rows. `keeps`: one that is told
+    what the worker calls the folder of its files.
     """
     first, told = task.portion.first, task.settings
     if first in told.get("fail", ()):
@@ -36,6 +38,8 @@ def numbers(task: CampaignTask) -> Columns:
     time.sleep(told.get("wait", 0.0))
     if "pids" in told:
         (Path(told["pids"]) / f"{first}-{os.getpid()}-{time.time_ns()}").touch()
+    if "keeps" in told:
+        (Path(told["keeps"]) / worker._home().name).touch()
     drawn = np.random.default_rng(task.portion.seed).standard_normal((task.portion.count, 8))
     return {
         "number": np.arange(first, first + task.portion.count),

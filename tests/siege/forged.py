@@ -80,7 +80,7 @@ def join_ulog(start: bytes, records: Sequence[Record]) -> bytes:
 
 def split_dataflash(content: bytes) -> tuple[bytes, list[Record]]:
     sizes, records, at = {128: 89}, [], 0
-    while at + 3 <= len(content) and content[at + 2] in sizes:
+    while at + 3 <= len(content) and sizes.get(content[at + 2], 0) >= 3:
         kind = content[at + 2]
         body = content[at + 3 : at + sizes[kind]]
         if kind == 128:

@@ -100,7 +100,7 @@ def besiege(*, commands: Sequence[str] = tuple(COMMANDS)) -> Found:
             for k in range(2):
                 log = looking / f"{len(rows)}-{k}"
                 ended = on.run(COMMANDS[command], environment={"PYTHONPATH": str(looking), "SWASH_SEEN": str(log)})
-                problems = [ended.wrong()] if ended.wrong() else []
+                problems = [] if ended.code == 0 else [ended.wrong() or f"is refused: {ended.said.strip()[:300]}"]
                 problems += [f"leaves {name}" for name in on.clear()]
                 told.append(events(log))
             problems += wrong(told[0], told[1], places)

@@ -12,7 +12,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import swashplate as sp
 from hostile_bags import packed_bag
+from swashplate.control.controller_file import save_controller
+from swashplate.control.lqg.design import design
+from swashplate.filtering.sensor_suite import suite
 
 from .kills import _inputs
 
@@ -31,10 +35,11 @@ COMMANDS: Mapping[str, str] = {
     "inspect a flight": "inspect INPUTS/flight.nc",
     "plot": "inspect INPUTS/log.csv --channels p --out OUT/plot.html",
     "respond": "respond INPUTS/log.csv --inputs servo_roll --outputs p --band 1-6Hz --out OUT/found",
-    "fit-time": "identify --structure rotor_body --flight INPUTS/log.csv --out OUT/fit --settings iterations=1",
+    "identify": "identify --vehicle coax --flight INPUTS/flight.nc --free flight --rate 20 --out OUT/fit --method "
+    "output-error --settings iterations=1",
     "trim": "vehicle trim raptor50",
     "linearize": "vehicle linearize raptor50 --speed 0-5/5 --out OUT/models",
-    "control": "control check coax",
+    "control": "control check coax --controller INPUTS/hold.toml",
     "export, C": "export coax --format c --out OUT/code",
     "export, FMU": "export coax --format fmu --out OUT/made",
     "campaign": "campaign run INPUTS/campaign.toml -o OUT/campaign --workers 1",
@@ -46,7 +51,7 @@ count = 2
 batch = 1
 vehicle = "coax"
 maneuver = "hover:0.2s"
-design = {rate = 100, gain = "steady"}
+controller = "hold.toml"
 varies = {numbers = {mass = "5%"}}
 """
 
@@ -80,12 +85,17 @@ class Machine:
         self.out = self.here / "OUT"
         self.out.mkdir()
         _inputs(self.inputs)
-        (self.inputs / "campaign.toml").write_text(CAMPAIGN)
         packed_bag(self.inputs)
+
+    def make_controller(self) -> None:
+        """The controller that some commands read, and the campaign that flies it."""
+        made = design(sp.vehicle("coax"), sensors=suite("gyro@50,mocap@50"), rate=50.0)
+        save_controller(made, self.inputs / "hold.toml")
+        (self.inputs / "campaign.toml").write_text(CAMPAIGN)
 
     def make_flight(self) -> None:
         """The flight that one of the commands reads; it takes seconds."""
-        made = self.run("simulate --vehicle coax --maneuver doublet:roll,0.5s,0.1 --out INPUTS/flight.nc")
+        made = self.run("simulate --vehicle coax --maneuver multisine:roll+pitch,0.4-4Hz,8s,0.1 --out INPUTS/flight.nc")
         assert made.code == 0, made.said
         self.clear()
 
@@ -135,6 +145,8 @@ def machine(commands: Sequence[str]) -> Iterator[Machine]:
     """A machine with what these commands read."""
     with tempfile.TemporaryDirectory(prefix="siege-") as name:
         made = Machine(Path(name))
-        if any("flight.nc" in COMMANDS[command].partition("--out")[0] for command in commands):
+        if any("INPUTS/flight.nc" in COMMANDS[command] for command in commands):
             made.make_flight()
+        if {"campaign", "control"}.intersection(commands):
+            made.make_controller()
         yield made

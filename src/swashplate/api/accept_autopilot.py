@@ -163,6 +163,7 @@ def accept_autopilot(
         session = ArduPilotSession(plant, Sensing(plant), Notices(lambda text: say(text)))
         _write_files(folder, files, expected | gains, shown, defaults, called)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
+            radio.bind(("127.0.0.1", 0))  # left to itself, the first packet would open a port to every machine
             pilot = TrialPilot(
                 lambda pulses: radio.sendto(pulses, ("127.0.0.1", sitl.rc_port)),
                 heave=_heave(model, moves["heave"], float(around.gravity)),

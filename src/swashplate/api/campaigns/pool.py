@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import tempfile
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -14,6 +15,7 @@ from multiprocessing import connection
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
+from swashplate import atomic
 from swashplate.api.campaigns import program
 from swashplate.api.campaigns.engine import TaskOutcome, Work
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
@@ -90,6 +92,8 @@ class ProcessPool:
         for lane in self._lanes:
             lane.process.join()
             lane.pipe.close()
+        if self._lanes:
+            atomic.sweep(tempfile.gettempdir())  # where they kept the campaign's files
         self._lanes = []
 
     def _lane(self) -> _Lane:

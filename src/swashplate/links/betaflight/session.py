@@ -145,6 +145,7 @@ def serve(
     """
     bound.setblocking(False)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        out.bind(("127.0.0.1", 0))  # left to itself, the first packet would open a port to every machine
         for stamp in (0.0, 0.0, _STAMP):  # the second is the first whose time it keeps
             _send(out, session.begun(stamp), STATE_PORT)
             time.sleep(_STAMP / session.pace if stamp == 0.0 else 0.0)

@@ -73,6 +73,17 @@ def test_kills_and_failures_cost_nothing_but_time(tmp_path: Path, monkeypatch: p
     assert {told["seed"] for told in store.failed().values()} == {every[2].portion.seed, every[4].portion.seed}
 
 
+def test_what_workers_kept_of_a_campaign_goes_with_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place, told = tmp_path / "temporary", tmp_path / "told"
+    place.mkdir()
+    told.mkdir()
+    monkeypatch.setenv("TMPDIR", str(place))
+    monkeypatch.setattr("tempfile.tempdir", str(place))
+    done(made_campaigns.tasks(4, keeps=str(told)), ProcessPool(made_campaigns.numbers, workers=2), tmp_path / "two")
+    assert list(told.iterdir())
+    assert list(place.iterdir()) == []
+
+
 def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
     dask: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

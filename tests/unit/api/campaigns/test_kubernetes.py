@@ -22,7 +22,11 @@ import pytest
 
 import made_campaigns
 import proof_page
+import swashplate as sp
 from swashplate.api.campaigns.store import CampaignStore
+from swashplate.control.controller_file import save_controller
+from swashplate.control.lqg.design import design
+from swashplate.filtering.sensor_suite import suite
 
 TASKS, KILLS = int(os.environ.get("SWASH_TASKS", "100")), int(os.environ.get("SWASH_KILLS", "6"))
 NAME = "swash-kubernetes-test"
@@ -33,7 +37,7 @@ count = {count}
 batch = 10
 vehicle = "coax"
 maneuver = "hover:4s"
-design = {{rate = 100, gain = "steady"}}
+controller = "hold.toml"
 varies = {{gusts = {{indoor = 0.3}}}}
 """
 
@@ -74,6 +78,7 @@ def test_a_campaign_on_kubernetes_outlives_killed_pods(tmp_path: Path) -> None:
         pytest.skip("no Kubernetes answers here (kubectl), or SWASH_IMAGE names no image")
     campaign = tmp_path / "flights.toml"
     campaign.write_text(CAMPAIGN.format(count=10 * TASKS))
+    save_controller(design(sp.vehicle("coax"), sensors=suite("gyro@50,mocap@50"), rate=50.0), tmp_path / "hold.toml")
     computed(campaign, tmp_path / "here")
     chance, over = random.Random(1), threading.Event()
     killed: list[str] = []
