@@ -311,6 +311,20 @@ def folder_when_complete(target: str | os.PathLike[str], *, ours: Collection[str
         _without_empty(missing)
 
 
+def temporary_place() -> str:
+    """The system's folder for temporary files.
+
+    Python's own search writes a file into it, which would stay behind where the process is killed at that moment: a
+    folder that is there and may be written to is taken without.
+    """
+    named = [os.environ.get(name) for name in ("TMPDIR", "TEMP", "TMP")]
+    named += [os.path.join(os.sep, "tmp")] if os.name == "posix" else []
+    if tempfile.tempdir is None:
+        usable = (place for place in named if place and os.access(place, os.W_OK | os.X_OK) and os.path.isdir(place))
+        tempfile.tempdir = next((os.path.abspath(place) for place in usable), None)
+    return tempfile.gettempdir()
+
+
 @contextmanager
 def scratch_folder(place: str | os.PathLike[str] | None = None) -> Iterator[Path]:
     """A folder for what no user asked for, removed after the block; where a process is killed before, by the next one.
@@ -321,7 +335,7 @@ def scratch_folder(place: str | os.PathLike[str] | None = None) -> Iterator[Path
     Raises:
         WriteError: where it cannot be made.
     """
-    around = Path(tempfile.gettempdir() if place is None else place)
+    around = Path(temporary_place() if place is None else place)
     with _named(around):
         sweep(around)
         folder, held = _new_folder(around)

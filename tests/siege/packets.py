@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import random
 import struct
+import tempfile
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from pymavlink.dialects.v20 import common
@@ -17,6 +20,7 @@ from pymavlink.dialects.v20 import common
 from heli_autopilot import servo_packet
 from link_bench import QUICK, bench
 from swashplate.links.live.messages import SCHEMA, MessageError, parse
+from swashplate.links.live.session import LiveSession
 from swashplate.links.mavlink.parameter_reading import ParameterReading
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
@@ -43,6 +47,7 @@ class _Link:
     take: Callable[[bytes, random.Random], None]
     whole: tuple[bytes, ...]
     look: Callable[[], str]
+    close: Callable[[], None] = lambda: None
 
 
 def _mutant(link: _Link, chance: random.Random) -> bytes:
@@ -193,7 +198,7 @@ def _parameters() -> _Link:
 
 def _page() -> _Link:
     """Messages of the live page: understood or refused in a word."""
-    whole = [json.dumps({"type": "stick", "roll": 0, "pitch": 0.5, "yaw": -1, "heave": 1.0, "number": 3})]
+    whole = [json.dumps({"type": "record", "value": True})]
     whole += [json.dumps({"type": kind, **dict.fromkeys(fields, 1)}) for kind, fields in SCHEMA.items()]
 
     def take(data: bytes, chance: random.Random) -> None:
@@ -202,9 +207,36 @@ def _page() -> _Link:
             assert found.keys() == {"type", *SCHEMA[found["type"]]}
 
     def look() -> str:
-        return "" if parse(whole[0])["pitch"] == 0.5 else "a whole message is not understood"
+        return "" if parse(whole[0])["value"] is True else "a whole message is not understood"
 
     return _Link(take, tuple(text.encode() for text in whole), look)
+
+
+def _flown() -> _Link:
+    """What the page says that it has flown, while it is recorded and estimated."""
+    kept = ExitStack()
+    folder = Path(kept.enter_context(tempfile.TemporaryDirectory()))
+    session = LiveSession(vehicle("coax"), controller=None, folder=folder, estimate=["tau_f_upper", "p_dot=Lp*p"])
+    kept.callback(session.close)
+    asyncio.run(session.obey({"type": "record", "value": True}))
+    flies = session.world.vehicle
+    n, m = len(flies.state_names), len(flies.input_names)
+    surroundings = [0.0, 0.0, 0.0, 11.0]
+
+    def row(tick: int) -> bytes:
+        return struct.pack(f"<{6 + n + m}d", session.version, tick, *[0.01] * n, *[0.1] * m, *surroundings)
+
+    def take(data: bytes, chance: random.Random) -> None:
+        with suppress(MessageError):
+            session.fly(data)
+        json.dumps(session.told(), allow_nan=False)
+
+    def look() -> str:
+        going = session.recording
+        session.fly(row(session._tick + 1))
+        return "" if going is not None and going.path.stat().st_size else "nothing is recorded"
+
+    return _Link(take, tuple(b"".join(row(k + j) for j in range(8)) for k in (0, 1, 49)), look, kept.close)
 
 
 LINKS: dict[str, Callable[[], _Link]] = {
@@ -214,6 +246,7 @@ LINKS: dict[str, Callable[[], _Link]] = {
     "PX4": _px4,
     "parameters over MAVLink": _parameters,
     "messages of the live page": _page,
+    "what the live page has flown": _flown,
 }
 
 
@@ -240,6 +273,7 @@ def besiege(*, packets: int, seconds: float, seed: int = 0) -> Found:
                 wrong += 1
                 bad.append(f"{name}, packet {sent} {data[:40].hex()}: {problem}")
             progress(f"{name}: {sent} packets, {wrong} bad")
+        link.close()
         rows.append([name, sent, round(sent / max(time.monotonic() - begin, 1e-9)), wrong])
     total = sum(row[1] for row in rows)
     text = (

@@ -299,3 +299,21 @@ def test_a_scratch_folder_goes_and_takes_those_of_dead_processes_along(tmp_path:
         assert [entry.name for entry in tmp_path.iterdir()] == [folder.name]
         assert folder.stat().st_mode & 0o777 == 0o700
     assert not any(tmp_path.iterdir())
+
+
+def test_no_file_is_written_to_find_the_place_for_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python's own search writes one, which the siege's kills found behind a command."""
+
+    def search() -> str:
+        raise AssertionError("Python searches")
+
+    monkeypatch.setattr("tempfile._get_default_tempdir", search)
+    monkeypatch.setattr("tempfile.tempdir", None)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    with atomic.scratch_folder() as folder:
+        assert folder.parent == tmp_path
+    monkeypatch.setattr("tempfile.tempdir", None)
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "not there"))
+    assert atomic.temporary_place() != str(tmp_path / "not there")

@@ -6,7 +6,6 @@ import multiprocessing
 import os
 import signal
 import sys
-import tempfile
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -93,7 +92,7 @@ class ProcessPool:
             lane.process.join()
             lane.pipe.close()
         if self._lanes:
-            atomic.sweep(tempfile.gettempdir())  # where they kept the campaign's files
+            atomic.sweep(atomic.temporary_place())  # where they kept the campaign's files
         self._lanes = []
 
     def _lane(self) -> _Lane:

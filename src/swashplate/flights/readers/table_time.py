@@ -172,7 +172,8 @@ def _unit_of(raw: Array, unit: str | None, table: ColumnTable) -> str:
         return unit
     steps = np.diff(raw)
     step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    rates = {name: 1.0 / (step * tick) for name, tick in _TICKS.items()} if step else {}
+    # a step may be so small that its product with a tick is none: its rate is beyond every log's
+    rates = {name: 1.0 / max(step * tick, 1e-300) for name, tick in _TICKS.items()} if step else {}
     likely = [name for name, rate in rates.items() if _RATES[0] <= rate <= _RATES[1]]
     if len(likely) != 1:
         may = " or ".join(f"{name} ({rates[name]:.4g} Hz)" for name in likely)

@@ -89,7 +89,15 @@ def test_a_unit_that_only_one_rate_of_logs_allows_is_taken_and_told(
     )
 
 
-@pytest.mark.parametrize(("step", "may"), [(0.1, "s .10 Hz. or ms"), (125, "ms .8 Hz. or us .8000 Hz."), (1e11, None)])
+@pytest.mark.parametrize(
+    ("step", "may"),
+    [
+        (0.1, "s .10 Hz. or ms"),
+        (125, "ms .8 Hz. or us .8000 Hz."),
+        (1e11, None),
+        (5e-320, None),
+    ],  # the last: by fuzzing
+)
 def test_a_unit_that_may_be_two_is_asked_for(tmp_path: Path, step: float, may: str | None) -> None:
     """10 Hz in seconds are 10 kHz in milliseconds, and 8 kHz of a Blackbox are 8 Hz in milliseconds."""
     with pytest.raises(UnitError, match=f"time: has no unit.*{may or '--unit time=s'}"):
