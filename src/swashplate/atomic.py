@@ -316,13 +316,21 @@ def temporary_place() -> str:
 
     Python's own search writes a file into it, which would stay behind where the process is killed at that moment: a
     folder that is there and may be written to is taken without.
+
+    Raises:
+        WriteError: where there is none.
     """
     named = [os.environ.get(name) for name in ("TMPDIR", "TEMP", "TMP")]
     named += [os.path.join(os.sep, "tmp")] if os.name == "posix" else []
     if tempfile.tempdir is None:
         usable = (place for place in named if place and os.access(place, os.W_OK | os.X_OK) and os.path.isdir(place))
         tempfile.tempdir = next((os.path.abspath(place) for place in usable), None)
-    return tempfile.gettempdir()
+    try:
+        return tempfile.gettempdir()
+    except OSError as error:
+        raise WriteError(
+            "there is no folder for temporary files that can be written to.", hint="Name one by TMPDIR."
+        ) from error
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import io
 import sqlite3
+import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -22,11 +23,12 @@ import made_autopilot_logs
 import made_blackbox_logs
 import made_logs
 import swashplate as sp
+from made_telemetry import telemetry
 from swashplate.api.campaigns.result_files import LARGEST, NUMPY, PARQUET, unpacked
 from swashplate.errors import FlightError
 from swashplate.flights import growing
 from swashplate.flights.foreign_process import JOBS
-from swashplate.flights.readers import blackbox_header, dataflash, dataflash_text, mat, ulog_messages
+from swashplate.flights.readers import blackbox_header, dataflash, dataflash_text, mat, tlog, ulog_messages
 from swashplate.flights.readers.blackbox_frames import find_frames
 from swashplate.flights.readers.blackbox_header import read_header
 from swashplate.flights.readers.blackbox_values import main_frames
@@ -119,6 +121,13 @@ def _kinds(value: Any) -> Any:
     return value.dtype.kind + str(value.ndim) if isinstance(value, np.ndarray) else type(value).__name__
 
 
+def _tlog(content: bytes, path: Path) -> object:
+    source = Source(path, content)
+    _refuse_unknown(tlog.recognises(source))
+    tables = tlog.tables_of(source)
+    return sorted((name, len(table.columns), len(tlog.number_columns(table))) for name, table in tables.items())
+
+
 def _growing(content: bytes, path: Path) -> object:
     flight = growing.parse(content, where=str(path))
     return len(flight.channels), len(flight.provenance.damage)
@@ -176,6 +185,12 @@ def _blackboxes() -> tuple[bytes, ...]:
     return (made_blackbox_logs.rotorflight({"gyroADC[0]": 100 * k, "rcCommand[0]": 50 - k}),)
 
 
+def _telemetry() -> tuple[bytes, ...]:
+    with tempfile.TemporaryDirectory() as folder:
+        made = (telemetry(Path(folder) / f"{version}.tlog", seconds=0.2, version=version) for version in (1, 2))
+        return tuple(path.read_bytes() for path in made)
+
+
 def _mats(*, packed: bool) -> tuple[bytes, ...]:
     file = io.BytesIO()
     t = np.arange(4) * 0.02
@@ -214,7 +229,15 @@ def _csv() -> tuple[bytes, ...]:
     motive = made_logs.motive([f"{k},{0.01 * k:.2f},0,0,0,1,{0.1 * k},2,3,0,0,0,0" for k in range(3)]).encode()
     vicon = made_logs.vicon([f"{k},0,{0.01 * k},0,0,{k},1,1" for k in range(1, 4)]).encode()
     own = b"time [s],phi [deg],x [m]\n0,1,2\n0.02,1.5,2.5\n0.04,2,3\n"
-    return (own, own.replace(b",", b";").replace(b".", b","), b"t\tp\tq\n0\t1\t2\n20\t3\t4\n40\t5\t6\n", motive, vicon)
+    bars = b"  real,time | p,rad/s | roll,_deg |\n 0.0 | 1.0 | 2.0 |\n 0.1 | 1.5 | 2.5 |\n 0.2 | 1.0 | 2.0 |\n"
+    return (
+        own,
+        own.replace(b",", b";").replace(b".", b","),
+        bars,
+        b"t\tp\tq\n0\t1\t2\n20\t3\t4\n40\t5\t6\n",
+        motive,
+        vicon,
+    )
 
 
 def _bags(generation: int, plugin: str = "MCAP") -> tuple[bytes, ...]:
@@ -260,6 +283,7 @@ CONTAINERS: Mapping[str, Callable[[], Container]] = {
     "MATLAB, level 5, packed (zlib)": _of(".mat", lambda: _mats(packed=True), _mat, forge=forged.by_packed),
     "MATLAB 7.3 (HDF5)": _of(".mat", lambda: _hdf5(matlab=True), _job("hdf5", wanted=""), job=True),
     "netCDF (HDF5)": _of(".nc", lambda: _hdf5(matlab=False), _job("hdf5", wanted="mark"), job=True),
+    "telemetry (MAVLink)": _of(".tlog", _telemetry, _tlog, forge=by_records(forged.split_tlog, forged.join_tlog)),
     "growing recording": _of(
         ".growing", lambda: (targets.growing_file(rows=6),), _growing, forge=forged.by_growing_head
     ),

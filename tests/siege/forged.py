@@ -15,6 +15,9 @@ import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from pymavlink.dialects.v20 import ardupilotmega
+from pymavlink.generator.mavcrc import x25crc
+
 from mutations import mutated
 
 from .damage import ODD_FLOATS, ODD_NUMBERS, ODD_WORDS, damaged
@@ -165,6 +168,29 @@ def split_bag1(content: bytes) -> tuple[bytes, list[Record]]:
 
 def join_bag1(start: bytes, records: Sequence[Record]) -> bytes:
     return start + b"".join(r.head + struct.pack("<I", len(r.body)) + r.body for r in records)
+
+
+def split_tlog(content: bytes) -> tuple[bytes, list[Record]]:
+    """Frames of MAVLink: time, head without the length, payload."""
+    records, at = [], 0
+    while at + 18 <= len(content):
+        head = {0xFE: 6, 0xFD: 10}[content[at + 8]]
+        size = content[at + 9]
+        records.append(Record(content[at : at + 9] + content[at + 10 : at + 8 + head], content[at + 8 + head :][:size]))
+        at += 8 + head + size + 2
+    return b"", records
+
+
+def join_tlog(start: bytes, records: Sequence[Record]) -> bytes:
+    out = [start]
+    for record in records:
+        body = record.body[:255]
+        frame = record.head[8:9] + bytes([len(body)]) + record.head[9:] + body
+        kind = int.from_bytes(frame[7:10], "little") if frame[0] == 0xFD else frame[5]
+        known = ardupilotmega.mavlink_map.get(kind)
+        extra = bytes([known.crc_extra]) if known is not None else b"\0"
+        out += [record.head[:8], frame, struct.pack("<H", x25crc(frame[1:] + extra).crc)]
+    return b"".join(out)
 
 
 _MCAP = b"\x89MCAP0\r\n"

@@ -44,6 +44,7 @@ def test_whole_files_are_read_and_damaged_ones_refused_in_words(name: str, tmp_p
         ("MATLAB, level 5", forged.split_matlab, forged.join_matlab),
         ("growing recording", forged.split_growing, forged.join_growing),
         ("ROS bag, first form", forged.split_bag1, forged.join_bag1),
+        ("telemetry (MAVLink)", forged.split_tlog, forged.join_tlog),
         ("MCAP", forged.split_mcap, forged.join_mcap),
     ],
 )

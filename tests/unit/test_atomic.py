@@ -317,3 +317,8 @@ def test_no_file_is_written_to_find_the_place_for_temporary_files(
     monkeypatch.setattr("tempfile.tempdir", None)
     monkeypatch.setenv("TMPDIR", str(tmp_path / "not there"))
     assert atomic.temporary_place() != str(tmp_path / "not there")
+    monkeypatch.setattr("tempfile.tempdir", None)
+    monkeypatch.setattr("tempfile._get_default_tempdir", lambda: os.listdir(tmp_path / "not there"))
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(WriteError, match="no folder for temporary files"):
+        atomic.temporary_place()
