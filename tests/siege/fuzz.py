@@ -21,6 +21,11 @@ SLICE = 240.0
 """s for a container at a time: then it is another process, which takes up the inputs that were kept."""
 
 
+def _named(name: str) -> str:
+    """A container's name as that of a file."""
+    return name.replace("/", "-")
+
+
 class Fuzz:
     """The campaign: the container that had the least time is next, until each has its inputs.
 
@@ -28,7 +33,8 @@ class Fuzz:
         names: of the containers.
         inputs: for each of them.
         seconds: after which no more is begun.
-        folder: where kept inputs, those that fell and the counts lie; a folder with counts is gone on with.
+        folder: where kept inputs, those that fell and the counts lie; a folder with counts is gone on with, and what
+            fell is tried again.
         workers: processes at a time.
         seed: other inputs.
     """
@@ -47,10 +53,11 @@ class Fuzz:
         folder.mkdir(parents=True, exist_ok=True)
         if self._kept.exists():
             before = json.loads(self._kept.read_text(encoding="utf-8"))
-            self.bad, self.contained = before["bad"], Counter(before["contained"])
+            self.contained = Counter(before["contained"])
             for name in before["counts"].keys() & self.counts.keys():
-                self.counts[name].update(before["counts"][name])
+                self.counts[name].update(before["counts"][name] | {"fell": 0})
                 self.spent[name] = before["spent"][name]
+        self._again = {name: fell for name in names if (fell := sorted((folder / "fell").glob(f"{_named(name)} *")))}
 
     def run(self) -> Found:
         threads = [threading.Thread(target=self._work) for _ in range(self.workers)]
@@ -63,9 +70,10 @@ class Fuzz:
     def _next(self) -> str | None:
         with self._lock:
             open_ = [n for n in self.names if n not in self._busy and self.counts[n]["inputs"] < self.inputs]
-            if not open_ or time.monotonic() > self.until:
+            again = [name for name in self._again if name not in self._busy]
+            if not again and (not open_ or time.monotonic() > self.until):
                 return None
-            name = min(open_, key=self.spent.__getitem__)
+            name = min(again or open_, key=self.spent.__getitem__)
             self._busy.add(name)
             return name
 
@@ -73,18 +81,20 @@ class Fuzz:
         while (name := self._next()) is not None:
             begun = time.monotonic()
             seconds = max(min(SLICE, self.until - begun), 1.0)
-            kept = self.folder / "kept" / name.replace("/", "-")
+            kept, again = self.folder / "kept" / _named(name), self._again.pop(name, [])
             kept.mkdir(parents=True, exist_ok=True)
             left = self.inputs - self.counts[name]["inputs"]
             seed = f"{self.seed * 1_000_000_007 + self.counts[name]['inputs']}"
             ended = subprocess.run(
-                [*FUZZED, name, seed, str(left), f"{seconds:g}", str(kept)],
+                [*FUZZED, name, seed, str(left), f"{seconds:g}", str(kept), *map(str, again)],
                 cwd=ROOT,
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(PLACES), "PYTHONHASHSEED": "0"},
                 capture_output=True,
                 timeout=3600.0,
                 check=False,
             )
+            for file in again:
+                file.unlink()
             with self._lock:
                 self._busy.discard(name)
                 self.spent[name] += time.monotonic() - begun
@@ -97,7 +107,7 @@ class Fuzz:
             if one["words"].startswith("contained: "):
                 self.contained[f"{name}: {one['words'].partition(': ')[2]}"] += 1
                 continue
-            fell = self.folder / "fell" / f"{name.replace('/', '-')} {hashlib.sha256(content).hexdigest()[:16]}"
+            fell = self.folder / "fell" / f"{_named(name)} {hashlib.sha256(content).hexdigest()[:16]}"
             fell.parent.mkdir(exist_ok=True)
             fell.write_bytes(content)
             self.bad.append(f"{name} ({fell.name.rpartition(' ')[2]}): {one['words']}")

@@ -1,6 +1,6 @@
 """The fuzzer's loop: one process feeds a container's parser in a child, and takes another child where that one ends.
 
-    python -m tests.siege.fuzzed NAME SEED INPUTS SECONDS KEPT
+    python -m tests.siege.fuzzed NAME SEED INPUTS SECONDS KEPT [AGAIN ...]
 
 An input with a new outcome joins those that are changed next, and lies in the folder KEPT. An outcome is new by the
 places of the code through which an error went, by what was read, and, at each 16th input, by the lines of Python that
@@ -23,7 +23,7 @@ import tempfile
 import time
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
@@ -134,12 +134,15 @@ class Loop:
         container: it.
         seed: other inputs.
         kept: folder of inputs with new outcomes.
+        again: inputs that come first.
         folder: for the file that is read.
     """
 
-    def __init__(self, name: str, container: Container, *, seed: int, kept: Path, folder: Path) -> None:
+    def __init__(
+        self, name: str, container: Container, *, seed: int, kept: Path, folder: Path, again: Sequence[bytes] = ()
+    ) -> None:
         self.name, self.container, self.kept, self.seed = name, container, kept, seed
-        self.path = folder / f"a{container.suffix}"
+        self.path, self.again = folder / f"a{container.suffix}", again
         self.counts = dict.fromkeys(COUNTS, 0)
         self.shared = mmap.mmap(-1, _HEAD.size + _ROOM)
         self.longest = 2 * max(map(len, container.whole)) + 2048
@@ -188,7 +191,8 @@ class Loop:
         resource.setrlimit(resource.RLIMIT_DATA, (had + MEMORY, had + MEMORY))
         while self.counts["inputs"] < inputs:
             self._say(0, b"")  # what hangs here is the loop's own
-            self._step(self._changed())
+            first = self.counts["inputs"] < len(self.again)
+            self._step(self.again[self.counts["inputs"]] if first else self._changed())
             if self.counts["inputs"] % 64 == 0 and time.monotonic() > until:
                 break
         self._say(0, b"")
@@ -248,13 +252,14 @@ OUT = sys.stdout
 
 
 def main() -> None:
-    name, seed, inputs, seconds, kept = sys.argv[1:]
+    name, seed, inputs, seconds, kept, *files = sys.argv[1:]
+    again = [Path(file).read_bytes() for file in files]
     sys.stdout = sys.stderr  # what a library prints is no answer
     warnings.simplefilter("ignore")
     fast = Path("/dev/shm")
     with tempfile.TemporaryDirectory(dir=fast if fast.is_dir() else None) as folder:
-        loop = Loop(name, CONTAINERS[name](), seed=int(seed), kept=Path(kept), folder=Path(folder))
-        print(json.dumps(loop.run(int(inputs), float(seconds))), file=OUT)
+        loop = Loop(name, CONTAINERS[name](), seed=int(seed), kept=Path(kept), folder=Path(folder), again=again)
+        print(json.dumps(loop.run(max(int(inputs), len(again)), float(seconds))), file=OUT)
 
 
 if __name__ == "__main__":

@@ -78,6 +78,10 @@ def test_the_fuzzer_adds_up_what_its_processes_tell(tmp_path: Path) -> None:
     assert found.rows[0][1] == found.rows[-1][1] == 300
     again = fuzz.Fuzz(["MATLAB, level 5"], inputs=300, seconds=60.0, folder=tmp_path, workers=1)
     assert again.run().rows == found.rows, "a folder with counts is gone on with"
+    (tmp_path / "fell").mkdir()
+    (tmp_path / "fell" / "MATLAB, level 5 fell before").write_bytes(b"no longer")
+    assert fuzz.Fuzz(["MATLAB, level 5"], inputs=300, seconds=60.0, folder=tmp_path).run().rows[0][1] == 301
+    assert list((tmp_path / "fell").iterdir()) == []
 
 
 def _dying(content: bytes, path: Path) -> object:
