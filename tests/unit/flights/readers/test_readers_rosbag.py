@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 from typing import Any
@@ -160,3 +161,36 @@ def test_without_rosbags_the_error_says_how_to_get_it(tmp_path: Path, monkeypatc
     monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(MissingLibraryError, match=r"needs the library rosbags,.*pip install 'swashplate\[logs\]'"):
         read(bag)
+
+
+_RUNS = "open('ran', 'w')"
+
+
+@pytest.mark.parametrize(
+    "definition",
+    [
+        "float64 data",
+        f"float64 data\n{_RUNS}",
+        f"float64 data\nfloat64 a: {_RUNS}",
+        f"float64 data\nfloat64 a;{_RUNS}",
+        f"float64 data\nstring A='; {_RUNS}; '",
+        f"float64 data\nstring A={_RUNS}",
+        f"float64 data\nstring a \"'''; {_RUNS}; '''\"",
+        f"float64 data\nfloat64[{_RUNS}] a",
+        f'float64 data\n# """\n{_RUNS}\n"""',
+        f'float64 data\n"""\n{_RUNS}',
+        f"float64 data\n{'=' * 80}\nMSG: a/B'] = {_RUNS} #\nfloat64 x",
+        f"float64 data\na/{_RUNS} x",
+        "float64 data\nfloat64 __class__\nfloat64 lambda\nstring import",
+    ],
+)
+def test_no_code_in_a_bags_own_words_for_its_messages_runs(definition: str, tmp_path: Path) -> None:
+    """rosbags writes Python code from them, and compiles it; the process works in the bag's folder."""
+    path = tmp_path / "a.bag"
+    with Writer1(path) as writer:
+        connection = writer.add_connection("/a", "std_msgs/msg/Float64", msgdef=definition, md5sum="0" * 32)
+        for k in range(3):
+            writer.write(connection, BEGIN + k * 10_000_000, np.float64(k).tobytes())
+    with contextlib.suppress(FlightError):
+        read(path)
+    assert not (tmp_path / "ran").exists()
