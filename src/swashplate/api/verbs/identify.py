@@ -138,7 +138,7 @@ class Identify(FromConditioned["Identification | LinearStudy"]):
     starts: int = setting(default=4, help="number of starting points", least=1)
     seed: int = setting(default=0, help="seed of the starting points", least=0)
     gusts: str | None = setting(
-        default=None, help="of filter-error in time: white (usual) or lasting, in the air of u, v, w"
+        default=None, help="of filter-error in time: white (usual) or lasting, in the air of u, v, w or on p, q, r"
     )
     biases: Names = setting(default=(), help="outputs with a constant bias in each record, in time")
     shifts: bool = setting(default=True, help="estimate constants in the states' rates, in time")

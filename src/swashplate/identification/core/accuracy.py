@@ -95,6 +95,41 @@ def corrected_covariance(
     return np.asarray(plain @ middle @ plain)
 
 
+def covariance_by_octaves(
+    plain: Array, rest: Array, whitened: Sequence[Array], sensitivities: Sequence[Array]
+) -> Array:
+    """Bound that allows for errors which hold together over half an octave, as those of what a model lacks do.
+
+        Sigma = M^-1 [ sum_b g_b g_b' ] M^-1,    g_b = sum_{w in band b} S(w)* R^-1/2 v(w)
+
+    with the pull of every band on the parameters, of all records together (clusters of Liang and Zeger 1986). What
+    pulls the same way in every band goes into the parameters, and no residual tells it. Arguments: as in
+    `corrected_covariance`.
+    """
+    pulls: dict[int, Array] = {}
+    for residual, piece in zip(whitened, sensitivities, strict=True):
+        n = len(residual)
+        share = np.full(n // 2 + 1, 2.0 / n)  # of both signs of a frequency (Parseval)
+        share[0] = 1.0 / n
+        if n % 2 == 0:
+            share[-1] = 1.0 / n
+        moved = rfft(piece, axis=1).conj() * share[None, :, None]
+        by_line = np.einsum("pkm,km->kp", moved, rfft(residual, axis=0)).real
+        band = np.floor(2.0 * np.log2(np.maximum(np.arange(len(share)), 1.0) / n)).astype(int)
+        for b in np.unique(band):
+            pulls[b] = pulls.get(b, np.zeros(len(plain))) + by_line[band == b].sum(axis=0)
+    together = np.array(list(pulls.values()))
+    return np.asarray(plain @ (together.T @ together + rest) @ plain)
+
+
+def covering(covariance: Array, *others: Array) -> Array:
+    """A covariance with the same correlations whose variances are the largest of all."""
+    own = np.diag(covariance)
+    largest = np.max([own, *map(np.diag, others)], axis=0)
+    stretch = np.sqrt(np.divide(largest, own, out=np.ones_like(own), where=own > 0.0))
+    return np.asarray(covariance * np.outer(stretch, stretch))
+
+
 def information_beyond(covariance: Array, prior: Array) -> Array:
     """The information in a covariance (p, p) that the priors (p, p) had not; nothing where they had more."""
     stretch, turn = np.linalg.eigh(np.linalg.pinv(covariance, hermitian=True) - prior)

@@ -5,8 +5,8 @@ innovations have, and the steady Kalman filter of both gives the gain (Maine and
 That is n unknowns where a free gain has n m. As in Jategaonkar's program the innovations count by their variances,
 without cross-correlations: on his HFB-320 the covariance that the filter predicts gives a pitch damping 30 % lower.
 
-`GustErrors`: the air itself moves, for some seconds at a time, and acts wherever the body's velocity does. Gusts that
-last, taken for white, bias the parameters by many times their bounds.
+`GustErrors`: the air itself moves, for some seconds at a time, and acts wherever the body's velocity does, or on the
+rates where a model has no velocity. Gusts that last, taken for white, bias the parameters by many times their bounds.
 """
 
 from __future__ import annotations
@@ -25,6 +25,9 @@ from swashplate.models.linear.state_space import StateSpaceModel
 
 VELOCITIES = ("u", "v", "w")
 """States that are velocities through the air."""
+
+RATES = ("p", "q", "r")
+"""Rates that the air turns where a model has no velocity."""
 
 _LASTS, _MOVES, _SHAKES, _READS = 1.0, 0.3, 0.003, 0.03
 """First guesses: seconds that a gust lasts; of the air, of other white noise and of the sensors' noise, as shares of a
@@ -59,11 +62,12 @@ class GustErrors(FilterErrors):
 
     @staticmethod
     def suits(model: StateSpaceModel) -> bool:
-        """Whether the model has a velocity through the air."""
-        return not set(VELOCITIES).isdisjoint(model.states)
+        """Whether the model has a velocity through the air, or a rate."""
+        return not {*VELOCITIES, *RATES}.isdisjoint(model.states)
 
     def _air(self) -> tuple[str, ...]:
-        return tuple(f"air {s}" for s in self.model.states if s in VELOCITIES)
+        moving = [s for s in self.model.states if s in VELOCITIES] or [s for s in self.model.states if s in RATES]
+        return tuple(f"air {s}" for s in moving)
 
     def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
         moving = [name.split()[1] for name in self._air()]
@@ -82,7 +86,9 @@ class GustErrors(FilterErrors):
     def _matrices(self, numbers: Batch) -> tuple[Any, Any, Any, Any, Any]:
         a, b, c, d, h1 = super()._matrices(numbers)
         air = self._air()
-        felt = -a[:, [self.model.states.index(name.split()[1]) for name in air]]
+        places = [self.model.states.index(name.split()[1]) for name in air]
+        turned = np.eye(len(a))[:, places]  # without a velocity the air pushes at the rates themselves
+        felt = np.where([name.split()[1] in RATES for name in air], turned, -a[:, places])
         fading = np.diag([-np.exp(-numbers[self._place[f"fading {name.split()[1]}"]]) for name in air])
         return (
             np.block([[a, felt], [np.zeros((len(air), len(a))), fading]]),

@@ -23,7 +23,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record, uniform_table
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.estimators import GAINS, Question
-from swashplate.identification.time.linear_filter import VELOCITIES, FilterErrors, GustErrors
+from swashplate.identification.time.linear_filter import RATES, VELOCITIES, FilterErrors, GustErrors
 from swashplate.identification.time.linear_likelihood import LinearErrors
 from swashplate.identification.time.record_fit import RecordEstimator, RecordProblem
 from swashplate.models.linear.expressions import Expression
@@ -85,7 +85,7 @@ def _likelihood_of(model: StateSpaceModel, method: str, gusts: str | None) -> ty
         raise IdentificationError(f"is '{gusts}', expected white or lasting.", channel="gusts")
     if gusts == "lasting" and not GustErrors.suits(model):
         raise IdentificationError(
-            f"'{model.name}' has no velocity through the air ({', '.join(VELOCITIES)}) that lasting gusts act on.",
+            f"'{model.name}' has no velocity or rate ({', '.join((*VELOCITIES, *RATES))}) that lasting gusts act on.",
             channel="gusts",
             hint="Choose white gusts, or method prediction-error: its free gain knows any.",
         )

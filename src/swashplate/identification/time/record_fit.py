@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -82,6 +82,10 @@ class RecordProblem(Generic[Model]):
     around: bool = False
 
 
+_WHITE = (0.85, 1.2)
+"""Ratios of a parameter's standard deviations, by coloured over by white errors, that a record's chance explains."""
+
+
 @dataclass(frozen=True)
 class Solved:
     """Where a likelihood has its optimum, or its errors some time ahead.
@@ -92,6 +96,7 @@ class Solved:
         plain, corrected: covariances of the moved entries in their units (p, p).
         row: the entries that moved last.
         whole: the likelihood's row where the search ended.
+        colour: standard deviation of each parameter by the errors' autocorrelation, over that of white errors.
     """
 
     numbers: Mapping[str, float]
@@ -100,6 +105,7 @@ class Solved:
     corrected: Array
     row: Row
     whole: Array
+    colour: Array = field(default_factory=lambda: np.ones(1))
 
 
 def fit(
@@ -159,7 +165,7 @@ def fit(
         converged=optimum.converged,
         problems=(*problems, *scale_words(data)),
         failed=bool(problems),
-        warnings=(*_words(free, optimum), *problem.words(estimates)),
+        warnings=(*_words(free, optimum), *_colour_words(method, solved.colour), *problem.words(estimates)),
         directions=accuracy.blind_directions(row.names[:k], marginal),
         constants=tuple(_constants(solved, likelihood.records, spread, k)),
         comparisons=likelihood.comparisons(solved.whole),
@@ -186,12 +192,17 @@ def _solved(problem: RecordProblem[Any], solver: Solver, horizon: Horizon | None
     plain = np.asarray(np.linalg.pinv(optimum.information + known, hermitian=True), dtype=np.float64)
     lags = round(LAGS / likelihood.records[0].dt)
     white, sensitivities, rest = likelihood.whitened(optimum.row)
-    corrected = accuracy.corrected_covariance(plain, rest + known, white, sensitivities, lags=lags)
+    coloured = accuracy.corrected_covariance(plain, rest + known, white, sensitivities, lags=lags)
+    own, coloured_own = (np.diag(c)[row.places("parameter")] for c in (plain, coloured))
+    colour = np.sqrt(np.divide(coloured_own, own, out=np.ones_like(own), where=own > 0.0))
+    by_octaves = accuracy.covariance_by_octaves(plain, rest + known, white, sensitivities)
+    corrected = accuracy.covering(coloured, plain, by_octaves)
     if horizon is not None:
-        return _solved_ahead(likelihood, optimum, horizon, corrected, replace(solver, around=False))
+        ahead = _solved_ahead(likelihood, optimum, horizon, corrected, replace(solver, around=False))
+        return replace(ahead, colour=colour)
     units = np.outer(row.scale, row.scale)
     named = dict(zip(row.names, map(float, _numbers(row, likelihood.sized(optimum.row))), strict=True))
-    return Solved(named, optimum, plain * units, corrected * units, row, optimum.row)
+    return Solved(named, optimum, plain * units, corrected * units, row, optimum.row, colour)
 
 
 def _solved_ahead(likelihood: OwnCovariance, first: Optimum, horizon: Horizon, known: Array, solver: Solver) -> Solved:
@@ -231,6 +242,17 @@ def _problems(row: Row, optimum: Optimum, k: int) -> tuple[str, ...]:
         if not (np.isfinite(value) and entry.lower - 1e-12 <= value <= entry.upper + 1e-12):
             problems.append(f"{entry.name} = {value:.4g} is not physical (allowed: {entry.lower:g} to {entry.upper:g})")
     return tuple(problems)
+
+
+def _colour_words(method: str, colour: Array) -> tuple[str, ...]:
+    """Whether the errors of a filter have the colour that its noise denies them: then its estimates are biased."""
+    if method == "output-error" or bool(np.all((_WHITE[0] < colour) & (colour < _WHITE[1]))):
+        return ()
+    return (
+        f"the filter's errors are not white: their autocorrelation makes bounds {colour.min():.2f} to "
+        f"{colour.max():.2f} times as wide as white errors would. Gusts that last are such noise, and shift the "
+        "estimates of this method. Compare with method output-error, or with filter-error and gusts=lasting.",
+    )
 
 
 def _words(parameters: Sequence[Estimate], optimum: Optimum) -> tuple[str, ...]:

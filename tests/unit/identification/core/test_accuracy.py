@@ -171,3 +171,47 @@ def test_numbers_within_two_standard_deviations_of_zero_are_named_and_no_others(
     many = [replace(estimates[0], name=f"X{k}") for k in range(8)]
     assert "X5" in accuracy.sign_words(many)[0]
     assert "and 2 more" in accuracy.sign_words(many)[0]
+
+
+def test_errors_that_hold_over_half_an_octave_are_covered() -> None:
+    """A regression whose errors follow the regressor band by band: the estimate scatters as the bound by octaves says.
+
+    The autocorrelation cannot tell them: they are as white in sum as sensor noise is.
+    """
+    rng = np.random.default_rng(3)
+    n, errors, bounds, white = 1024, [], [], []
+    frequency = np.fft.rfftfreq(n)
+    band = np.floor(2.0 * np.log2(np.maximum(frequency, 1.0 / n))).astype(int)
+    for _ in range(150):
+        spectrum = np.exp(2j * np.pi * rng.random(frequency.size)) / np.sqrt(np.maximum(frequency, 1.0 / n))
+        spectrum[0] = 0.0  # a sweep has as much in every octave
+        regressor = np.fft.irfft(spectrum, n)
+        off = dict(zip(np.unique(band), 0.3 * rng.standard_normal(np.unique(band).size), strict=True))
+        lacking = np.fft.irfft(spectrum * np.array([off[b] for b in band]), n)
+        noise = 0.1 * regressor.std() * rng.standard_normal(n)
+        errors.append(float(regressor @ (lacking + noise) / (regressor @ regressor)))
+        left = (lacking + noise - errors[-1] * regressor) / (lacking + noise).std()
+        S = (regressor / (lacking + noise).std())[None, :, None]
+        plain = np.linalg.inv(np.einsum("pnm,qnm->pq", S, S))
+        found = accuracy.covariance_by_octaves(plain, np.zeros((1, 1)), [left[:, None]], [S])
+        bounds.append(float(np.sqrt(found[0, 0])))
+        white.append(float(np.sqrt(plain[0, 0])))
+    assert 0.8 < np.std(errors) / np.sqrt(np.mean(np.square(bounds))) < 1.3
+    assert np.std(errors) > 2.0 * np.sqrt(np.mean(np.square(white)))
+
+
+def test_white_errors_have_the_plain_bound_by_octaves_too() -> None:
+    rng = np.random.default_rng(4)
+    S = rng.standard_normal((2, 4096, 2))
+    plain = np.linalg.inv(np.einsum("pnm,qnm->pq", S, S))
+    ratios = [
+        np.diag(accuracy.covariance_by_octaves(plain, np.zeros((2, 2)), [rng.standard_normal((4096, 2))], [S]))
+        / np.diag(plain)
+        for _ in range(200)
+    ]
+    np.testing.assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.15)
+
+
+def test_what_covers_has_the_largest_variances_and_the_first_correlations() -> None:
+    first, other = np.array([[4.0, 1.0], [1.0, 9.0]]), np.diag([16.0, 1.0])
+    np.testing.assert_allclose(accuracy.covering(first, other), [[16.0, 2.0], [2.0, 9.0]])
