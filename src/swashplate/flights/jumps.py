@@ -38,7 +38,8 @@ _INERTIAL = (*RATES, "ax", "ay", "az")
 _OTHERS = ("_imu2", "_imu3")
 """Ends of the channels of other sensors than the first."""
 _FELT = 2
-"""Other quantities of the inertial sensors that jump with one of them where the aircraft is shaken."""
+"""Other channels of the inertial sensors that jump with one of them where the aircraft is shaken: two quantities, or
+one that two sensors feel, as at a touch-down."""
 _DERIVATIVES: Mapping[str, int] = {
     **dict.fromkeys((*VELOCITY, "vx", "vy", "vz"), 1),
     **dict.fromkeys((*POSITION, *ATTITUDE, "attitude"), 2),
@@ -183,4 +184,4 @@ def _shaken(name: str, at: float, reach: float, felt: Mapping[str, Array]) -> bo
     if own not in _INERTIAL:
         return bool(together)
     again = any(_base(other) == own and other.endswith(_OTHERS) != name.endswith(_OTHERS) for other in together)
-    return again or len({_base(other) for other in together} - {own}) >= _FELT
+    return again or sum(_base(other) != own for other in together) >= _FELT

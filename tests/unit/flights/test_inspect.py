@@ -150,6 +150,15 @@ def test_a_loops_command_may_spike_where_the_mode_changes_and_nowhere_else() -> 
         assert inspect(replace(flight, provenance=provenance)).problems == problems
 
 
+def test_a_touch_down_that_two_accelerometers_feel_is_no_outlier_of_the_yaw_rate() -> None:
+    turning, down = (0.001 * np.sin(np.arange(N)) for _ in range(2))
+    turning[100] -= 1.5
+    down[100] -= 30.0
+    felt = inspect(_flight(r=turning, az=down, az_imu2=down + 1e-4 * np.cos(np.arange(N)))).problems
+    assert not any("r: 2" in text or "2 in r" in text for text in felt)
+    assert any("2 in r" in text for text in inspect(_flight(r=turning, az=down)).problems)
+
+
 def test_a_command_may_step_but_not_spike_and_not_leave_its_range() -> None:
     stepped, spiked, wild = (0.001 * np.sin(np.arange(N)) for _ in range(3))
     stepped[100:200] += 0.2
