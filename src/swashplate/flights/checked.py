@@ -28,6 +28,6 @@ def checked(flight: Flight, used: Collection[str] | None = None) -> Flight:
         flight, whole = flight.with_streams({home: data for home, data in kept.items() if data.data_vars}), flight
     else:
         whole = flight
-    told += [Problem(text) for text in problems(flight)]
+    told += [Problem(text) for text in problems(flight, whole)]
     before = whole.provenance.problems
     return replace(whole, provenance=replace(whole.provenance, problems=tuple(dict.fromkeys((*before, *told)))))

@@ -227,12 +227,14 @@ def _shared_problems(channels: Sequence[ChannelSummary], jumps: Mapping[str, int
     return problems
 
 
-def _looked(flight: Flight) -> tuple[tuple[StreamSummary, ...], tuple[ChannelSummary, ...]]:
+def _looked(
+    flight: Flight, beside: Flight | None = None
+) -> tuple[tuple[StreamSummary, ...], tuple[ChannelSummary, ...]]:
     """Every stream and every channel of a flight without impossible numbers, which are counted."""
     switched = np.sort([event.time for event in flight.provenance.events if event.kind == "mode"])
     streams = tuple(time_base(name, data, switched) for name, data in flight.streams.items())
     flight, impossible = _without_impossible(flight)
-    outliers = jumps(flight)
+    outliers = jumps(flight, beside)
     labels = {channel: name for name, group in attitudes(flight).items() for channel in group}
     channels = tuple(
         _summarise_channel(
@@ -251,9 +253,9 @@ def _told(flight: Flight, streams: Sequence[StreamSummary], channels: Sequence[C
     return told + _shared_problems(channels, outliers)
 
 
-def problems(flight: Flight) -> tuple[str, ...]:
-    """What is wrong with a flight's streams and channels, each by itself, in words."""
-    return tuple(_told(flight, *_looked(flight)))
+def problems(flight: Flight, beside: Flight | None = None) -> tuple[str, ...]:
+    """What is wrong with a flight's streams and channels, each by itself, in words (`beside`: as of `jumps`)."""
+    return tuple(_told(flight, *_looked(flight, beside)))
 
 
 def inspect(flight: Flight) -> Inspection:

@@ -58,20 +58,27 @@ def attitudes(flight: Flight) -> dict[str, tuple[str, ...]]:
     return {name: group for name, group in whole.items() if len({flight.stream_of(each) for each in group}) == 1}
 
 
-def jumps(flight: Flight) -> dict[str, int]:
-    """How many jumps a channel or an attitude has, of those that have some. A spike is two: there and back."""
+def jumps(flight: Flight, beside: Flight | None = None) -> dict[str, int]:
+    """How many jumps a channel or an attitude has, of those that have some. A spike is two: there and back.
+
+    Args:
+        beside: whose inertial sensors tell of a shaken aircraft too, where `flight` is a part of it.
+    """
     groups = attitudes(flight)
     grouped = {channel for group in groups.values() for channel in group}
     changes = {name: _turns(flight, group) for name, group in groups.items()}
     changes |= {name: _steps(flight, name) for name in flight.channels if name not in grouped}
-    outstanding = {name: np.any([_stands_out(row) for row in rows], axis=0) for name, (_, rows) in changes.items()}
+    others = () if beside is None else (n for n in beside.channels if _base(n) in _INERTIAL and n not in changes)
+    known = changes | {name: _steps(beside, name) for name in others if beside is not None}
+    outstanding = {name: np.any([_stands_out(row) for row in rows], axis=0) for name, (_, rows) in known.items()}
     felt = {
         name: time[1:][outstanding[name]]
-        for name, (time, _) in changes.items()
+        for name, (time, _) in known.items()
         if _base(name) in _INERTIAL and outstanding[name].any()
     }
     counts = {}
-    for name, out in outstanding.items():
+    for name in changes:
+        out = outstanding[name]
         if out.any():
             told = out & _impossible(changes[name], "attitude" if name in groups else _base(name))
             if name not in groups:

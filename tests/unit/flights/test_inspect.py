@@ -12,6 +12,7 @@ from rich.console import Console
 
 from swashplate.control.laws.hold import hover_hold
 from swashplate.errors import FlightError
+from swashplate.flights.checked import checked
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.inspect import inspect
 from swashplate.flights.provenance import Event, Provenance
@@ -157,6 +158,10 @@ def test_a_touch_down_that_two_accelerometers_feel_is_no_outlier_of_the_yaw_rate
     felt = inspect(_flight(r=turning, az=down, az_imu2=down + 1e-4 * np.cos(np.arange(N)))).problems
     assert not any("r: 2" in text or "2 in r" in text for text in felt)
     assert any("2 in r" in text for text in inspect(_flight(r=turning, az=down)).problems)
+    whole = _flight(az=down, az_imu2=down + 1e-4 * np.cos(np.arange(N)), r=turning, p=turning)
+    for name in ("az", "r"):  # what a work needs is judged beside what the others felt
+        assert checked(whole, used=[name]).provenance.problems == ()
+    assert checked(_flight(az=down), used=["az"]).provenance.problems != ()
 
 
 def test_a_command_may_step_but_not_spike_and_not_leave_its_range() -> None:
