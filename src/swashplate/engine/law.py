@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swashplate.atomic import scratch_folder
 from swashplate.engine.graph import Graph
 from swashplate.engine.template import filled
+from swashplate.errors import WriteError
 
 REFERENCES = ("x", "y", "z", "psi", "ahead", "right", "roll", "pitch")
 """What a controller is asked for, in the order of the reference row: place [m] and heading [rad] to hold, speed ahead
@@ -67,13 +68,21 @@ def print_function(function: Graph, real: str) -> tuple[str, dict[str, int]]:
     Args:
         function: any.
         real: "double" or "float".
+
+    Raises:
+        WriteError: where it cannot be written to the folder for temporary files, which CasADi prints into.
     """
     import casadi
 
     with scratch_folder() as folder:
         made = casadi.CodeGenerator("traced.c", {"casadi_real": real, "casadi_int": "int"})
         made.add(function)
-        printed = Path(made.generate(f"{folder}/")).read_text(encoding="utf-8")
+        try:
+            printed = Path(made.generate(f"{folder}/")).read_text(encoding="utf-8")
+        except (RuntimeError, OSError) as error:  # CasADi says no more than that it has no stream
+            raise WriteError(
+                "CasADi's code cannot be written there.", where=folder.parent, hint="Check the folder and the disk."
+            ) from error
     calls = {name: len(re.findall(rf"(?<![\w]){name}\(", printed)) for name in ("sin", "cos", "sqrt", "atan2")}
     for name, own in _OWN.items():
         printed = printed.replace(f"return {name};", f"return {own};")
