@@ -6,6 +6,7 @@ import csv
 import json
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ import pytest
 import chromium
 import swashplate as sp
 from flown_here import World
+from swashplate.api.verbs.export import ExportModel
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.web.libraries import PAGE
@@ -149,6 +151,26 @@ def test_a_recording_is_a_log(browser: Any, tmp_path: Path) -> None:
     assert not chromium.complaints(said)
 
 
+def test_the_flight_it_was_learnt_from_flies_beside_it(browser: Any, tmp_path: Path) -> None:
+    coax = sp.vehicle("coax")
+    flight = sp.simulate_maneuver(coax, "doublet:roll,0.5s,0.1", controller=sp.autopilot, tail=4)
+    flight.save(tmp_path / "flight.nc")
+    ExportModel("coax", "web", out=tmp_path, flight=tmp_path / "flight.nc").answer()
+    page, said = opened(browser, tmp_path / "coax.html")
+    page.locator("#logged").check()
+    wait_until(page, "swash.now.logged && swash.now.t > 1.5 && swash.scene.crafts.logged")
+    now = page.evaluate("({ x: swash.now.logged.x, t: swash.now.t, from: swash.connection.flight.loggedFrom })")
+    north, east, down, ticks = now["from"]
+    at = flight.time("phi")[0] + now["t"] - 0.01 * ticks
+    expected = [np.interp(at, flight.time(name), flight.values(name)) for name in ("x", "y", "z", "phi")]
+    found = [now["x"][0] - north, now["x"][1] - east, now["x"][2] - down, now["x"][6]]
+    np.testing.assert_allclose(found, expected, atol=3e-3)
+    assert page.evaluate("swash.charts.charts[0].data.at(-1).at(-1) !== null"), "dashed in the charts"
+    page.locator("#logged").uncheck()
+    wait_until(page, "!swash.now.logged && !swash.scene.crafts.logged")
+    assert not chromium.complaints(said)
+
+
 def test_draws_fly_beside_it(browser: Any, tmp_path: Path) -> None:
     coax = sp.vehicle("coax")
     heavier = [coax.with_values({"mass": coax.card.values()["mass"] * share}) for share in (0.95, 1.05)]
@@ -159,3 +181,51 @@ def test_draws_fly_beside_it(browser: Any, tmp_path: Path) -> None:
     own, (light, heavy) = page.evaluate("[swash.now.own.x[2], swash.now.fan.x.map(x => x[2])]")
     assert light < own < heavy, json.dumps([light, own, heavy])  # down is positive: the heavier one sinks
     assert not chromium.complaints(said)
+
+
+def test_a_hostile_card_is_shown_as_text(browser: Any, tmp_path: Path) -> None:
+    hostile = "</script><img src=x onerror='window.caught = 1'><script>window.caught = 2</script>&\"'"
+    coax = sp.vehicle("coax")
+    mass = replace(coax.card.parameters["mass"], source=hostile)
+    card = replace(coax.card, title=hostile, trust=hostile, parameters={**coax.card.parameters, "mass": mass})
+    (file,) = sp.export_model(coax.with_card(card), "web", name="coax").save(tmp_path)
+    page, said = opened(browser, file)
+    assert page.evaluate("window.caught") is None
+    assert page.locator("#title").text_content() == hostile
+    assert hostile in page.locator("#trust").text_content()
+    assert page.locator("details td", has_text="onerror").count() == 1
+    assert page.evaluate("document.images.length") == 0
+    assert not chromium.complaints(said)
+
+
+def test_the_page_s_policy_stops_what_is_put_into_it(browser: Any, tmp_path: Path) -> None:
+    """No evaluation, no script of another text, nothing fetched: tried from inside."""
+    (file,) = sp.export_model("coax", "web").save(tmp_path)
+    page, _ = opened(browser, file)
+    tried = page.evaluate("""async () => {
+      const refused = [];
+      document.addEventListener("securitypolicyviolation", (event) => refused.push(event.effectiveDirective));
+      const script = document.createElement("script");
+      script.textContent = "window.caught = 1";
+      document.body.append(script);
+      const button = document.createElement("button");
+      button.setAttribute("onclick", "window.caught = 2");
+      document.body.append(button);
+      button.click();
+      const fetched = await fetch("data:text/plain,x").then(() => "fetched", () => "refused");
+      const image = new Image();
+      image.src = "http://127.0.0.1:9/x.png";
+      await new Promise((done) => setTimeout(done, 300));
+      return { caught: window.caught ?? null, fetched, refused };
+    }""")
+    assert (tried["caught"], tried["fetched"]) == (None, "refused")
+    assert {"script-src-elem", "script-src-attr", "connect-src", "img-src"} <= set(tried["refused"])
+
+
+def test_a_browser_without_webassembly_says_so(browser: Any, tmp_path: Path) -> None:
+    (file,) = sp.export_model("coax", "web").save(tmp_path)
+    page = browser.new_context(offline=True).new_page()
+    page.add_init_script("delete window.WebAssembly")
+    page.goto(file.as_uri())
+    page.locator("#trouble").wait_for(state="visible")
+    assert "This browser lacks WebAssembly" in page.locator("#trouble").text_content()

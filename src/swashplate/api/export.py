@@ -13,6 +13,7 @@ from swashplate.export.control_json import read_linear
 from swashplate.export.controller_c import controller_code
 from swashplate.export.formats import Export, Model
 from swashplate.export.matlab import read_matlab
+from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.controller import Controller
@@ -44,6 +45,7 @@ def export_model(
     delays: bool | None = None,
     controller: Controller | str | Path | None = None,
     draws: Sequence[Vehicle] = (),
+    flight: Flight | None = None,
 ) -> Export:
     """A vehicle or a linear model in another program's format; `.save(folder)` writes it.
 
@@ -56,6 +58,7 @@ def export_model(
         delays: take along a vehicle's identified input delays; where the card knows them if None.
         controller: what flies it on the page of "web", or its file; the page's own pilot where None.
         draws: models that a fit cannot tell from it (`fit.draw(5)`), which fly beside it on that page.
+        flight: that it was learnt from, as logged: it replays beside the model there.
 
     Raises:
         ExportError: where the format cannot hold the model, CasADi is missing, or the compiler refuses the sources.
@@ -73,6 +76,7 @@ def export_model(
         delays=delays,
         controller=flown,
         draws=draws,
+        flight=flight,
     )
 
 

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from swashplate.errors import ExportError
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.errors import ExportError, FlightError
 from swashplate.export.formats import Export, ExportRequest
-from swashplate.links.live.single_page import single_page
+from swashplate.flights.flight import Flight
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.links.live.replay import flight_at
+from swashplate.links.live.single_page import LOGGED_RATE, single_page
 from swashplate.links.live.world import World
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 
 MOST_DRAWS = 20
+LONGEST_LOGGED = 180.0
+"""Seconds of a flight that a page takes along."""
 
 
 def web(request: ExportRequest) -> Export:
@@ -29,10 +37,12 @@ def web(request: ExportRequest) -> Export:
     if len(request.draws) > MOST_DRAWS:
         raise ExportError(f"is {len(request.draws)}, expected {MOST_DRAWS} at most.", channel="draws")
     world = World(model, controller=request.controller, draws=request.draws)
+    logged, left = (None, "") if request.flight is None else beside(request.flight)
     late = {name: delay for name, delay in (request.late or {}).items() if delay}
     not_flown = ", ".join(f"{name} {1e3 * delay:.3g} ms" for name, delay in late.items())
-    page = single_page(world, name=request.name, made=request.origin)
+    page = single_page(world, name=request.name, made=request.origin, logged=logged)
     drawn = f"; {len(request.draws)} models drawn from the fit" if request.draws else ""
+    drawn += f"; {request.flight.provenance.source or 'the flight'}{left}" if request.flight is not None else ""
     inside = f"the equations and numbers of {model.name}, its card's sources, {world.pilot.title}{drawn}"
     return Export(
         {f"{request.name}.html": page.encode()},
@@ -41,3 +51,24 @@ def web(request: ExportRequest) -> Export:
             *((f"The page's pilot flies without the identified delays ({not_flown}).",) if not_flown else ()),
         ),
     )
+
+
+def beside(flight: Flight) -> tuple[Array, str]:
+    """Body states of a flight at `LOGGED_RATE` that a page shows, shape (n, 12), and what of it was cut, in words.
+
+    Raises:
+        FlightError: where its place, velocity, attitude or rates are missing.
+    """
+    clean = flight.provenance.simulated and "phi" in flight
+    shown = flight.condition(rate=100.0, outliers=not clean, trim_ground=not clean)
+    if missing := [name for name in PREDICTED if name not in shown]:
+        raise FlightError(
+            f"lacks {', '.join(missing)}.",
+            where=flight.provenance.source,
+            channel="flight",
+            hint="Beside a model flies what has place and attitude at least.",
+        )
+    begun, end = (float(shown.time("phi")[k]) for k in (0, -1))
+    time = np.arange(begun, min(end, begun + LONGEST_LOGGED), 1.0 / LOGGED_RATE)
+    cut = f", its first {LONGEST_LOGGED:g} s of {end - begun:.0f}" if end - begun > LONGEST_LOGGED else ""
+    return flight_at(shown, time), cut

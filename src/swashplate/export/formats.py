@@ -12,6 +12,7 @@ from swashplate.engine.c_text import Precision, identifier
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear, logged_delays, of_state_space, of_vehicle
 from swashplate.export.origin import origin_of
+from swashplate.flights.flight import Flight
 from swashplate.models.delays import input_delays
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -119,6 +120,7 @@ class ExportRequest:
         controller: what flies it where the format is flown; None for the page's own.
         draws: models that a fit cannot tell from it, for formats that show them.
         origin: commit, card and data that it was made from, a line each.
+        flight: that it was learnt from, for formats that show it.
     """
 
     model: Model
@@ -129,6 +131,7 @@ class ExportRequest:
     controller: Controller | None = None
     draws: tuple[Vehicle, ...] = ()
     origin: tuple[str, ...] = ()
+    flight: Flight | None = None
 
     def linear(self) -> Linear:
         """The model as matrices."""
@@ -166,6 +169,7 @@ def export_model(
     delays: bool | None = None,
     controller: Controller | None = None,
     draws: Sequence[Vehicle] = (),
+    flight: Flight | None = None,
 ) -> Export:
     """A vehicle or a linear model in another program's format.
 
@@ -180,6 +184,7 @@ def export_model(
             card knows it. A linear model has its own, unless they are not to be taken along (False).
         controller: what flies it on the page of "web"; its own pilot where None.
         draws: models that a fit cannot tell from it (`fit.draw(5)`), which fly beside it on that page.
+        flight: that it was learnt from, which flies beside it there too.
 
     Raises:
         ExportError: where the format cannot hold the model, CasADi is missing, or the compiler refuses the sources.
@@ -190,8 +195,10 @@ def export_model(
         raise ExportError(f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join(FORMATS)}.")
     if precision != "double" and form != "c":
         raise ExportError(f"numbers of '{form}' are double.", channel="--precision", hint="It is for --format c.")
-    if (controller or draws) and form != "web":
-        raise ExportError(f"'{form}' holds no controller and no drawn models.", channel="--format", hint="web does.")
+    if (controller or draws or flight) and form != "web":
+        raise ExportError(
+            f"'{form}' holds no controller, no drawn models and no flight.", channel="--format", hint="web does."
+        )
     flying = model if isinstance(model, Vehicle) and model.structure is None else None
     late, left_out, about, origin = None, "", trim, origin_of(model)
     if flying is None:
@@ -211,7 +218,7 @@ def export_model(
             left_out = f"Left out: the identified delays of the inputs ({told})."
         about = trim or find_trim(flying)
     called = identifier(name)
-    made = FORMATS[form](ExportRequest(model, called, about, late, precision, controller, tuple(draws), origin))
+    made = FORMATS[form](ExportRequest(model, called, about, late, precision, controller, tuple(draws), origin, flight))
     return replace(made, notes=(*made.notes, left_out)) if left_out else made
 
 

@@ -26,7 +26,7 @@ from swashplate.compiler import STRICT, compiler, shared_library, web_compiler
 from swashplate.engine.equations import parameter_row
 from swashplate.engine.fly import FlightPlan, fly
 from swashplate.export.control_json import read_linear
-from swashplate.export.formats import Export
+from swashplate.export.formats import Export, export_model
 from swashplate.export.linear import Linear
 from swashplate.export.matlab import read_matlab
 from swashplate.links.live.axes import STICKS
@@ -85,7 +85,7 @@ def flown(name: str, size: float = 1.0) -> Flown:
 def made(flight: Flown, form: str) -> Export:
     vehicle = flight.world.vehicle
     trim = None if vehicle.structure is not None else flight.world.trim
-    return sp.export_model(vehicle, form, name="model", trim=trim)
+    return export_model(vehicle, form, name="model", trim=trim)
 
 
 # ---- how each format flies: states at the end of each period, and their names --------------------------------------

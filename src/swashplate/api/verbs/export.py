@@ -63,6 +63,9 @@ class ExportModel(OfVehicle["Exported"]):
         default=None, metavar="FILE", help="with web: a fit.json of this model: models drawn from it fly beside it"
     )
     draws: int = setting(default=5, help="with posterior: how many", least=2, most=20)
+    flight: Path | None = setting(
+        default=None, metavar="LOG", help="with web: the flight that the model was learnt from, which replays beside it"
+    )
     keep: Names = setting(
         default=(),
         metavar="KIND,...",
@@ -117,7 +120,14 @@ class ExportModel(OfVehicle["Exported"]):
             delays=self.delays,
             controller=self.controller,
             draws=() if self.posterior is None else drawn(exported, self.posterior, count=self.draws),
+            flight=None if self.flight is None else self._logged(self.flight),
         )
+
+    def _logged(self, log: Path) -> Any:
+        from swashplate.flights.readers.read import read
+
+        stamps = "drop" if self.drop_bad_stamps else "error"
+        return read(log, mapping=self.mapping, units=self.units, bad_stamps=stamps)
 
     def _page(self, name: str | None, say: Say) -> Exported:
         """The page of a log."""
@@ -126,7 +136,13 @@ class ExportModel(OfVehicle["Exported"]):
         where, form = str(self.model), f"--format {self.form}"
         if self.form != "web":
             raise SwashError("is a log: --format web writes its page.", where=where, channel=form)
-        given = {"--speed": self.speed, "--set": self.changes, "delays": self.delays, "controller": self.controller}
+        given = {
+            "--speed": self.speed,
+            "--set": self.changes,
+            "delays": self.delays,
+            "controller": self.controller,
+            "flight": self.flight,
+        }
         refused = [one for one, value in {**given, "posterior": self.posterior}.items() if value is not None]
         if refused:
             raise SwashError("is for vehicles, and this is a log.", where=where, channel=", ".join(refused))

@@ -21,16 +21,19 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.record import largest_states
 
 _KINDS = {"sweep": (30.0, (0.3, 5.0)), "doublet": (1.0, None), "3211": (3.5, None)}
+LOGGED_RATE = 20.0
+"""Rows a second of a flight that is shown beside the model."""
 _CARD_HEAD = ("name", "value", "unit", "±", "source")
 
 
-def single_page(world: World, *, name: str, made: Sequence[str] = ()) -> str:
+def single_page(world: World, *, name: str, made: Sequence[str] = (), logged: Array | None = None) -> str:
     """The text of the page.
 
     Args:
         world: what flies, at its start.
         name: of the model, for what is recorded.
         made: what it was made from, a line each: commit, card, data.
+        logged: body states of the flight that it was learnt from, `LOGGED_RATE` rows a second, shape (n, 12).
 
     Raises:
         SwashError: without the page's libraries, ziglang or CasADi, or for equations that become no C.
@@ -38,8 +41,11 @@ def single_page(world: World, *, name: str, made: Sequence[str] = ()) -> str:
     return single_file(
         PAGE / "live.html",
         title=world.vehicle.card.title,
-        documents={"model": page_model(world, name=name)},
-        packed={WEB_ASSEMBLY: web_assembly(frame_code(world))},
+        documents={"model": page_model(world, name=name, logged=logged is not None)},
+        packed={
+            WEB_ASSEMBLY: web_assembly(frame_code(world)),
+            **({} if logged is None else {"log": np.ascontiguousarray(logged, dtype="<f4").tobytes()}),
+        },
         instead={"/page/connection.js": "/page/alone.js"},
         within={'<p id="folder"></p>': f'<p id="folder"></p>\n{_card(world.vehicle)}\n{_origin(made)}'},
     )
@@ -59,7 +65,7 @@ def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
     around = world.environment
     law = pilot.decide.graph(len(vehicle.state_names) + 4, pilot.memory.size, pilot.gain_count)
     steps = world.steps_back
-    own = {"bar": False, "barred": False, "hows": [], "folder": "", "estimates": [], "learns": False}
+    own = {"bar": False, "barred": False, "hows": [], "folder": "", "estimates": [], "learns": False, "logged": False}
     return {
         "name": name,
         "hello": {
@@ -81,6 +87,7 @@ def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
         },
         "states": [list(pair) for pair in zip(vehicle.state_names, vehicle.state_units, strict=True)],
         "period": world.period,
+        "logged": LOGGED_RATE,
         "sizes": {
             "depth": 1 + int(np.max(steps)),
             "carried": pilot.memory.size,

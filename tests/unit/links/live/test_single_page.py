@@ -6,6 +6,7 @@ import base64
 import gzip
 import json
 import re
+import signal
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +17,8 @@ import pytest
 import swashplate as sp
 from flown_here import World
 from swashplate import compiler
-from swashplate.errors import ExportError, MissingLibraryError
+from swashplate.api.verbs.export import ExportModel
+from swashplate.errors import ExportError, MissingLibraryError, WriteError
 from swashplate.links.live import frame_code
 from swashplate.links.live.single_page import single_page
 from swashplate.links.web.libraries import PAGE
@@ -93,7 +95,7 @@ def test_what_is_no_vehicle_and_too_many_draws_are_refused() -> None:
     coax = sp.vehicle("coax")
     with pytest.raises(ExportError, match=r"draws: is 21, expected 20 at most"):
         sp.export_model(coax, "web", draws=[coax] * 21)
-    with pytest.raises(ExportError, match="'c' holds no controller and no drawn models"):
+    with pytest.raises(ExportError, match="'c' holds no controller, no drawn models"):
         sp.export_model(coax, "c", draws=[coax])
 
 
@@ -114,3 +116,31 @@ def test_a_module_imports_mathematics_alone_and_a_refusal_is_told(tmp_path: Path
     assert b"\x04math\x03sin" in sine, "what it lacks is the browser's"
     with pytest.raises(ExportError, match="ziglang refused the model's C"):
         frame_code.web_assembly("no C", exports=["one"])
+
+
+def test_what_cannot_be_compiled_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not (PAGE / "vendor" / "three.module.min.js").is_file() or compiler.web_compiler() is None:
+        pytest.skip("the page's libraries or what makes WebAssembly are not here")
+    monkeypatch.setattr("swashplate.links.live.single_page.frame_code", lambda world: "no C")
+    with pytest.raises(ExportError, match="refused the model's C"):
+        ExportModel("coax", "web", out=tmp_path / "page.html").answer()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_a_full_disk_leaves_no_half_of_a_page(tmp_path: Path) -> None:
+    """A limit on the size of files stands for it: what is written ends in the middle."""
+    resource = pytest.importorskip("resource")
+    made = sp.export_model("coax", "web")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(WriteError, match=r"coax\.html"):
+            made.save(tmp_path / "out")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+    (file,) = made.save(tmp_path / "out")
+    assert file.stat().st_size > 100_000

@@ -7,7 +7,8 @@ export class Connection extends Flown {
   constructor({ heard }) {
     super({ heard });
     this.rows = null;
-    this.begin(JSON.parse(document.getElementById("model").textContent), window.swashBytes.flight);
+    const { flight, log } = window.swashBytes;
+    this.begin(JSON.parse(document.getElementById("model").textContent), flight, { logged: log ? new Float32Array(log) : null });
   }
 
   kept(row) {

@@ -29,7 +29,7 @@ export class Connection extends Flown {
     if (message.version === this.session) return; // it was away for a moment
     this.session = message.version;
     this.told = { ...this.told, estimates: message.model.hello.estimates.map(() => [null, null, null]) };
-    this.begin(message.model, Uint8Array.from(atob(message.code), (char) => char.charCodeAt(0)), message.goes_on);
+    this.begin(message.model, Uint8Array.from(atob(message.code), (char) => char.charCodeAt(0)), { goesOn: message.goes_on });
   }
 
   kept(row) {

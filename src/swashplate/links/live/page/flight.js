@@ -9,9 +9,10 @@ function normal() {
 }
 
 export class Flight {
-  constructor(instance, model) {
+  constructor(instance, model, logged = null) {
     const { frame, buffer, delays, memory } = instance.exports;
     this.model = model;
+    this.logged = logged; // body states, twelve a row, of the flight it was learnt from
     this.period = model.period;
     this.frame = frame;
     const { states, hello, sizes } = model, m = hello.inputs.length;
@@ -23,7 +24,7 @@ export class Flight {
     new Int32Array(memory.buffer, delays(), model.back.length).set(model.back);
     this.limits.set([...hello.inputs.map(({ low }) => low), ...hello.inputs.map(({ high }) => high)]);
     this.places.forEach(({ card }, i) => card.set(i < 2 ? model.card : model.draws[i - 2]));
-    this.setting = { mode: model.mode, decoupled: true, ghost: false, wind: [0, 0, 0], gusts: 0, voltage: model.voltage,
+    this.setting = { mode: model.mode, decoupled: true, ghost: false, logged: false, wind: [0, 0, 0], gusts: 0, voltage: model.voltage,
       sticks: { roll: 0, pitch: 0, yaw: 0, heave: 0 } };
     this.place = Object.fromEntries(["x", "y", "z", "u", "v", "w", "phi", "theta", "psi"].map((name) => [name, states.findIndex(([n]) => n === name)]));
     this.reset();
@@ -51,6 +52,7 @@ export class Flight {
     this.setGusts(0);
     this.#fresh(0);
     if (this.setting.ghost) this.#fresh(1);
+    this.setLogged(this.setting.logged);
     this.#take();
     this.#beginFan();
   }
@@ -83,6 +85,20 @@ export class Flight {
   setGhost(on) {
     this.setting.ghost = on;
     if (on) this.#copy(1);
+  }
+  // The flight it was learnt from begins beside where it is.
+  setLogged(on) {
+    const { x } = this.places[0], { place, logged } = this, beside = 3 * this.model.hello.picture.size;
+    this.setting.logged = on && logged !== null;
+    if (!this.setting.logged) return;
+    this.loggedFrom = [x[place.x] - logged[0], x[place.y] - logged[1] + beside, x[place.z] - logged[2], this.ticks];
+  }
+  #loggedNow() {
+    const { logged, loggedFrom, model } = this, [north, east, down, begun] = loggedFrom, count = logged.length / 12;
+    const at = ((this.ticks - begun) * this.period * model.logged) % (count - 1), k = Math.floor(at);
+    const row = (i) => logged.subarray(12 * i, 12 * i + 12), [now, next] = [row(k), row(k + 1)];
+    const x = [...now].map((value, i) => (Math.abs(next[i] - value) > 3 ? value : value + (at - k) * (next[i] - value))); // a heading turns over
+    return [x[0] + north, x[1] + east, x[2] + down, ...x.slice(3)];
   }
   setGusts(sigma) {
     this.setting.gusts = sigma;
@@ -177,7 +193,9 @@ export class Flight {
       const { x, inputs } = this.places[craft];
       return { x: [...x.slice(0, 12)], u: [...inputs], ...this.#pose(x, inputs) };
     };
-    return { own: told(0), ...(this.setting.ghost ? { ghost: told(1) } : {}) };
+    const { ghost, logged } = this.setting, { x, u } = this.model.trim;
+    const flown = logged ? { logged: { x: this.#loggedNow(), u: [...u], ...this.#pose(x, u) } } : {};
+    return { own: told(0), ...(ghost ? { ghost: told(1) } : {}), ...flown };
   }
   fanned() {
     if (!this.model.draws.length) return null;

@@ -12,10 +12,10 @@ export class Flown {
     this.notice = "";
   }
 
-  // A model, and its WebAssembly; `goesOn` from where the last one flies.
-  async begin(model, code, goesOn = false) {
+  // A model, and its WebAssembly; `goesOn` from where the last one flies; `logged`: the flight it was learnt from.
+  async begin(model, code, { goesOn = false, logged = null } = {}) {
     const { instance } = await WebAssembly.instantiate(code, { math: Math });
-    const flight = new Flight(instance, model);
+    const flight = new Flight(instance, model, logged);
     if (this.flight) flight.follow(this.flight, goesOn);
     this.model = model;
     this.flight = flight;
@@ -61,6 +61,7 @@ export class Flown {
       mode: () => flight.setMode(value),
       decoupled: () => (flight.setting.decoupled = value),
       ghost: () => flight.setGhost(value),
+      logged: () => flight.setLogged(value),
       wind: () => (flight.setting.wind = [fields.north, fields.east, fields.down]),
       gusts: () => flight.setGusts(value),
       voltage: () => (flight.setting.voltage = value),

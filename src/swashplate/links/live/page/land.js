@@ -6,8 +6,8 @@ const TILE = 8; // cells after which the fields repeat
 const POSTS = 11, APART = 4; // to each side in all; cells between them
 const BANDS = 4, RED = [0.7, 0.23, 0], WHITE = [1, 1, 1];
 
-// The same fields every time.
-function fields() {
+// The same fields every time; `plainly`: as a processor without a graphics card draws them fastest.
+function fields(plainly) {
   const canvas = document.createElement("canvas"), side = 16;
   canvas.width = canvas.height = 16 * side;
   const plain = canvas.getContext("2d");
@@ -20,6 +20,10 @@ function fields() {
     }
   const texture = new THREE.CanvasTexture(canvas);
   texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
+  if (plainly) {
+    texture.generateMipmaps = false;
+    texture.minFilter = texture.magFilter = THREE.NearestFilter;
+  }
   texture.colorSpace = THREE.SRGBColorSpace;
   return texture;
 }
@@ -43,10 +47,10 @@ function posts(cell) {
 }
 
 export class Land {
-  constructor(scene, { cell, floor, grounded }) {
+  constructor(scene, { cell, floor, grounded, software }) {
     Object.assign(this, { scene, cell, floor, grounded });
     this.grid = new THREE.GridHelper(60 * cell, 60, 0x6f8a70, 0x9db09a);
-    const map = fields(), side = 50 * TILE;
+    const map = fields(software), side = 50 * TILE;
     map.repeat.set(side / TILE, side / TILE);
     this.ground = new THREE.Mesh(new THREE.PlaneGeometry(side * cell, side * cell), new THREE.MeshBasicMaterial({ map }));
     this.ground.rotation.x = -Math.PI / 2;
@@ -55,6 +59,7 @@ export class Land {
     this.sky = sky();
     this.sky.scale.setScalar(1500);
     this.sky.renderOrder = -1;
+    this.sky.visible = !software; // half a picture that a processor paints twice
     this.ground.visible = this.posts.visible = grounded; // without ground the grid is a level to look at, and may be flown through
     scene.add(this.grid, this.ground, this.posts, this.sky);
     scene.fog.near = 12 * cell;

@@ -49,8 +49,8 @@ function heard(message) {
   now = message;
   if (now.t >= charted + TOLD_EVERY) {
     charted = now.t;
-    charts.add(now.t, now.own, now.ghost, now.estimates, now.fan?.x);
-    for (const name of ["own", "ghost"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
+    charts.add(now.t, now.own, now.ghost ?? now.logged, now.estimates, now.fan?.x);
+    for (const name of ["own", "ghost", "logged"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
     if (now.fan) scene?.leaveFan(now.fan.x, { anew: now.fan.begun !== fanBegun });
     fanBegun = now.fan?.begun ?? null;
   }
@@ -70,7 +70,7 @@ function draw() {
   const time = now.t + late, elapsed = Math.min(Math.max(time - drawnTime, 0), 0.1);
   drawnTime = time;
   const rows = {};
-  for (const name of ["own", "ghost"]) if (now[name]) rows[name] = ahead(name, late);
+  for (const name of ["own", "ghost", "logged"]) if (now[name]) rows[name] = ahead(name, late);
   rows.fan = now.fan?.x;
   scene?.draw(rows, now, elapsed);
   if (begun - shownAt >= SHOWN_EVERY) {

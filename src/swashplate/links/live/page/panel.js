@@ -19,7 +19,7 @@ export class Panel {
     this.slid = new Map();
     for (const button of document.querySelectorAll("[data-mode]"))
       button.onclick = () => say("mode", { value: button.dataset.mode });
-    for (const name of ["decoupled", "ghost", "bar"])
+    for (const name of ["decoupled", "ghost", "logged", "bar"])
       $(name).onchange = () => {
         this.touched.set(name, performance.now());
         say(name, { value: $(name).checked });
@@ -95,6 +95,7 @@ export class Panel {
     for (const row of document.querySelectorAll(".wind")) row.hidden = !hello.wind; // what the equations do not have
     $("air").hidden = !hello.wind && !hello.voltages;
     $("bar").parentElement.hidden = !hello.bar;
+    $("logged").parentElement.hidden = !hello.logged;
     for (const button of document.querySelectorAll("[data-mode]")) button.hidden = !hello.modes.includes(button.dataset.mode);
     for (const name of ["decoupled", "ghost"]) $(name).parentElement.hidden = !hello.decoupling; // both would be alike
     for (const option of $("how").options) option.hidden = option.disabled = !hello.hows.includes(option.value);
@@ -120,7 +121,7 @@ export class Panel {
     const { setting } = now;
     for (const button of document.querySelectorAll("[data-mode]"))
       press(button, button.dataset.mode === setting.mode);
-    for (const name of ["decoupled", "ghost", "bar"])
+    for (const name of ["decoupled", "ghost", "logged", "bar"])
       if (this.#still(name) && $(name).checked !== setting[name]) $(name).checked = setting[name];
     const values = { north: setting.wind[0], east: setting.wind[1], gusts: setting.gusts, voltage: setting.voltage };
     for (const [id, value] of Object.entries(values)) {

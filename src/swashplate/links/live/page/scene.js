@@ -5,7 +5,7 @@ import { Helicopter } from "./helicopter.js";
 import { Land } from "./land.js";
 import { Trail } from "./trail.js";
 
-const COLORS = { own: 0xd55e00, ghost: 0x56b4e9 };
+const COLORS = { own: 0xd55e00, ghost: 0x56b4e9, logged: 0x7a5195 };
 const SOFTWARE = /swiftshader|llvmpipe|software/i;
 
 // Asked of a context of its own: whether edges are smoothed is settled when the page's is made.
@@ -93,7 +93,7 @@ export class Scene {
   }
 
   #add(name) {
-    const model = new Helicopter(this.picture, { ghost: name === "ghost", color: COLORS[name] });
+    const model = new Helicopter(this.picture, { ghost: name !== "own", color: COLORS[name] });
     const trail = new Trail(COLORS[name]);
     const shadow = new THREE.Mesh(
       new THREE.CircleGeometry(this.size, 24),
@@ -121,7 +121,7 @@ export class Scene {
 
   // `rows` are body states by name (of "fan" one of each drawn model), `moment` tells the discs; `elapsed` seconds of simulation since the last picture.
   draw(rows, moment, elapsed) {
-    for (const name of ["own", "ghost"]) {
+    for (const name of Object.keys(COLORS)) {
       if (!rows[name]) {
         if (this.crafts[name]) this.#remove(name);
         continue;
