@@ -29,6 +29,8 @@ _COMPLEX_FLAG = 0x0800
 # Element kind -> NumPy type; 16 to 18 are UTF-8, -16 and -32.
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _TEXTS = {1: "utf-8", 2: "utf-8", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+_PLAIN = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
+"""Classes of version 7.3 whose data are their numbers."""
 _DEEPEST = 16
 
 
@@ -214,10 +216,13 @@ def _version_7_3(source: Source) -> dict[str, Any]:
             kind = stored.attributes.get("MATLAB_class", "double")
             if stored.attributes.get("MATLAB_empty"):
                 at[key] = np.zeros(0)
-            elif stored.values.dtype.kind in "fiub" and kind != "char":
+            elif stored.values.dtype.kind in "fiub" and kind in _PLAIN:
                 at[key] = stored.values.T.squeeze()
+            elif kind in _PLAIN:  # references: the parts stand elsewhere in the file
+                at[key] = Unread("a MATLAB array of structs")
             else:
-                at[key] = Unread("text" if kind == "char" else f"a MATLAB {kind}")
+                held = "a MATLAB cell" if kind == "cell" else f"a MATLAB object of class {kind}"
+                at[key] = Unread("text" if kind == "char" else held)
     return variables
 
 

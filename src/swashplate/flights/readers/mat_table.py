@@ -1,6 +1,7 @@
 """MATLAB files of any layout as tables: variables, fields of structs and columns of matrices are columns.
 
-A field is called `log.p`, a matrix's column `u(:,1)`, its row `y(1,:)`, as in MATLAB. Variables called as the schema's
+A field is called `log.p`, that of an array of structs `signals(2).values`, a cell's part `data{1}`, a matrix's column
+`u(:,1)`, its row `y(1,:)`, as in MATLAB. Variables called as the schema's
 channels are those channels; others are named in a mapping. A CoaX-56 record has a reader of its own (`coax56`).
 """
 
@@ -106,7 +107,7 @@ def _table(variables: Mapping[str, Any], source: Source, options: Options) -> Ma
     strange: list[str] = []
     for path, value in _flat(variables):
         numbers = mat.numbers(value)
-        if numbers is not None and numbers.size and numbers.ndim <= 2:
+        if numbers is not None and numbers.size and numbers.ndim <= 3:
             arrays[path] = np.atleast_1d(numbers)
         else:
             strange.append(f"{path} ({value.what})" if isinstance(value, mat.Unread) else path)
@@ -136,6 +137,9 @@ def _flat(value: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
         path = f"{above}{name}" or "(unnamed)"
         if isinstance(part, dict):
             yield from _flat(part, f"{path}.")
+        elif isinstance(part, list) and 0 < len(part) <= _MOST:  # a cell, or an array of structs
+            struct = isinstance(part[0], dict)
+            yield from _flat({f"{path}({k})" if struct else f"{path}{{{k}}}": one for k, one in enumerate(part, 1)})
         else:
             yield path, part
 
@@ -171,4 +175,6 @@ def _columns(path: str, numbers: Array, n: int) -> dict[str, Array]:
         return {f"{path}(:,{k})": column for k, column in enumerate(numbers.T, 1)}
     if numbers.ndim == 2 and numbers.shape[1] == n and numbers.shape[0] <= _MOST:
         return {f"{path}({k},:)": row for k, row in enumerate(numbers, 1)}
+    if numbers.ndim == 3 and numbers.shape[2] == n and numbers.size <= _MOST * n:  # as Simulink saves matrices
+        return {f"{path}({i + 1},{j + 1},:)": numbers[i, j] for i, j in np.ndindex(*numbers.shape[:2])}
     return {}

@@ -122,3 +122,20 @@ def test_an_object_is_named_and_the_rest_is_read(tmp_path: Path, of_class: str) 
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(FlightError, match="damaged"):
         sp.read(path, units={"p": "rad/s"})
+
+
+def test_arrays_of_structs_cells_and_stacked_matrices_are_columns(tmp_path: Path) -> None:
+    """As Simulink saves signals: an array of structs, each with values; matrices stand along the third dimension."""
+    signals = np.zeros((1, 2), dtype=[("values", "O"), ("label", "O")])
+    signals[0, 0], signals[0, 1] = (P[:, None], "roll"), (2 * P[:, None], "pitch")
+    cell = np.empty(2, dtype=object)
+    cell[0], cell[1] = 3 * P, "words"
+    turned = np.arange(6.0).reshape(2, 3, 1) * P
+    path = _mat(tmp_path, out={"time": T[:, None], "signals": signals}, data=cell, R=turned)
+    flight = sp.read(path)
+    assert flight.values("out.signals(2).values") == pytest.approx(2 * P)
+    assert flight.values("data{1}") == pytest.approx(3 * P)
+    assert flight.values("R(2,3,:)") == pytest.approx(5 * P)
+    assert any("out.signals(1).label" in note and "data{2}" in note for note in flight.provenance.notes)
+    mapping = {"channels": {"p": {"column": "out.signals(1).values", "unit": "deg/s"}}}
+    assert sp.read(path, mapping=mapping).values("p") == pytest.approx(np.deg2rad(P))

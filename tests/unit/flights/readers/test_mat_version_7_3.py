@@ -59,3 +59,12 @@ def test_a_damaged_one_is_told(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:2000])
     with pytest.raises(FlightError, match=r"damaged MATLAB 7\.3 file"):
         read(path)
+
+
+def test_an_object_is_named_as_what_it_is(tmp_path: Path) -> None:
+    path = written(tmp_path / "flight.mat")
+    with h5py.File(path, "r+") as file:
+        record = file.create_dataset("record", data=np.array([[0xDD000000, 2, 1, 1, 1, 1]], "u4"))
+        record.attrs["MATLAB_class"] = np.bytes_("timeseries")
+    notes = read(path, units={"p": "deg/s"}).provenance.notes
+    assert any("record (a MATLAB object of class timeseries)" in note for note in notes)
