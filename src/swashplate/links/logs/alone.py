@@ -1,7 +1,8 @@
-"""What a response to one input alone would have been worth, where several inputs were estimated together."""
+"""Where several inputs were estimated together: what one alone would have been worth, and what it does off its axis."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,31 @@ from swashplate.public import resolve
 
 _SEEN = 0.6
 """Coherence from which a response counts."""
+
+
+def off_axis(responses: FrequencyResponse, chosen: Channels, others: Sequence[str]) -> list[dict[str, Any]]:
+    """What an input does to the other axes' outputs, over what it does to its own: lines to draw, and in words.
+
+    Args:
+        responses: of all inputs together. others: outputs of the other axes.
+    """
+    on, _, _ = responses.pair(chosen.output, chosen.input)
+    hertz, drawn = responses.omega / (2.0 * np.pi), []
+    for other in others:
+        h, coherence, _ = responses.pair(other, chosen.input)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = 20.0 * np.log10(np.abs(h / on))
+        counted = (coherence >= _SEEN) & np.isfinite(share)
+        if counted.any():
+            largest = int(np.argmax(np.where(counted, share, -np.inf)))
+            words = (
+                f"{chosen.input} moves {other} by at most {share[largest]:.1f} dB of {chosen.output} (at "
+                f"{hertz[largest]:.2g} Hz); {counted.sum()} of {counted.size} lines are coherent enough to tell."
+            )
+        else:
+            words = f"What {chosen.input} does to {other} is not told: no line has a coherence of {_SEEN:g}."
+        drawn.append({"output": other, "share": np.where(counted, share, np.nan), "words": words})
+    return drawn
 
 
 def alone(

@@ -19,7 +19,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import Sweep
 from swashplate.flights.schema import channel
 from swashplate.links.logs import code_lines
-from swashplate.links.logs.alone import alone
+from swashplate.links.logs.alone import alone, off_axis
 from swashplate.links.logs.hold_out import Part, hold_out
 from swashplate.links.logs.loop_page import loop_of
 from swashplate.links.logs.opened import Opened
@@ -109,6 +109,7 @@ def identify_sweep(
         axes.append(_axis(one, responses, made.study, held, made.gained))
         if len(swept) > 1:
             own = (_digits(one.sweep.low), _digits(one.sweep.high))
+            axes[-1]["off"] = off_axis(responses, one.chosen, [o for o in outputs if o != one.chosen.output])
             axes[-1]["alone"] = alone(records[k], one.chosen, responses, band=own, form=made.form)
         studies.append(made)
         seen.append(held)
@@ -163,6 +164,7 @@ def _axis(one: Swept, responses: Any, study: Any, held: Part, gained: str) -> di
         "gains": [loop_of(suggestion) for suggestion in study.material.gains if not suggestion.refused],
         "no_gains": " ".join(filter(None, (gained, *refused))),
         "alone": None,
+        "off": [],
     }
 
 

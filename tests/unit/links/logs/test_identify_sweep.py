@@ -234,6 +234,12 @@ def test_sweeps_of_two_axes_in_two_logs_are_estimated_together(tmp_path: Path, m
         assert values["K"] == pytest.approx(GAIN, rel=0.08)
         assert axis["alone"]["decibels"] > 0.3
         assert "alone gives J" in axis["alone"]["words"]
+        (off,) = axis["off"]
+        assert off["output"] == {"p": "q", "q": "p"}[axis["output"]]
+        share = off["share"][np.isfinite(off["share"])]
+        assert share.size > 5
+        assert np.median(share) == pytest.approx(20.0 * np.log10(0.4), abs=1.0)
+        assert f"moves {off['output']} by at most" in off["words"]
     assert {"report-p.html", "report-q.html", "sweep-q.csv"} <= set(made.files)
     names: dict[str, Any] = {}
     exec(result["code"]["python"], names)

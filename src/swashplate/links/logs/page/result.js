@@ -24,6 +24,11 @@ function bode(home, found) {
   curves(home, { title: `${found.output} / ${found.input}`, x, xLabel: label, yLabel: "magnitude [dB]", lines: pair(b.magnitude, b.fit_magnitude), log: true });
   curves(home, { title: "Phase", x, xLabel: label, yLabel: "phase [deg]", lines: pair(b.phase, b.fit_phase), log: true });
   curves(home, { title: "Coherence, from 0.6 on it counts", x, xLabel: label, yLabel: "coherence [1]", lines: [{ name: "", values: b.coherence, colour: 0, dash: [] }], log: true, height: 130, range: [0, 1.02], level: 0.6 });
+  if (found.off.length) {
+    curves(home, { title: `Off axis: what ${found.input} does elsewhere`, x, xLabel: label, yLabel: `dB of ${found.output}`, log: true, level: 0,
+      lines: found.off.map((one, i) => ({ name: `${one.output} / ${found.output}`, values: one.share, colour: 2 + i, points: true })) });
+    home.append(make("ul", { class: "plain", "data-off": "" }, ...found.off.map((one) => make("li", {}, one.words))));
+  }
   home.append(make("p", { class: "soft" }, `0 dB is 1 ${b.unit}. Fitted from ${short(b.fitted[0])} to ${short(b.fitted[1])} Hz.`));
 }
 
