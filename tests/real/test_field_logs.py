@@ -9,6 +9,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import FlightError
+from swashplate.flights.readers.log_fields import log_fields
 
 
 @pytest.fixture
@@ -70,6 +71,20 @@ def test_what_a_bag_loses_is_a_problem_with_its_share(field: Path, bag: str, los
     if lost:
         assert f"({lost:g} %) are lost" in flight.provenance.damage[0]
         assert flight.provenance.damage[0] in sp.inspect(flight).problems
+
+
+@pytest.mark.parametrize("bag", ["ok_mcap", "ok_sqlite", "zero_stamp"])
+def test_every_field_of_a_bag_is_listed_on_the_flights_clock(field: Path, bag: str) -> None:
+    pytest.importorskip("rosbags")
+    path = field / "05-ros" / bag
+    flight, fields = sp.read(path), log_fields(path)
+    assert fields is not None
+    assert flight.provenance.damage == ()
+    assert {"imu.angular_velocity.x", "imu.orientation.w", "pose.pose.position.z"} <= set(fields.listed)
+    assert not any("covariance" in name for name in fields.listed)
+    time, rate = fields.read("imu.angular_velocity.x")
+    assert time - flight.epoch == pytest.approx(flight.time("p"), abs=1e-6)
+    assert rate == pytest.approx(flight.values("p"))
 
 
 # ---- 19: another firmware's Blackbox ---------------------------------------------------------------------------------

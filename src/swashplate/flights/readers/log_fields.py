@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
-from swashplate.flights.readers import clocked, dataflash, dataflash_text, tlog, ulog
+from swashplate.flights.readers import clocked, dataflash, dataflash_text, rosbag, tlog, ulog
 from swashplate.flights.readers.ardupilot_events import seconds
 from swashplate.flights.readers.dataflash import MessageKind, MessageTable
 from swashplate.flights.readers.source import open_source
@@ -83,6 +83,8 @@ def log_fields(path: Path) -> LogFields | None:
             return _Binary(path, source.content)
         if source.content.startswith(ulog.MAGIC):
             return _Decoded(_topics(source.content, source.name))
+        if rosbag.recognises(source):
+            return _Decoded(rosbag.fields_of(source))
         if tlog.recognises(source):
             tables = tlog.tables_of(source)
             numbers = {n: (t.place, t.time, tlog.number_columns(t)) for n, t in tables.items()}

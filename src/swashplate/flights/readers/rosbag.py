@@ -113,14 +113,26 @@ def _one_run(topics: dict[str, _Topic], told: clocked.Remarks) -> dict[str, _Top
     return {name: topic for name, topic in cut.items() if topic.place.size}
 
 
-def _received(source: Source) -> tuple[dict[str, _Topic], dict[tuple[str, str], int], int, list[str]]:
+def fields_of(source: Source) -> dict[str, tuple[NDArray[np.int64], Array, dict[str, Array]]]:
+    """Every number of every topic whose type is known: places, times on the bag's clock [s], values by their fields.
+
+    Raises:
+        FlightError: where rosbags is not installed, or the bag cannot be opened.
+    """
+    topics, _, begin, _ = _received(source, every=True)
+    return {name.strip("/"): (one.place, one.time + begin * 1e-9, dict(one.numbers)) for name, one in topics.items()}
+
+
+def _received(
+    source: Source, *, every: bool = False
+) -> tuple[dict[str, _Topic], dict[tuple[str, str], int], int, list[str]]:
     """Messages by topic, their number by topic and type, first stamp [ns], damage."""
     library("rosbags", what="a ROS bag", where=source.name)
     topics: dict[str, _Topic] = {}
     counts: dict[tuple[str, str], int] = {}
     begin, damage = 0, list[str]()
     with scratch_folder() if source.path.is_dir() else nullcontext() as scratch:
-        for told, content in foreign.frames("rosbag", source.path, size=source.size, scratch=scratch):
+        for told, content in foreign.frames("rosbag", source.path, size=source.size, scratch=scratch, every=every):
             if "topic" in told:
                 table = np.frombuffer(content).reshape(-1, 2 + len(told["names"]))
                 numbers = {name: table[:, 2 + k].copy() for k, name in enumerate(told["names"])}

@@ -11,18 +11,19 @@ import numpy as np
 
 from swashplate.errors import FlightError
 from swashplate.flights.foreign_process import Frame, UnpackedError, limit_met
-from swashplate.flights.readers.rosbag_types import TYPES, Row
+from swashplate.flights.readers.rosbag_types import TYPES, Row, every_number
 
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"
 _PIECE = 1 << 20  # bytes that are unpacked at once
 
 
-def frames(path: Path, *, disk: int = 0) -> Iterator[Frame]:
+def frames(path: Path, *, disk: int = 0, every: bool = False) -> Iterator[Frame]:
     """A bag's messages of known types, by topic.
 
     Args:
         path: the bag.
         disk: bytes that its packed files may unpack to.
+        every: all numbers of all types that the bag defines, by their own names, and not those that are read.
 
     Yields:
         {"topic", "names", "bytes"} with, for each message, its place in the bag, its stamp [s from the first message]
@@ -36,7 +37,7 @@ def frames(path: Path, *, disk: int = 0) -> Iterator[Frame]:
     """
     if path.is_dir():
         _measure_packed(path, disk)
-    stamps, rows, counts, begin, damage = _collected(path)
+    stamps, rows, counts, begin, damage = _collected(path, every=every)
     for topic, received in rows.items():
         names = list(dict.fromkeys(name for row in received for name in row))
         table = np.array([[row.get(name, np.nan) for name in names] for row in received])
@@ -68,7 +69,7 @@ def _measure_packed(folder: Path, most: int) -> None:
 Collected = tuple[dict[str, list[tuple[int, float]]], dict[str, list[Row]], dict[tuple[str, str], int], int, list[str]]
 
 
-def _collected(path: Path) -> Collected:
+def _collected(path: Path, *, every: bool) -> Collected:
     """By topic places and stamps, and numbers; messages by topic and type, first stamp [ns], damage."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -93,13 +94,15 @@ def _collected(path: Path) -> Collected:
             for connection in bag.connections:
                 key = (connection.topic, connection.msgtype)
                 counts[key] = counts.get(key, 0) + int(connection.msgcount)
-            known = [c for c in bag.connections if c.msgtype in known_types]
+            known = [c for c in bag.connections if c.msgtype in (bag.typestore.types if every else known_types)]
             try:
                 for place, (connection, received, raw) in enumerate(bag.messages(known) if known else ()):
                     message = bag.deserialize(raw, connection.msgtype)
                     at = _stamp(message, received)
                     stamps.setdefault(connection.topic, []).append((place, (at - begin) * 1e-9))
-                    rows.setdefault(connection.topic, []).append(known_types[connection.msgtype](message))
+                    rows.setdefault(connection.topic, []).append(
+                        every_number(message) if every else known_types[connection.msgtype](message)
+                    )
             except Exception as error:  # a damaged bag can raise anything in there
                 if limit_met(error):
                     raise

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 Row = dict[str, float]
 
 
@@ -38,6 +40,28 @@ def _transform(m: Any) -> Row:
 
 def _listed(name: str, values: Any, start: int = 1) -> Row:
     return {f"{name}_{i}": float(value) for i, value in enumerate(values, start)}
+
+
+_LONGEST = 32
+"""Numbers of a row that is taken number by number: a longer one is a picture or a scan."""
+
+
+def every_number(message: Any, above: str = "") -> Row:
+    """Numbers of a message by their fields (`pose.position.x`, `channels[0]`), without header and covariances."""
+    row: Row = {}
+    for name in getattr(message, "__dataclass_fields__", ()):
+        value, path = getattr(message, name), f"{above}{name}"
+        if name in ("header", "__msgtype__") or name.endswith("covariance"):
+            continue
+        if hasattr(value, "__dataclass_fields__"):
+            row |= every_number(value, f"{path}.")
+        elif isinstance(value, int | float):
+            row[path] = float(value)
+        elif (
+            isinstance(value, np.ndarray) and value.ndim == 1 and value.size <= _LONGEST and value.dtype.kind in "fiub"
+        ):
+            row |= {f"{path}[{k}]": float(one) for k, one in enumerate(value.tolist())}
+    return row
 
 
 _MIXER = ("mixer_roll", "mixer_pitch", "mixer_yaw", "mixer_collective")
