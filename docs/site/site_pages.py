@@ -5,7 +5,9 @@
 * A link to a file of the repository's root leads to its page (`OF_THE_ROOT`).
 * A link into research/, which is no part of the site, becomes the name of its file.
 * `<!-- include -->` before a link to a file of the repository's root shows that file there, with links that hold.
-* `<!-- fly NAME -->` becomes the vehicle's exported page (`--format web`), where ziglang is installed.
+* `<!-- fly NAME -->` becomes the vehicle's exported page (`--format web`), where ziglang is installed; `fly all` leads
+  to that of every packaged vehicle.
+* `<!-- step NAME KNOB -->` becomes a small page in which a control, a number or the speed is moved (`step_picture`).
 * `<!-- python reference -->` becomes every public name with its signature and docstring (`site_reference`).
 * A page of docs/notebooks is offered as a Jupyter notebook too.
 """
@@ -23,16 +25,19 @@ from typing import Any
 import docs_pages
 import docs_running
 import site_reference
+import step_picture
 from pygments.lexers.special import TextLexer
 from sphinx.search.en import SearchEnglish
 
 import swashplate as sp
+from swashplate.atomic import write_text
+from swashplate.models.card import packaged_cards
 
 NAVIGATION = "<!-- navigation -->"
 REFERENCE = "<!-- python reference -->"
 NOTEBOOKS = "notebooks/"
-FLYING = "fly"
-"""Folder of the exported pages."""
+FLYING, ALL = "fly", "all"
+"""Folder of the exported pages, and what asks for that of every packaged vehicle."""
 OF_THE_ROOT = {
     "README.md": "index.md",
     "ARCHITECTURE.md": "developers/architecture.md",
@@ -45,7 +50,8 @@ OF_THE_ROOT = {
 _INCLUDE = re.compile(r"^<!-- include -->\[[^\]]+\]\((?:\.\./)+(\w+\.md)\)$", re.MULTILINE)
 _TO_THE_ROOT = re.compile(r"\]\((?:\.\./)+([A-Z]+\.md)\)")
 _TO_RESEARCH = re.compile(r"\[([^\[\]]*)\]\((?:\.\./)+(research/[\w./-]+\.md)(?:#[^)]*)?\)")
-_FLY = re.compile(r"^<!-- fly (\w+) -->$", re.MULTILINE)
+_FLY = re.compile(r"^<!-- fly (\w+) -->$", re.MULTILINE)  # "all": links to those of every packaged vehicle
+_STEP = re.compile(r"^<!-- step (\w+) (\w+) -->$", re.MULTILINE)
 _LINK = re.compile(r"\[([^\[\]]*)\]\((?!https?:|#)([^)\s]+)\)")
 _HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 _ITEM = re.compile(r"^(?:[*-]|\d+\.) +\**\[[^\]]+\]\(([^)#]+)\.md\)", re.MULTILINE)
@@ -109,14 +115,20 @@ def notebook(text: str) -> dict[str, Any]:
     return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
 
 
-def flying(name: str, here: str) -> str:
-    """A vehicle's exported page inside a page of a folder; nothing where no ziglang makes one."""
+def flying(name: str, here: str, *, knob: str = "") -> str:
+    """A vehicle's exported page inside a page of a folder, or a step of it; nothing where no ziglang makes one."""
     if find_spec("ziglang") is None:
         return ""
-    place = posixpath.relpath(f"{FLYING}/{name}.html", here)
+    if name == ALL:
+        links = (f'<a href="{posixpath.relpath(FLYING, here)}/{one}.html">{one}</a>' for one in packaged_cards())
+        return f"```{{raw}} html\n<p>Fly one in this browser: {', '.join(links)}.</p>\n```"
+    file = f"{name}-{knob}" if knob else name
+    place = posixpath.relpath(f"{FLYING}/{file}.html", here)
     may = 'loading="lazy" sandbox="allow-scripts allow-downloads"'
-    frame = f'<iframe class="flying" src="{place}" title="{name}, flying" {may}></iframe>'
-    return f'```{{raw}} html\n{frame}\n<p><a href="{place}">Fly {name} in the whole window</a></p>\n```'
+    title, look = (f"{name}, a step", "step") if knob else (f"{name}, flying", "flying")
+    frame = f'<iframe class="{look}" src="{place}" title="{title}" {may}></iframe>'
+    more = "" if knob else f'\n<p><a href="{place}">Fly {name} in the whole window</a></p>'
+    return f"```{{raw}} html\n{frame}{more}\n```"
 
 
 def _read(app: Any, name: str, source: list[str]) -> None:
@@ -125,6 +137,7 @@ def _read(app: Any, name: str, source: list[str]) -> None:
     text = _TO_THE_ROOT.sub(lambda match: f"]({posixpath.relpath(OF_THE_ROOT[match[1]], here)})", text)
     text = _TO_RESEARCH.sub(r"\1 (`\2`)", text)
     text = _FLY.sub(lambda match: flying(match[1], here), text)
+    text = _STEP.sub(lambda match: flying(match[1], here, knob=match[2]), text)
     if REFERENCE in text:
         text = text.replace(REFERENCE, site_reference.reference())
     if name.startswith(NOTEBOOKS):
@@ -139,9 +152,13 @@ def _finish(app: Any, exception: Exception | None) -> None:
     if exception is not None or app.builder.format != "html":
         return
     if find_spec("ziglang") is not None:
-        pages = (page.read_text(encoding="utf-8") for page in Path(app.srcdir).rglob("*.md"))
-        for name in sorted({name for text in pages for name in _FLY.findall(text)}):
-            sp.export_model(name, "web").save(Path(app.outdir) / FLYING)
+        folder = Path(app.outdir) / FLYING
+        whole = "\n".join(page.read_text(encoding="utf-8") for page in Path(app.srcdir).rglob("*.md"))
+        asked = set(_FLY.findall(whole))
+        for name in sorted({*asked, *packaged_cards()} - {ALL} if ALL in asked else asked):
+            sp.export_model(name, "web").save(folder)
+        for name, knob in sorted(set(_STEP.findall(whole))):
+            write_text(folder / f"{name}-{knob}.html", step_picture.step_picture(name, knob))
     for page in sorted((Path(app.srcdir) / NOTEBOOKS).glob("*.md")):
         made = json.dumps(notebook(page.read_text(encoding="utf-8")), indent=1)
         (Path(app.outdir) / NOTEBOOKS / f"{page.stem}.ipynb").write_text(made + "\n", encoding="utf-8")
