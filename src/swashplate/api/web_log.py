@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
+from swashplate.commit import commit
 from swashplate.export.formats import Export
 from swashplate.extras import version_of
 from swashplate.flights.datasets import locate
@@ -43,7 +44,9 @@ def export_log(
     mapped = mapping or (None if units else kept(path))
     flight = read_log(log, units=units, mapping=mapped, bad_stamps=bad_stamps)
     read = Read(path.name, Remedy(dict(units or {}), bad_stamps == "drop"), os.fspath(mapped) if mapped else "")
-    made = f"Made by swashplate {version_of('swashplate')} from a log with the SHA-256 {flight.provenance.sha256}."
+    at = commit()
+    program = f"swashplate {version_of('swashplate')}{f', commit {at},' if at else ''}"
+    made = f"Made by {program} from a log with the SHA-256 {flight.provenance.sha256}."
     page = sent_page(flight, path, read=read, keep=keep, made=made, say=say)
     size = f"{len(page.text.encode()) / 1e6:.1f} MB, opened by double-click."
     return Export({f"{name or 'log'}.html": page.text.encode()}, (*page.remarks, size))

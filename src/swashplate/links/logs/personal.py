@@ -71,7 +71,7 @@ def stripped(flight: Flight, path: Path, *, keep: Collection[str] = ()) -> Strip
         "place": ", ".join([*dropped, "the map"]),
         "serials": "serial numbers",
         "names": "the file's name, names of owner and craft",
-        "messages": f"{messages} messages",
+        "messages": f"messages ({messages})",
         "date": "the date",
         "others": f"{len(unknown)} channels of unknown meaning" if unknown else "",
     }

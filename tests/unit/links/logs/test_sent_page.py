@@ -135,7 +135,7 @@ def test_it_lists_what_is_inside_and_what_was_left_out() -> None:
     assert inside.endswith("no fit; no gains.")
     for words in (
         "latitude, longitude, x, y, the map",
-        "1 messages",
+        "messages (1)",
         "2 parameters",
         "the date",
     ):
