@@ -8,9 +8,8 @@ import time
 import numpy as np
 
 from benchmarks.timing import Result, Span, best_rate
-from swashplate.control.draws.robustness import SENSOR_NOISE
 from swashplate.control.draws.spread import spread
-from swashplate.control.draws.variations import draw_numbers
+from swashplate.control.draws.variations import SENSOR_NOISE, draw_numbers
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.lqg.design import design
 from swashplate.filtering.sensor_suite import suite

@@ -16,7 +16,7 @@ import numpy as np
 
 import swashplate as sp
 from swashplate.control.analysis.straightness import command_for_speed, paths_of, step_paths
-from swashplate.control.draws.robustness import draw_models
+from swashplate.control.draws.variations import draw_models
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.laws.learning import corrected_by_step
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops

@@ -16,7 +16,7 @@ from flights import FLIGHTS
 
 import swashplate as sp
 from swashplate.api.decouple import FlownStep
-from swashplate.models.delays import input_delays
+from swashplate.models.surroundings import input_delays
 from swashplate.simulation.wind import INDOOR
 
 SPEED = 1.8

@@ -10,7 +10,7 @@ import numpy as np
 
 from swashplate.flights.flight import Flight, stream
 from swashplate.models.card import Card, Parameter
-from swashplate.models.choices import PhysicalEffect
+from swashplate.models.traits import PhysicalEffect
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment

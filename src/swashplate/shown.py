@@ -36,6 +36,7 @@ class Shown(Saved):
         *,
         theme: Literal["paper", "light", "dark"] = "paper",
         frequency: Literal["Hz", "rad/s"] = "Hz",
+        **choice: Any,
     ) -> Figure:
         """One figure as a matplotlib figure; `savefig` writes it as PDF, SVG or PNG.
 
@@ -43,11 +44,13 @@ class Shown(Saved):
             figure: its name (see `figures`); the main one where None.
             theme: "paper" (for print: small type, no title), "light" or "dark".
             frequency: unit of axes of frequency.
+            choice: `channels` of a flight (a panel each; the usual groups if not given), `pairs` (output, input) of
+                responses (all that answer coherently if not given), `row` of derivatives (X, Y, Z, L, M or N).
 
         Raises:
             SwashError: a figure, a theme or a unit that there is not; matplotlib missing.
         """
-        drawn: Figure = resolve("plot")(self, figure, theme=theme, frequency=frequency)
+        drawn: Figure = resolve("plot")(self, figure, theme=theme, frequency=frequency, **choice)
         return drawn
 
     def explore(
@@ -56,9 +59,10 @@ class Shown(Saved):
         *,
         theme: Literal["paper", "light", "dark"] = "light",
         frequency: Literal["Hz", "rad/s"] = "Hz",
+        **choice: Any,
     ) -> Any:
         """One figure as a `plotly.graph_objects.Figure`, to zoom and point at; arguments and errors as of `plot`."""
-        return resolve("explore")(self, figure, theme=theme, frequency=frequency)
+        return resolve("explore")(self, figure, theme=theme, frequency=frequency, **choice)
 
     def report(self, path: str | Path, *, title: str | None = None) -> Path:
         """A page about it: see `swashplate.report`."""

@@ -12,7 +12,7 @@ from commands import saying, swash
 import swashplate as sp
 from made_results import result
 from report_pages import whole
-from swashplate.control.controller_file import read_controller, save_controller
+from swashplate.control.kinds import read_controller, save_controller
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.errors import ControllerError
 

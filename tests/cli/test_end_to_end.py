@@ -10,7 +10,7 @@ from commands import saying, swash
 
 import swashplate as sp
 from simulated_flights import FREE, TIE
-from swashplate.flights.csv_export import write_csv
+from swashplate.flights.tabular import write_csv
 
 ASKED = ("--free", ",".join(FREE), "--settings", f"tie={TIE}")
 METHOD = ("--method", "output-error")  # nothing disturbs this flight, and it is the quicker one

@@ -13,7 +13,7 @@ from commands import one_message, swash
 
 import swashplate as sp
 from swashplate import compiler
-from swashplate.control.controller_file import save_controller
+from swashplate.control.kinds import save_controller
 from swashplate.export import fmu
 from swashplate.models.linear.state_space_file import structure, to_toml
 

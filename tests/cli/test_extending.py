@@ -13,7 +13,7 @@ import pytest
 from commands import swash
 
 import swashplate as sp
-from swashplate.control.controller_file import save_controller
+from swashplate.control.kinds import save_controller
 from swashplate.errors import ControllerError, FlightError, IdentificationError, SwashError
 from swashplate.flights.flight import Flight
 from tipping import TRUTH, tipped, tipping

@@ -10,8 +10,7 @@ from commands import swash
 
 import swashplate as sp
 from made_results import result
-from swashplate.control.draws.linear_draws import entries_of, vary_parameters
-from swashplate.control.draws.robustness import draw_models
+from swashplate.control.draws.variations import draw_models, entries_of, vary_parameters
 from swashplate.errors import ControllerError
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure

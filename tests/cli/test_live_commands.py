@@ -51,7 +51,7 @@ def test_live_refuses_what_cannot_fly(tmp_path: Path) -> None:
     assert "expected a folder" in one_message(swash("live", "coax", "--port", "0", "--out", file))
     assert "is not TOML" in one_message(swash("live", "coax", "--port", "0", "--controller", _broken(tmp_path)))
     coax = sp.vehicle("coax")
-    from swashplate.control.controller_file import save_controller
+    from swashplate.control.kinds import save_controller
 
     save_controller(sp.autopilot(coax, sp.trim(coax)), tmp_path / "coax-controller.toml")
     told = one_message(swash("live", "raptor50", "--port", "0", "--controller", tmp_path / "coax-controller.toml"))

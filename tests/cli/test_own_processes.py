@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from swashplate import progress_lines
-from swashplate.control.controller_file import save_controller
+from swashplate.control.kinds import save_controller
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.links.web import libraries
 from swashplate.models.catalogue import vehicle

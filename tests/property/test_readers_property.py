@@ -15,10 +15,10 @@ from scipy.io import savemat
 
 from made_logs import coax_record, motive, vicon
 from swashplate.errors import FlightError
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import ProcessingStep, Provenance
 from swashplate.flights.readers.read import read
+from swashplate.flights.tabular import write_csv
 
 few = settings(max_examples=10, deadline=None, derandomize=True)
 

@@ -9,8 +9,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.bench.evaluate import Bench, evaluate
-from swashplate.bench.record_files import read_records
-from swashplate.bench.record_tables import read_table
+from swashplate.bench.record_files import read_records, read_table
 from swashplate.bench.result import BenchFinding
 from swashplate.bench.speed_map import fit_map
 from swashplate.bench.supply import together

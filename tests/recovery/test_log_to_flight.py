@@ -16,7 +16,7 @@ from swashplate.api.demo import demo
 from swashplate.api.fly_maneuver import fly_maneuver
 from swashplate.api.monte_carlo import MonteCarlo
 from swashplate.control.draws.spread import Limits
-from swashplate.models.delays import input_delays
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.wind import indoor
 

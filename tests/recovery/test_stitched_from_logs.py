@@ -12,8 +12,8 @@ from proof_page import leave
 from swashplate.flights.flight import Flight
 from swashplate.identification.frequency.response_cost import cost_of, target
 from swashplate.identification.time.equation_error import equation_error
-from swashplate.models.delays import input_delays
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.wind import dryden, outdoor
 

@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
+from swashplate.flights.tabular import write_csv
 
 from .found import ROOT, Found, progress
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import swashplate as sp
 from hostile_bags import packed_bag
-from swashplate.control.controller_file import save_controller
+from swashplate.control.kinds import save_controller
 from swashplate.control.lqg.design import design
 from swashplate.filtering.sensor_suite import suite
 

@@ -21,19 +21,19 @@ import swashplate as sp
 from made_results import result
 from made_telemetry import telemetry
 from swashplate.bench.record_files import is_bench, read_bench
-from swashplate.control.controller_file import read_controller, save_controller
-from swashplate.control.draws.robustness import draw_models
+from swashplate.control.draws.variations import draw_models
+from swashplate.control.kinds import read_controller, save_controller
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.lqg.design import design
 from swashplate.errors import SwashError
 from swashplate.export.control_json import control_json, read_linear
 from swashplate.export.linear import Linear
 from swashplate.filtering.sensor_suite import suite
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.growing import Growing
 from swashplate.flights.maneuvers.series import parse as maneuver
 from swashplate.flights.provenance import Provenance
+from swashplate.flights.tabular import write_csv
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.links.servos import servo_mapping
 from swashplate.models.linear.expressions import parse_tie

@@ -22,7 +22,7 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 from swashplate.errors import WriteError
-from swashplate.flights.csv_export import write_csv
+from swashplate.flights.tabular import write_csv
 from swashplate.flights.flight import Flight, stream
 from swashplate.bench.record import BenchRecord
 from swashplate.atomic import folder_when_complete, write_bytes

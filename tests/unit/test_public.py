@@ -11,19 +11,11 @@ import pytest
 import swashplate as sp
 from swashplate import public
 from swashplate.flights.flight import Flight
-from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.shown import Shown
-from swashplate.simulation.derivatives_over_speed import Derivatives
 
 METHODS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
     "Flight.condition": (Flight.condition, public.resolve("condition")),
     "Flight.to_dataframe": (Flight.to_dataframe, public.resolve("flight_to_dataframe")),
-    "Flight.plot": (Flight.plot, public.resolve("plot_flight")),
-    "FrequencyResponse.plot": (FrequencyResponse.plot, public.resolve("plot_responses")),
-    "Flight.explore": (Flight.explore, public.resolve("explore_flight")),
-    "FrequencyResponse.explore": (FrequencyResponse.explore, public.resolve("explore_responses")),
-    "Derivatives.plot": (Derivatives.plot, public.resolve("plot_derivatives")),
-    "Derivatives.explore": (Derivatives.explore, public.resolve("explore_derivatives")),
     "Shown.plot": (Shown.plot, public.resolve("plot")),
     "Shown.explore": (Shown.explore, public.resolve("explore")),
     "Flight.from_arrays": (Flight.from_arrays, public.resolve("flight_from_arrays")),

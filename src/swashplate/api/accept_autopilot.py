@@ -48,8 +48,7 @@ from swashplate.links.sensing import Sensing
 from swashplate.links.sockets import listen_udp
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.atmosphere import standard_altitude
-from swashplate.physics.environment import Environment
+from swashplate.physics.environment import Environment, standard_altitude
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.standing import airborne, standing
 from swashplate.simulation.trim import trim

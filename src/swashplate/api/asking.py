@@ -45,8 +45,8 @@ class FromLogs(VerbQuestion[Answer]):
     def _read(self, text: str) -> Flight:
         """The flight that a text names; a saved simulation goes by its file's name."""
         from swashplate.flights.consistency import UNCHECKED
+        from swashplate.flights.readers.options import split_log, split_window
         from swashplate.flights.readers.read import read as read_log
-        from swashplate.flights.readers.windows import split_log, split_window
 
         stamps = "drop" if self.drop_bad_stamps else "error"
         mapping = self.mapping or self._kept(text)
@@ -62,7 +62,7 @@ class FromLogs(VerbQuestion[Answer]):
     def _kept(self, text: str) -> Path | None:
         """The mapping that was kept for a table with these columns; units that are given speak for themselves."""
         from swashplate.flights.datasets import locate
-        from swashplate.flights.readers.windows import split_log, split_window
+        from swashplate.flights.readers.options import split_log, split_window
         from swashplate.links.logs.kept_mappings import kept
 
         place = None if self.units else kept(Path(locate(split_log(split_window(text)[0])[0])))
@@ -191,8 +191,7 @@ class InAir(OfVehicle[Answer]):
     def around(self, vehicle: Vehicle) -> Environment:
         """The environment that is asked for."""
         from swashplate.models.surroundings import environment_of
-        from swashplate.physics.atmosphere import air_density
-        from swashplate.physics.environment import Environment
+        from swashplate.physics.environment import Environment, air_density
 
         if self.altitude is not None and not -500.0 <= self.altitude <= 11_000.0:
             raise SwashError(f"is {self.altitude:g} m, expected -500 to 11000.", channel="altitude")

@@ -15,7 +15,7 @@ from swashplate.atomic import write_text
 from swashplate.control.analysis.cascade_gains import CascadeGains, cascade_gains, judge_cascade
 from swashplate.control.analysis.gain_premises import refused_by_card
 from swashplate.control.analysis.rotorflight_gains import judge_rotorflight, rotorflight_gains
-from swashplate.control.controller_file import save_controller
+from swashplate.control.kinds import save_controller
 from swashplate.control.laws.ardupilot.law import FLIGHT_MODES, RATE_OF_LOOPS, ArduPilotLaw, FlightMode
 from swashplate.control.laws.ardupilot.parameters import RENAMED
 from swashplate.control.laws.rotorflight.law import MODES as ROTORFLIGHT_MODES
@@ -31,7 +31,7 @@ from swashplate.links.ardupilot.parameters import parameters as ardupilot_parame
 from swashplate.links.px4.gains import RATE as PX4_RATE
 from swashplate.links.px4.gains import px4_file, px4_gains, px4_law
 from swashplate.links.px4.parameters import parameters as px4_parameters
-from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.figures.of_results import plain_page, section_of_loops
 from swashplate.reporting.structure import Report

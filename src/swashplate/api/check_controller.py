@@ -11,7 +11,7 @@ from typing import Any
 from swashplate.api.controllers import flown_by
 from swashplate.control.analysis.check import Command, ControlCheck
 from swashplate.control.analysis.check import check_controller as judge
-from swashplate.control.analysis.check_gusts import InGusts
+from swashplate.control.analysis.check_steps import InGusts
 from swashplate.control.analysis.requirements import ATTITUDE_COUPLING, GAIN_MARGIN, PHASE_MARGIN, REJECTION_PEAK
 from swashplate.control.lateness import lateness
 from swashplate.models.vehicle import Vehicle

@@ -15,10 +15,13 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.models.catalogue import vehicle
 from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.vehicle import Vehicle
-from swashplate.reporting.case_parts import CaseParts
-from swashplate.reporting.cases_of_models import compare_answers, compare_modes
-from swashplate.reporting.cases_of_responses import compare_responses
-from swashplate.reporting.cases_of_results import compare_estimates
+from swashplate.reporting.case_parts import (
+    CaseParts,
+    compare_answers,
+    compare_estimates,
+    compare_modes,
+    compare_responses,
+)
 from swashplate.validation.compare import ModelComparison, along_flights
 from swashplate.validation.verb import fitted
 

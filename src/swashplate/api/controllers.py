@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from swashplate.control.controller_file import read_controller
-from swashplate.control.kinds import kind_of
+from swashplate.control.kinds import kind_of, read_controller
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.controller import Controller

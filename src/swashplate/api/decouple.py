@@ -14,8 +14,8 @@ from swashplate.api.design_controller import margins_document
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.analysis.stability import loop_margins, loop_modes, require_stable
 from swashplate.control.analysis.straightness import DURATION, StepRun, command_for_speed, nearer, step_run
-from swashplate.control.controller_file import save_controller
-from swashplate.control.draws.robustness import draw_models
+from swashplate.control.draws.variations import draw_models
+from swashplate.control.kinds import save_controller
 from swashplate.control.lateness import lateness
 from swashplate.control.laws.autopilot import Autopilot, Mode, autopilot
 from swashplate.control.laws.decoupling import Lag, estimated_lag

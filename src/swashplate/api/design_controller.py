@@ -11,7 +11,7 @@ from typing import Any, Literal
 from swashplate.arrays import Array
 from swashplate.control.analysis.gain_premises import refused_by_card
 from swashplate.control.analysis.margins import Margins
-from swashplate.control.controller_file import save_controller
+from swashplate.control.kinds import save_controller
 from swashplate.control.lateness import lateness
 from swashplate.control.lqg.analysis import Analysis, analyse
 from swashplate.control.lqg.constant_gain import steady_sigmas, with_steady_gain

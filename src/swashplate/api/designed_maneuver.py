@@ -12,11 +12,11 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.atomic import write_text
 from swashplate.errors import ManeuverError
-from swashplate.flights.csv_export import as_csv
 from swashplate.flights.maneuvers.ardupilot_chirp import MIXER, Chirp
 from swashplate.flights.maneuvers.composed import ComposedMultisine
 from swashplate.flights.maneuvers.maneuver_design import sampled
 from swashplate.flights.maneuvers.series import FADE, Maneuver
+from swashplate.flights.tabular import as_csv
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.figures.of_results import plain_page, section_of_pieces
 from swashplate.reporting.structure import Report

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from swashplate.control.controller_file import read_controller
+from swashplate.control.kinds import read_controller
 from swashplate.engine.c_text import Precision, identifier
 from swashplate.export import formats
 from swashplate.export.control_json import read_linear

@@ -11,10 +11,10 @@ from swashplate.api.controllers import flown_by
 from swashplate.control.laws.hold import hover_hold
 from swashplate.control.laws.state_hold import state_hold
 from swashplate.errors import SwashError
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
-from swashplate.models.delays import input_delays
+from swashplate.flights.tabular import write_csv
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.flight_page import compose_flight
 from swashplate.reporting.structure import Report

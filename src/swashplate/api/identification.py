@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 from swashplate.api.report_folder import ReportFolder
 from swashplate.api.saying import Say, silent
 from swashplate.errors import IdentificationError
+from swashplate.flights.checked import check_disjoint
 from swashplate.flights.flight import Flight, as_flights
-from swashplate.flights.overlap import check_disjoint
 from swashplate.identification.core import stopping
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
@@ -22,7 +22,7 @@ from swashplate.identification.posterior import check_posterior
 from swashplate.identification.posterior import posterior as draw_posterior
 from swashplate.identification.time.feedback import FlightDetails
 from swashplate.models.card import Card
-from swashplate.models.choices import Free
+from swashplate.models.traits import Free
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.structure import Report

@@ -24,8 +24,7 @@ from swashplate.links.recorder import Recorder, recover
 from swashplate.links.sensing import Sensing
 from swashplate.links.servos import ServoMapping, packaged, servo_mapping
 from swashplate.links.sockets import is_loopback, listen_tcp, listen_udp
-from swashplate.models.delays import complete_delays, input_delays
-from swashplate.models.surroundings import environment_of
+from swashplate.models.surroundings import complete_delays, environment_of, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.record import monitored, unflown

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from swashplate.api.saying import announce
-from swashplate.control.controller_file import read_controller
+from swashplate.control.kinds import read_controller
 from swashplate.errors import SwashError
 from swashplate.links.live.replay import Replay, as_json
 from swashplate.models.vehicle import Vehicle

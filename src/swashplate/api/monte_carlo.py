@@ -13,10 +13,18 @@ import numpy as np
 from swashplate.api.controllers import flown_by
 from swashplate.api.fly_maneuver import save_flight
 from swashplate.arrays import Array
-from swashplate.control.draws.linear_draws import bounds_of, entries_of, vary_parameters
-from swashplate.control.draws.robustness import SENSOR_NOISE, draw_models
 from swashplate.control.draws.spread import Limits, Spread, spread
-from swashplate.control.draws.variations import draw_delays, draw_numbers, load_them, tolerances_of
+from swashplate.control.draws.variations import (
+    SENSOR_NOISE,
+    bounds_of,
+    draw_delays,
+    draw_models,
+    draw_numbers,
+    entries_of,
+    load_them,
+    tolerances_of,
+    vary_parameters,
+)
 from swashplate.control.kinds import kind_of
 from swashplate.control.lateness import lateness
 from swashplate.engine.law import REFERENCES

@@ -10,8 +10,8 @@ from swashplate.commit import commit
 from swashplate.export.formats import Export
 from swashplate.extras import version_of
 from swashplate.flights.datasets import locate
+from swashplate.flights.readers.options import split_log, split_window
 from swashplate.flights.readers.read import read as read_log
-from swashplate.flights.readers.windows import split_log, split_window
 from swashplate.links.logs.code_lines import Read
 from swashplate.links.logs.kept_mappings import kept
 from swashplate.links.logs.remedies import Remedy

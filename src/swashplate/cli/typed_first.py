@@ -29,7 +29,7 @@ def refuse_wrong_names(command: Any, given: Mapping[str, Any]) -> None:
 
 def _log(text: str) -> None:
     from swashplate.flights.datasets import locate
-    from swashplate.flights.readers.windows import split_log, split_window
+    from swashplate.flights.readers.options import split_log, split_window
 
     _place(locate(split_log(split_window(text)[0])[0]))
 

@@ -9,8 +9,13 @@ an entry point of the group `swashplate.controllers` that names an instance of a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+import tomli_w
+
+from swashplate import documents
+from swashplate.atomic import write_text
 from swashplate.control.analysis.judged_loop import Aircraft, JudgedLoop, judged_with_states
 from swashplate.control.analysis.margins import Margins
 from swashplate.errors import ControllerError
@@ -118,3 +123,32 @@ CONTROLLERS: Registry[ControllerKind[Any]] = Registry(
 def kind_of(controller: Controller) -> ControllerKind[Any]:
     """The kind of a controller, by its `type`."""
     return CONTROLLERS[controller.type] if controller.type else PLAIN
+
+
+def save_controller(controller: Controller, path: str | Path) -> None:
+    """Write a controller as a TOML file.
+
+    Raises:
+        ControllerError: where its kind has no file.
+    """
+    write_text(path, tomli_w.dumps(kind_of(controller).to_document(controller)))
+
+
+def read_controller(path: str | Path) -> Controller:
+    """A controller from its file.
+
+    Raises:
+        ControllerError: naming the file and the entry that is missing, unknown or no number.
+    """
+    document = documents.read_document(path, form="toml", error=ControllerError)
+    if document.get("kind") != "controller":
+        raise ControllerError(
+            f"kind is {document.get('kind')!r:.60}, expected 'controller'.",
+            where=path,
+            hint="`swash control decouple MODEL --out FILE` writes one.",
+        )
+    name = document.get("type")
+    if not isinstance(name, str) or name not in CONTROLLERS:
+        raise ControllerError(f"is {name!r:.60}, expected {', '.join(CONTROLLERS)}.", where=path, channel="type")
+    controller: Controller = CONTROLLERS[name].from_document(document, str(path))
+    return controller

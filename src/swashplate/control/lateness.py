@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.controller import Controller
 

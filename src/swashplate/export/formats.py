@@ -13,10 +13,10 @@ from swashplate.errors import ExportError
 from swashplate.export.linear import Linear, logged_delays, of_state_space, of_vehicle
 from swashplate.export.origin import origin_of
 from swashplate.flights.flight import Flight
-from swashplate.models.delays import input_delays
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.residual import refuse_predictor
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry
 from swashplate.simulation.controller import Controller

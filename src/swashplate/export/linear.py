@@ -8,9 +8,9 @@ from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.errors import ExportError
-from swashplate.models.delays import input_delays
 from swashplate.models.linear import python_control
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim

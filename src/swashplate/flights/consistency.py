@@ -29,7 +29,7 @@ from swashplate.flights.agreement import (
 from swashplate.flights.conditioning.attitude import continuous, interpolate, quaternion_from_euler, to_body
 from swashplate.flights.conditioning.derive import GRAVITY, body_rates, differentiate
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers.given_units import unit_to_give
+from swashplate.flights.readers.options import unit_to_give
 from swashplate.flights.schema import ATTITUDE, LOGGED_UNIT, POSITION, QUATERNION, RATES, VARIANTS, VELOCITY, channel
 
 UNCHECKED = "consistency_not_checked"

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,11 +20,11 @@ from swashplate.flights.schema import channel
 from swashplate.meant import taking_names
 from swashplate.public import resolve
 from swashplate.registry import listed
+from swashplate.shown import Shown
 
 if TYPE_CHECKING:  # a quarter of a second to import, and designs and trims have no flight
     import pandas as pd
     import xarray as xr
-    from matplotlib.figure import Figure
 
 
 def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[str, str] | None = None) -> xr.Dataset:
@@ -66,7 +66,7 @@ def did_you_mean(name: str, channels: Iterable[str]) -> str | None:
 
 
 @dataclass(frozen=True)
-class Flight:
+class Flight(Shown):
     """A flight: streams of channels, each stream at its native times.
 
     Attributes:
@@ -230,23 +230,6 @@ class Flight:
         frame: pd.DataFrame = resolve("flight_to_dataframe")(self, stream=stream)
         return frame
 
-    def plot(
-        self, *, channels: Sequence[str] | None = None, theme: Literal["paper", "light", "dark"] = "paper"
-    ) -> Figure:
-        """Channels over time as a matplotlib figure: one panel each, or the usual groups where none are named."""
-        figure: Figure = resolve("plot_flight")(self, channels=channels, theme=theme)
-        return figure
-
-    def explore(
-        self, *, channels: Sequence[str] | None = None, theme: Literal["paper", "light", "dark"] = "light"
-    ) -> Any:
-        """The same as a `plotly.graph_objects.Figure`, to zoom and point at."""
-        return resolve("explore_flight")(self, channels=channels, theme=theme)
-
-    def _repr_html_(self) -> str:
-        page: str = resolve("html_of")(self)
-        return page
-
     # ---- files -------------------------------------------------------------------------------------------------
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the flight as a netCDF file without loss (`storage.save`); returns its path."""
@@ -324,11 +307,6 @@ class Flight:
         """Frequency responses of its outputs to its inputs: see `swashplate.respond`."""
         channels = {"inputs": inputs, "outputs": outputs, "references": references}
         return resolve("respond")(self, **channels, band=band, windows=windows, direct=direct)
-
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """A page about it: see `swashplate.report`."""
-        written: Path = resolve("report")(self, path=path)
-        return written
 
     def __repr__(self) -> str:
         name = self.provenance.source or "(unnamed)"

@@ -12,9 +12,9 @@ from swashplate.flights.aircraft_kind import aircraft_kind
 from swashplate.flights.consistency import consistency
 from swashplate.flights.epoch import note
 from swashplate.flights.flight import Flight
-from swashplate.flights.input_signs import input_signs, sign_problem, sign_words
 from swashplate.flights.jumps import OUTLIER, attitudes, jumps
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
+from swashplate.flights.motion_signs import input_signs, sign_problem, sign_words
 from swashplate.flights.schema import channel, is_known
 from swashplate.flights.time_base import StreamSummary, time_base
 from swashplate.shown import Shown

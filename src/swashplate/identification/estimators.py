@@ -17,8 +17,8 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.card import Card
-from swashplate.models.choices import Free
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.traits import Free
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.registry import Registry

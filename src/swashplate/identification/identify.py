@@ -11,8 +11,8 @@ from swashplate.identification.core.result import Result
 from swashplate.identification.estimators import ESTIMATORS, Data, Estimator, Question, check_method
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.card import Card
-from swashplate.models.choices import Free
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.traits import Free
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 

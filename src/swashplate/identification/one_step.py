@@ -23,7 +23,7 @@ from swashplate.arrays import Array
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.result import Result, bounds_of
 from swashplate.identification.time.record_fit import LAGS
-from swashplate.models.choices import PhysicalEffect
+from swashplate.models.traits import PhysicalEffect
 
 LEVEL = 0.01
 """Chance, over all effects together, of calling one needed that is not there."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from swashplate.atomic import added_when_complete
 from swashplate.errors import FlightError, LinkError, SwashError, WriteError
 from swashplate.flights import growing
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight
 from swashplate.flights.growing import SUFFIX, Abandoned, Growing
+from swashplate.flights.tabular import write_csv
 from swashplate.links.notices import Say
 
 LEAST = 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swashplate.models.choices import Choice, Free, PhysicalEffect
+from swashplate.models.traits import Choice, Free, PhysicalEffect
 
 _PAPER_TIES = ("a_beta_u = a_alpha_v", "a_beta_v = a_alpha_u", "a_beta_q = a_alpha_p")
 _LINEAR_TIES = (

@@ -11,7 +11,6 @@ import numpy as np
 
 from swashplate.errors import CardError
 from swashplate.models.card import Card
-from swashplate.models.choices import Choice, Free, PhysicalEffect
 from swashplate.models.multirotor import (
     Battery,
     MotorWarmth,
@@ -22,7 +21,7 @@ from swashplate.models.multirotor import (
     specific_force,
     steady_speed,
 )
-from swashplate.models.traits import Axis, Pose, RecordingFit, Traits
+from swashplate.models.traits import Axis, Choice, Free, PhysicalEffect, Pose, RecordingFit, Traits
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics import rotor
 from swashplate.physics.backend import Backend, Scalar

@@ -10,12 +10,11 @@ from typing import Any
 from swashplate.arrays import Array, Complex
 from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter
-from swashplate.models.choices import Choice
 from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.surroundings import environment_of
-from swashplate.models.traits import Role, Traits
+from swashplate.models.traits import Choice, Role, Traits
 from swashplate.models.usual_axes import usual_axes
 from swashplate.physics.backend import Backend, FloatBackend
 from swashplate.physics.environment import Environment

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from swashplate.control.analysis.check import ControlCheck
 from swashplate.control.analysis.margins import AxisMargins
 from swashplate.control.analysis.requirements import (
@@ -216,11 +214,8 @@ def _handling(check: ControlCheck) -> Section | None:
         "ADS-33E-PRF: the bandwidth of an attitude response is the one by phase, that of a rate response the lower of "
         "the two. If the type was not given, the phase at a tenth of the bandwidth decides it."
     )
-    blocks: list[Block] = [tabulate("Bandwidth and phase delay", columns, rows, note=note)]
-    if any(a.handling and np.isfinite(a.handling.bandwidth.value) for a in check.attitudes):
-        blocks.append(figures.bandwidth_chart(check))
-    blocks.append(figures.attitude_figure(check))
-    return Section("handling", "How does it follow a pilot?", tuple(blocks), folded=True)
+    table = tabulate("Bandwidth and phase delay", columns, rows, note=note)
+    return Section("handling", "How does it follow a pilot?", (table, figures.attitude_figure(check)), folded=True)
 
 
 def _steps(check: ControlCheck) -> Section | None:

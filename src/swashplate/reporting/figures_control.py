@@ -1,8 +1,6 @@
-"""Figures of a controller's check: loops, sensitivities, attitude responses, the bandwidth chart and steps."""
+"""Figures of a controller's check: loops, sensitivities, attitude responses and steps."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -10,7 +8,6 @@ from swashplate.control.analysis.check import ControlCheck
 from swashplate.flights.schema import channel
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (
-    BLACK,
     GREY,
     MODEL,
     PUBLISHED,
@@ -23,7 +20,6 @@ from swashplate.reporting.theme import (
     grid,
     line,
     over_frequency,
-    shade,
     style,
 )
 
@@ -121,49 +117,6 @@ def attitude_figure(check: ControlCheck) -> Figure:
         caption="Attitude over the pilot's command, all loops closed; -135 and -180 degrees are dotted.",
         alt="Bode diagram of the attitude responses with their bandwidths.",
         keys=tuple(keys),
-    )
-
-
-def bandwidth_chart(check: ControlCheck) -> Figure:
-    """Phase delay over bandwidth, one panel an axis, with the scaled level boundaries."""
-    judged = [a for a in check.attitudes if a.handling and np.isfinite(a.handling.bandwidth.value)]
-    titles = [ATTITUDE_WORDS[a.state] for a in judged]
-    layout = grid(
-        titles, columns=min(3, len(titles)), height=240, x_title="bandwidth [rad/s]", y_title="phase delay [s]"
-    )
-    delays = [a.handling.phase_delay.value for a in judged if a.handling]
-    highest = 1.4 * max([d for d in delays if np.isfinite(d)] or [0.1])
-    traces: list[dict[str, Any]] = []
-    for i, a in enumerate(judged):
-        assert a.handling is not None
-        number = axis_number(i)
-        bandwidth, delay = a.handling.bandwidth.value, a.handling.phase_delay.value
-        first, second = check.boundary(a.state).scaled(check.scale)
-        right = 1.3 * max(bandwidth, first)
-        for low, high, color, label in (
-            (first, right, "rgba(0,158,115,0.18)", "Level 1"),
-            (second, first, "rgba(230,159,0,0.18)", "Level 2"),
-            (0.0, second, "rgba(213,94,0,0.18)", "Level 3"),
-        ):
-            around = ([low, high, high, low, low], [0.0, 0.0, highest, highest, 0.0])
-            box = shade(*around, name=label, color=color, axis=number)
-            traces.append({**box, "line": {"color": GREY, "width": 1.0}})
-            layout["annotations"].append(
-                {"text": label, "x": 0.5 * (low + high), "y": 0.93 * highest, "xref": f"x{number}",
-                 "yref": f"y{number}", "showarrow": False, "font": {"size": 10}}
-            )  # fmt: skip
-        marker, hover = {"color": BLACK, "size": 11, "symbol": "circle"}, "%{x:.3g} rad/s, %{y:.3g} s"
-        traces.append(dots([bandwidth], [delay], marker, name=a.state, hover=hover, axis=number))
-        layout[f"xaxis{number}"]["range"] = [0.0, right]
-        layout[f"yaxis{number}"]["range"] = [0.0, highest]
-    return Figure(
-        identifier="bandwidth-chart",
-        spec={"data": traces, "layout": layout},
-        caption=f"ADS-33E-PRF bandwidth and phase delay, boundaries scaled for N = {check.scale:.3g}. Only the "
-        "vertical part of the boundaries is drawn, and their numbers were not checked against the standard's text.",
-        alt="Bandwidth and phase delay of each axis against the boundaries of Levels 1 and 2.",
-        keys=(Key("this loop", BLACK, "circle"),),
-        min_width=620,
     )
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.flights.schema import channel
-from swashplate.reporting.downsample import joined, kept
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (
     BAND,
@@ -22,6 +21,8 @@ from swashplate.reporting.theme import (
     base_layout,
     dots,
     grid,
+    joined,
+    kept,
     line,
     numbers,
     shade,

@@ -9,7 +9,6 @@ import numpy as np
 from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.flights.schema import channel
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.reporting.downsample import kept
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (
     FLIGHT,
@@ -18,6 +17,7 @@ from swashplate.reporting.theme import (
     PUBLISHED,
     axis_title,
     inputs_title,
+    kept,
     line,
     over_frequency,
     shown,

@@ -10,16 +10,18 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.flights.schema import channel
-from swashplate.reporting.downsample import MAX_POINTS, joined, kept
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (
     BAND,
     FLIGHT,
     INPUT_COLORS,
+    MAX_POINTS,
     MODEL,
     axis_title,
     dots,
     inputs_title,
+    joined,
+    kept,
     line,
     numbers,
     shade,

@@ -11,10 +11,9 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.reporting.downsample import kept
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Figure, Points, Report, Section
-from swashplate.reporting.theme import BLUE, axis_number, line, quantity, stacked
+from swashplate.reporting.theme import BLUE, axis_number, kept, line, quantity, stacked
 
 _PANEL = 118
 """Height of one panel [px]."""

@@ -10,7 +10,6 @@ from typing import Any, Protocol, runtime_checkable
 
 from swashplate.bench.result import BenchDetails
 from swashplate.errors import SwashError
-from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -40,7 +39,7 @@ class HasPage(Protocol):
 
 
 def report(
-    *results: Shown | Flight | FrequencyResponse | HasPage | None,
+    *results: Shown | HasPage | None,
     path: str | os.PathLike[str],
     title: str | None = None,
     modes: Mapping[str, Sequence[Mode]] | None = None,
@@ -67,7 +66,7 @@ def report(
 
 
 def structure_of(
-    *results: Shown | Flight | FrequencyResponse | HasPage | None,
+    *results: Shown | HasPage | None,
     title: str | None = None,
     modes: Mapping[str, Sequence[Mode]] | None = None,
 ) -> Report:

@@ -7,15 +7,31 @@ from pathlib import Path
 
 from swashplate.errors import SwashError
 from swashplate.identification.core.sources import problem_words, scale_words
+from swashplate.identification.frequency.search_result import StructureSearch
 from swashplate.identification.frequency.state_space_result import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
 from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.reporting.sections_search import search_section
 from swashplate.reporting.sections_verification import verification_section
-from swashplate.reporting.structure import Report
+from swashplate.reporting.structure import Cell, Points, Report, Section, tabulate
 from swashplate.reporting.terms import first_screen
 from swashplate.reporting.words import listed
+
+
+def search_section(search: StructureSearch) -> Section:
+    """The structures that were tried, and why one was picked."""
+    head, *rows = search.rows()
+    cells = tuple(
+        tuple(
+            Cell(f"{text} (picked)" if c is search.pick and k == 0 else text, number=0 < k < len(row) - 1)
+            for k, text in enumerate(row)
+        )
+        for c, row in zip(search.tried, rows, strict=True)
+    )
+    why = Points(tuple(text.strip() for text in search.reasons), title="Why this one")
+    return Section(
+        "structures", "Which structures were tried?", (why, tabulate("Structures", head, cells)), folded=True
+    )
 
 
 def response_report(material: ResponseMaterial, *, path: str | os.PathLike[str], title: str | None = None) -> Path:

@@ -16,7 +16,7 @@ from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
-from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.controller import Controller

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import DerivativeTable, factor_to_feet, split_name, unit
 from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
-from swashplate.shown import Saved
+from swashplate.shown import Shown
 from swashplate.simulation.derivatives import CardSpread, derivative_table, spread
 from swashplate.simulation.trim import Trim
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 _NOTHING = 1e-9
 """Smaller derivatives are not shown."""
 
 
 @dataclass(frozen=True, repr=False)
-class Derivatives(Saved):
+class Derivatives(Shown):
     """Derivatives of force per mass and moment per inertia, by contributor; flapping follows without delay.
 
     Attributes:
@@ -105,19 +105,6 @@ class Derivatives(Saved):
             lines += ["".join(f"{c:>{w}}" for c, w in zip(row, widths, strict=True)) for row in (head, *rows)]
         lines += [self.bounds.words] if self.bounds is not None else []
         return "\n".join(lines)
-
-    def plot(self, *, row: str = "M", theme: Literal["paper", "light", "dark"] = "paper") -> Figure:
-        """The derivatives of one force or moment (X, Y, Z, L, M or N) over speed, as a matplotlib figure."""
-        figure: Figure = resolve("plot_derivatives")(self, row=row, theme=theme)
-        return figure
-
-    def explore(self, *, row: str = "M", theme: Literal["paper", "light", "dark"] = "light") -> Any:
-        """The same as a `plotly.graph_objects.Figure`, to zoom and point at."""
-        return resolve("explore_derivatives")(self, row=row, theme=theme)
-
-    def _repr_html_(self) -> str:
-        page: str = resolve("html_of")(self)
-        return page
 
 
 def derivatives(

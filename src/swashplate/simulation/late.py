@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import CardError, SwashError
-from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim, trim

@@ -14,12 +14,12 @@ from swashplate import atomic
 from swashplate.arrays import Array, Complex, largest_first
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.engine.slopes import rates_and_slopes
-from swashplate.models.delays import known_delays
 from swashplate.models.linear import python_control
 from swashplate.models.linear.matrices_file import state_space_of_matrices
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
 from swashplate.models.residual import refuse_predictor
+from swashplate.models.surroundings import known_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
 from swashplate.simulation.trim import Trim

@@ -12,7 +12,7 @@ from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space_file import parse
-from swashplate.reporting.cases_of_models import match
+from swashplate.reporting.case_parts import match
 
 MODEL = """
 kind = "state-space"

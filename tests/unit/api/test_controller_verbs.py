@@ -13,8 +13,7 @@ import pytest
 import swashplate as sp
 from swashplate.api.decouple_axes import decouple_axes
 from swashplate.api.fly_maneuver import fly_maneuver
-from swashplate.control.controller_file import read_controller, save_controller
-from swashplate.control.kinds import CONTROLLERS, PLAIN, ControllerKind, kind_of
+from swashplate.control.kinds import CONTROLLERS, PLAIN, ControllerKind, kind_of, read_controller, save_controller
 from swashplate.errors import ControllerError, SwashError
 from swashplate.json_text import as_json
 from swashplate.simulation.wind import INDOOR

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from observer_trial import trial
-from swashplate.control.controller_file import read_controller, save_controller
+from swashplate.control.kinds import read_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.constant_gain import steady_sigmas, with_steady_gain
 from swashplate.control.lqg.controller import Lqg

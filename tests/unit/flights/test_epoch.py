@@ -9,10 +9,10 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import FlightError, UnitError
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.epoch import from_iso, iso, rebased
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Event, Provenance
+from swashplate.flights.tabular import write_csv
 from swashplate.identification.core.records import uniform_table
 
 ZERO = 1_772_681_685

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.flights.motion_signs import sign_of
-from swashplate.flights.senses import INTEGRATIONS, expected_sense
+from swashplate.flights.motion_signs import INTEGRATIONS, expected_sense, sign_of
 from swashplate.models.linear.state_space_file import structure
 
 

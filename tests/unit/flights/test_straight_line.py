@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import detrend
 
-from swashplate.flights.straight_line import detrended
+from swashplate.flights.conditioning.filters import detrended
 
 
 def test_the_best_line_is_taken_out_of_every_column() -> None:

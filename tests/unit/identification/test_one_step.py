@@ -15,7 +15,7 @@ from swashplate.identification.core.result import Fitted
 from swashplate.identification.identify import identify
 from swashplate.identification.one_step import in_words, not_judged, one_step_effects
 from swashplate.models.catalogue import vehicle
-from swashplate.models.choices import PhysicalEffect
+from swashplate.models.traits import PhysicalEffect
 
 NAMES = ("linkage_lower", "o_zeta_lower", "a_alpha_u_linear")
 SPIN = PhysicalEffect("spin", {"gyroscopic": 0.0})

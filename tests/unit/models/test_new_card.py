@@ -9,8 +9,7 @@ import pytest
 from swashplate.errors import CardError
 from swashplate.models.card import Card, packaged_cards
 from swashplate.models.catalogue import from_card
-from swashplate.models.conventional.new_card import new_card
-from swashplate.models.conventional.size_classes import CLASSES, default_class
+from swashplate.models.conventional.new_card import CLASSES, default_class, new_card
 from swashplate.simulation.trim import trim
 
 TYPICAL = {"micro": (0.3, 0.22), "600": (4.6, 0.68), "90": (8.2, 0.78), "rmax": (80.0, 1.55), "full-size": (7440, 8.18)}

@@ -12,7 +12,7 @@ import pytest
 import swashplate
 from swashplate.models.card import Card, Parameter
 from swashplate.models.catalogue import EQUATIONS, vehicle
-from swashplate.models.choices import uncertain_numbers
+from swashplate.models.traits import uncertain_numbers
 
 SOURCE = Path(swashplate.__file__).parent
 NAMES = {"coax", "conventional", "linear"}

@@ -18,10 +18,9 @@ from swashplate.errors import SwashError
 from swashplate.extras import library
 from swashplate.reporting.compose import compose
 from swashplate.reporting.figures import of_flight
-from swashplate.reporting.figures.interactive import interactive
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import DARK
-from swashplate.reporting.figures.views import figures_of
+from swashplate.reporting.figures.views import figures_of, interactive
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import axis, base_layout, line
 from swashplate.simulation.linearize import LinearModel

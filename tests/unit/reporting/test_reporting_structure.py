@@ -19,7 +19,6 @@ from swashplate.flights.provenance import Problem, ProcessingStep
 from swashplate.identification.core import result_file
 from swashplate.identification.core.sources import source_of, sources_of
 from swashplate.reporting.compose import compose, hover_modes
-from swashplate.reporting.downsample import joined, kept
 from swashplate.reporting.figures_fit import autocorrelation, cost_history
 from swashplate.reporting.figures_time import Series, time_figures
 from swashplate.reporting.sections_fit import parameters
@@ -27,7 +26,7 @@ from swashplate.reporting.sections_validation import apart
 from swashplate.reporting.structure import Cell, Report, Section, Table
 from swashplate.reporting.terminal_tables import fit_table
 from swashplate.reporting.terms import TERMS
-from swashplate.reporting.theme import packed, phase_ticks
+from swashplate.reporting.theme import joined, kept, packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash
 from swashplate.reporting.words import (
     mode_words,

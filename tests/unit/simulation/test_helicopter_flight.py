@@ -15,10 +15,9 @@ from swashplate.models.catalogue import from_card, vehicle
 from swashplate.models.doubts import doubts
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics import actuators, engine
-from swashplate.physics.atmosphere import air_density
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.engine import RotorSpeed
-from swashplate.physics.environment import Environment
+from swashplate.physics.environment import Environment, air_density
 from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.standing import at_rest, standing

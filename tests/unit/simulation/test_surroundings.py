@@ -10,7 +10,7 @@ import swashplate as sp
 from swashplate.api.simulate_batch import simulate_batch
 from swashplate.errors import CardError
 from swashplate.models.surroundings import environment_of
-from swashplate.physics.atmosphere import air_density
+from swashplate.physics.environment import air_density
 from swashplate.simulation.late import acting_rows
 
 HEAVE = sp.structure("heave")

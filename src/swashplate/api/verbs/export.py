@@ -89,7 +89,7 @@ class ExportModel(OfVehicle["Exported"]):
         from swashplate.api.export import export_controller, export_model
         from swashplate.documents import kind_of
         from swashplate.export.formats import FORMATS
-        from swashplate.flights.readers.windows import is_log
+        from swashplate.flights.readers.options import is_log
 
         if self.form not in FORMATS:
             hint = f"There are {', '.join(FORMATS)}."

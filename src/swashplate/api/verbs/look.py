@@ -193,8 +193,7 @@ class Inspect(FromLogs[Looked]):
         return Looked((record_table(record), f"\nEvaluate it with `swash bench {name}`."), record_as_dict(record))
 
     def _rotor(self) -> Looked:
-        from swashplate.flights.rotor_speed import rotor_speed
-        from swashplate.flights.rotor_speed_words import line_words, lines_of
+        from swashplate.flights.rotor_speed import line_words, lines_of, rotor_speed
 
         measured = rotor_speed(self.read(self.logs)[0], lines=lines_of(self.line or ()), per_turn=self.per_turn)
         lines: Mapping[str, Any] = measured.history[-1].details["lines"]

@@ -60,8 +60,8 @@ class Respond(FromConditioned["FrequencyResponse"]):
         return self._responded(say) if self.combine is None else self._combined()
 
     def _responded(self, say: Say) -> FrequencyResponse:
+        from swashplate.flights.checked import check_disjoint
         from swashplate.flights.conditioning.uniform_records import uniform_records
-        from swashplate.flights.overlap import check_disjoint
         from swashplate.identification.responses.respond import respond
 
         ins, outs, references = _pairs(self.inputs), _pairs(self.outputs), strings(self.references)

@@ -81,7 +81,7 @@ class Validate(FromConditioned["Validation | LinearStudy"]):
         if min(self.horizons) <= 0.0:
             told = ",".join(f"{one:g}" for one in self.horizons)
             raise SwashError(f"'{told}' are not all positive.", channel="--horizons")
-        from swashplate.flights.overlap import check_disjoint
+        from swashplate.flights.checked import check_disjoint
         from swashplate.identification.core.records import records
         from swashplate.validation.validation import Validation
         from swashplate.validation.verb import validate

@@ -146,7 +146,7 @@ class NewVehicle(VerbQuestion["Card"]):
         return [f"Careful: mass and radius ask for {self._usual().why}."]
 
     def _usual(self) -> Any:
-        from swashplate.models.conventional.size_classes import default_class
+        from swashplate.models.conventional.new_card import default_class
 
         return default_class(self.mass, self.radius)
 

@@ -10,8 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.control.analysis.check_gusts import InGusts, fly_gusts
-from swashplate.control.analysis.check_steps import COUPLING_WITHIN, STEPS, Coupling, Step, couplings_of, fly_steps
+from swashplate.control.analysis.check_steps import (
+    COUPLING_WITHIN,
+    STEPS,
+    Coupling,
+    InGusts,
+    Step,
+    couplings_of,
+    fly_gusts,
+    fly_steps,
+)
 from swashplate.control.analysis.judged_loop import Aircraft
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.analysis.requirements import (

@@ -13,8 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.control.lqg.controller_step import LawOnEstimates, sizes
-from swashplate.control.lqg.graph import readings_kept, sensed_graph, step_graph
+from swashplate.control.lqg.graph import LawOnEstimates, readings_kept, sensed_graph, sizes, step_graph
 from swashplate.control.lqg.law import Feedback
 from swashplate.engine.law import FELT, LawGraph, draw_names
 from swashplate.errors import ControllerError

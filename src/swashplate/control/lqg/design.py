@@ -17,9 +17,7 @@ from swashplate.arrays import Array
 from swashplate.control.analysis.margins import promised_disc
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.law import Feedback
-from swashplate.control.lqg.optimal import regulator
-from swashplate.control.lqg.steady_loop import Watched, crossovers
-from swashplate.control.lqg.weights import (
+from swashplate.control.lqg.optimal import (
     ALLOWED,
     DISC,
     EFFORT,
@@ -32,18 +30,19 @@ from swashplate.control.lqg.weights import (
     bryson,
     checked_weights,
     crossover_limits,
+    regulator,
     square,
     total_delays,
     typical,
 )
+from swashplate.control.lqg.steady_loop import Watched, crossovers
 from swashplate.engine.equations import equations_of, parameter_row
 from swashplate.errors import ControllerError
 from swashplate.filtering import disturbances, observer
 from swashplate.filtering.disturbances import Unrest
 from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.sensor_suite import Suite
-from swashplate.models.delays import complete_delays, input_delays
-from swashplate.models.surroundings import environment_of
+from swashplate.models.surroundings import complete_delays, environment_of, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.discretisation import with_late_inputs, zero_order_hold

@@ -1,4 +1,4 @@
-"""Linear-quadratic controllers among the kinds of controllers: their file, their loop, their C."""
+"""Linear-quadratic controllers among the kinds: file, loop, C, another vehicle, and how it differs from their own."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.judged_loop import Aircraft, JudgedLoop, judged_with_states
@@ -14,12 +15,160 @@ from swashplate.control.kinds import ControllerKind, TracedStep
 from swashplate.control.lqg.analysis import sensitivity
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.file import lqg_document, lqg_from
-from swashplate.control.lqg.other_model import differences
 from swashplate.control.lqg.steady_loop import observed_loop
-from swashplate.control.lqg.transfer import flown_on
+from swashplate.engine.equations import parameter_row
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.trim import Trim
+
+_COMPARED = ("p", "q", "r", "w")
+"""States whose answers to an input are compared."""
+_NAMED = 4
+"""Numbers of the card that are named, those that differ most."""
+_ALIKE = 1e-9
+
+
+def differences(controller: Lqg, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
+    """What differs; empty where the controller was designed on what flies.
+
+    Args:
+        controller: with the model of its design.
+        flying: who flies, where, how late.
+        margins: of the loop; the answers to an input are compared at its crossover, at 5 rad/s where there is none.
+    """
+    vehicle = flying.vehicle
+    told = [*_numbers(controller, flying), *_options(controller, flying), *_delays(controller, flying)]
+    if not told and controller.vehicle.name == vehicle.name:
+        return ()
+    own = controller.vehicle.card.title
+    head = f"The controller was designed on another model ('{own}') than the one flown ('{vehicle.card.title}')."
+    return (head, *told, *_answers(controller, flying, margins))
+
+
+def _numbers(controller: Lqg, flying: Aircraft) -> list[str]:
+    """Numbers of the card that differ, where the equations are the same."""
+    own, theirs = controller.vehicle.card.values(), flying.vehicle.card.values()
+    if controller.vehicle.name != flying.vehicle.name:
+        return [f"Equations: '{controller.vehicle.name}' against '{flying.vehicle.name}'."]
+    moved = {}
+    for name in sorted(own.keys() | theirs.keys()):
+        a, b = own.get(name, 0.0), theirs.get(name, 0.0)
+        size = max(abs(a), abs(b))
+        if size and abs(a - b) > _ALIKE * size:
+            moved[name] = abs(a - b) / size
+    most = sorted(moved, key=lambda name: -moved[name])[:_NAMED]
+    listed = ", ".join(f"{name} {own.get(name, 0.0):.4g} against {theirs.get(name, 0.0):.4g}" for name in most)
+    rest = f" and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
+    return [f"Numbers of the card (design against flown): {listed}{rest}."] if moved else []
+
+
+def _options(controller: Lqg, flying: Aircraft) -> list[str]:
+    own, theirs = controller.vehicle.card.options, flying.vehicle.card.options
+    if controller.vehicle.name != flying.vehicle.name:
+        return []
+    names = [name for name in sorted(own.keys() | theirs.keys()) if own.get(name) != theirs.get(name)]
+    listed = ", ".join(f"{name} {own.get(name)!r} against {theirs.get(name)!r}" for name in names)
+    return [f"Options (design against flown): {listed}."] if names else []
+
+
+def _delays(controller: Lqg, flying: Aircraft) -> list[str]:
+    """Inputs that are later than was designed for, or earlier by more than a sample."""
+    names = []
+    for name, believed in controller.delays.items():
+        real = flying.delays.get(name, 0.0)
+        if real > believed + _ALIKE or real < believed - 1.0 / controller.rate:
+            names.append(f"{name} {1e3 * believed:.3g} against {1e3 * real:.3g} ms")
+    return [f"Delays (design against flown): {', '.join(names)}."] if names else []
+
+
+def _answers(controller: Lqg, flying: Aircraft, margins: Margins | None) -> list[str]:
+    """Relative difference of the answers in p, q, r and w to each input, delays included, at its crossover."""
+    at = int(np.argmin(np.abs(np.asarray(controller.feedback.speeds) - flying.trim.speed)))
+    start = controller.start
+    own_trim = replace(
+        start,
+        state=np.asarray(controller.feedback.states)[at],
+        inputs=np.asarray(controller.feedback.inputs)[at],
+        speed=float(np.asarray(controller.feedback.speeds)[at]),
+    )
+    own, theirs = linearize(controller.vehicle, own_trim), linearize(flying.vehicle, flying.trim)
+    crossovers = {a.name: a.crossover for a in margins.axes} if margins is not None else {}
+    apart = []
+    for name in own.inputs:
+        w = crossovers.get(name, float("nan"))
+        w = w if np.isfinite(w) else 5.0
+        a = _answer(own, name, w, controller.delays.get(name, 0.0))
+        b = _answer(theirs, name, w, flying.delays.get(name, 0.0))
+        size = float(np.linalg.norm(a))
+        if size > 0.0:
+            apart.append(f"{name} {100.0 * float(np.linalg.norm(b - a)) / size:.0f} % at {w:.3g} rad/s")
+    return [f"Answers of p, q, r and w to the inputs differ by: {', '.join(apart)}."] if apart else []
+
+
+def _answer(model: LinearModel, name: str, w: float, delay: float) -> NDArray[np.complex128]:
+    n = len(model.states)
+    column = model.B[:, model.inputs.index(name)]
+    states = np.linalg.solve(1j * w * np.eye(n) - model.A, column.astype(complex))
+    picked = [states[model.states.index(state)] for state in _COMPARED]
+    return np.asarray(np.array(picked) * np.exp(-1j * w * delay), dtype=np.complex128)
+
+
+def flown_on(controller: Lqg, vehicle: Vehicle, trim: Trim) -> Lqg:
+    """The controller with its deviations counted from another vehicle's trim, and that vehicle's limits.
+
+    The observer goes on predicting with the linear model; states of the same name start at the trim's.
+
+    Args:
+        controller: designed on a linear model, with sensors (another vehicle has other states to be fed with).
+        vehicle: with the same inputs in the same order.
+        trim: where it flies.
+
+    Raises:
+        ControllerError: where the inputs are not the same, or it has no sensors.
+    """
+    if not controller.plan.sensors:
+        raise ControllerError(
+            "is fed with the linear model's states, which another vehicle does not have.",
+            where=controller.vehicle.card.title,
+            hint="Design it with --method lqg: sensors read the same of both.",
+        )
+    own = about(controller.vehicle, trim)
+    numbers = own.card.values()
+    named = {name: numbers.get(f"trim_{name}", 0.0) for name in own.state_names}
+    state = np.array([trim.states().get(name, value) for name, value in named.items()])
+    limits = np.array(vehicle.input_limits)
+    feedback = controller.feedback._replace(
+        states=state[None], inputs=np.array(trim.inputs)[None], low=limits[:, 0], high=limits[:, 1]
+    )
+    return replace(
+        controller,
+        vehicle=own,
+        feedback=feedback,
+        numbers=controller.numbers._replace(parameters=parameter_row(own, trim.environment)),
+        start=replace(trim, state=state, state_names=own.state_names),
+    )
+
+
+def about(vehicle: Vehicle, trim: Trim) -> Vehicle:
+    """A linear vehicle about another vehicle's trim: where it flies, deviations count from there.
+
+    Args:
+        vehicle: linear.
+        trim: of the vehicle that is to be flown; states of the same name move, others keep theirs.
+
+    Raises:
+        ControllerError: where the inputs are not the same.
+    """
+    if trim.input_names != vehicle.input_names:
+        raise ControllerError(
+            f"has the inputs {', '.join(vehicle.input_names)}, the aircraft {', '.join(trim.input_names)}.",
+            where=vehicle.card.title,
+        )
+    at_trim = {**trim.states(), **trim.commands()}
+    names = {f"trim_{n}": at_trim[n] for n in (*vehicle.card.options["states"], *vehicle.input_names) if n in at_trim}
+    return vehicle.with_values(names, source="derived: the trim that it is flown at", status="derived")
+
 
 _OBSERVED = (
     "With an observer, modes, margins and disturbance rejection are those of its steady filter about the flown "

@@ -17,8 +17,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.judged_loop import Aircraft
 from swashplate.control.analysis.sampled_loop import SampledLoop
 from swashplate.control.lqg.controller import Lqg
-from swashplate.control.lqg.optimal import steady_filter
-from swashplate.control.lqg.weights import typical
+from swashplate.control.lqg.optimal import steady_filter, typical
 from swashplate.engine.equations import equations_of, parameter_row
 from swashplate.engine.law import REFERENCES
 from swashplate.errors import ControllerError

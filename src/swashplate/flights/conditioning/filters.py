@@ -1,4 +1,4 @@
-"""Zero-phase Butterworth low-pass and band-pass, the same for every channel, segment by segment."""
+"""Zero-phase Butterworth filters, the same for every channel, segment by segment; signals without their line."""
 
 from __future__ import annotations
 
@@ -141,3 +141,11 @@ def lowpass(flight: Flight, *, cutoff: float, order: int = 4) -> Flight:
         smooth.update(zip(QUATERNION, unit.T, strict=True))
     made = data.assign({n: timed(v, data[n].attrs) for n, v in smooth.items()})
     return flight.with_streams({name: made}).done("lowpass", cutoff=cutoff, order=order, zero_phase=True)
+
+
+def detrended(values: Array) -> Array:
+    """Values less the straight line that fits them best, along the first axis; shape as given, (n,) or (n, m)."""
+    ramp = np.linspace(-1.0, 1.0, len(values)) if len(values) > 1 else np.zeros(len(values))
+    slope = (ramp @ values) / max(float(ramp @ ramp), 1e-300)
+    line = np.multiply.outer(ramp, slope) + np.mean(values, axis=0)
+    return np.asarray(values - line, dtype=np.float64)

@@ -15,7 +15,7 @@ import xarray as xr
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.filters import filtered
-from swashplate.flights.conditioning.regression import coloured_covariance
+from swashplate.flights.conditioning.reconstruction import coloured_covariance
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, RATES
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from swashplate.atomic import write_text
 from swashplate.errors import ManeuverError
-from swashplate.flights.csv_export import as_csv
 from swashplate.flights.maneuvers.ardupilot_chirp import AXES, MIXER, Chirp
 from swashplate.flights.maneuvers.maneuver_design import ExpectedResponse, RuleCheck, checks, sampled
 from swashplate.flights.maneuvers.series import FADE, Maneuver, parse
+from swashplate.flights.tabular import as_csv
 from swashplate.shown import Shown
 from swashplate.text_table import text_table
 

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
+from swashplate.flights.conditioning.filters import detrended
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweep_tracking import Ridge
 from swashplate.flights.provenance import Event
 from swashplate.flights.schema import is_known
-from swashplate.flights.straight_line import detrended
 
 _CYCLES = 6.0  # of a wavelet: resolves a third of an octave
 _PER_OCTAVE = 8

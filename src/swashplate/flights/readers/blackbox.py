@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -16,9 +16,9 @@ import xarray as xr
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.provenance import Event
 from swashplate.flights.readers import blackbox_header, checks, clocked
-from swashplate.flights.readers.blackbox_chirp import chirps
 from swashplate.flights.readers.blackbox_encodings import Whole
 from swashplate.flights.readers.blackbox_fields import Fields, gps_place
 from swashplate.flights.readers.blackbox_frames import FoundFrames, find_frames
@@ -26,6 +26,70 @@ from swashplate.flights.readers.blackbox_header import Header, as_number, read_h
 from swashplate.flights.readers.blackbox_values import Main, main_frames
 from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
+
+_AXES = (("roll", 7, 1.0), ("pitch", 8, -1.0), ("yaw", 9, -1.0))
+"""Name, the same place in System ID's count of axes, and the sign from forward-left-up to forward-right-down."""
+_OFF = 0.02  # of the frequency, beside a step of the field: what a chirp's own law does not explain
+_FOLLOWS = 0.95  # of the samples
+_FEWEST = 20  # samples
+
+
+@dataclass(frozen=True)
+class _Law:
+    start_hz: float
+    stop_hz: float
+    seconds: float
+
+    def since(self, hertz: Array) -> Array:
+        """Time since the start [s] at which the chirp has a frequency [Hz]."""
+        return np.asarray(self.seconds * np.log(hertz / self.start_hz) / np.log(self.stop_hz / self.start_hz))
+
+
+def chirps(header: Header, columns: Mapping[str, Whole], time: Array) -> list[Event]:
+    """The chirps that the log tells of.
+
+    Args:
+        columns: of the main frames, by field, shape (n,). time: of each frame [s], shape (n,).
+    """
+    law = _Law(
+        0.1 * header.number("chirp_frequency_start_deci_hz"),
+        0.1 * header.number("chirp_frequency_end_deci_hz"),
+        header.number("chirp_time_seconds"),
+    )
+    if not (0.0 < law.start_hz < law.stop_hz and law.seconds > 0.0 and {"debug[1]", "debug[2]"} <= columns.keys()):
+        return []
+    axis, deci = columns["debug[1]"], columns["debug[2]"]
+    on = np.isin(axis, range(len(_AXES))) & (deci > 0)
+    edges = np.flatnonzero(np.diff(np.where(on, axis, -1), prepend=-1, append=-1))
+    events = []
+    for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        if on[first] and last - first >= _FEWEST:
+            hertz = np.asarray(0.1 * deci[first:last], dtype=np.float64)
+            start = _start(law, time[first:last], hertz)
+            if start is not None:
+                events.append(_event(header, law, int(axis[first]), start, float(time[last - 1])))
+    return events
+
+
+def _start(law: _Law, time: Array, hertz: Array) -> float | None:
+    """When the chirp began [s]; None where the field does not follow the header's law."""
+    # A step of the field is 0.1 Hz: half of one is little where the frequency is high.
+    sharp = hertz >= np.median(hertz)
+    start = float(np.median(time[sharp] - law.since(hertz[sharp])))
+    own = law.start_hz * (law.stop_hz / law.start_hz) ** ((time - start) / law.seconds)
+    follows = np.abs(hertz - own) <= 0.1 + _OFF * own
+    rises = law.since(hertz[-1:])[0] - law.since(hertz[:1])[0] > 0.0
+    return start if rises and np.mean(follows) >= _FOLLOWS else None
+
+
+def _event(header: Header, law: _Law, axis: int, start: float, last: float) -> Event:
+    name, place, sign = _AXES[axis]
+    magnitude = sign * header.number(f"chirp_amplitude_{name}", 1.0)
+    chirp = Chirp(place, magnitude, law.start_hz, law.stop_hz, law.seconds, fade_in=0.0, fade_out=0.0, dwell=0.0)
+    words = f"{chirp.axis_name}, {chirp.start_hz:g}-{chirp.stop_hz:g} Hz in {chirp.record:g} s"
+    times = {"start": start, "stop": start + law.seconds, "seen": min(start + law.seconds, last)}
+    return Event(start, "sweep", words, {**chirp.as_details(), **times, "channel": f"mixer_{name}"})
+
 
 NAME = "blackbox"
 VERSION = "1"

@@ -21,7 +21,7 @@ from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, clocked, frames, mat
-from swashplate.flights.readers.faults import Faults
+from swashplate.flights.readers.checks import Faults
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import QUATERNION

@@ -12,10 +12,8 @@ from swashplate.flights import datasets
 from swashplate.flights.epoch import rebased
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers import blackbox, checks, no_log
-from swashplate.flights.readers.given_units import with_units
-from swashplate.flights.readers.options import Options, load_mapping
+from swashplate.flights.readers.options import Options, cut, load_mapping, split_log, split_window, with_units
 from swashplate.flights.readers.source import Source, open_source
-from swashplate.flights.readers.windows import cut, split_log, split_window
 from swashplate.registry import Registry
 
 
@@ -107,10 +105,10 @@ def read(
     file, number = split_log(named)
     if log is not None and number is not None:
         raise FlightError(f"names log {number}, and log={log} is given too.", where=named, hint="Give one of them.")
-    flight = _whole(
-        datasets.locate(file),
-        units=units,
-        mapping=mapping,
+    options = Options(
+        units=units or {},
+        mapping=load_mapping(mapping),
+        mapping_file="" if mapping is None or isinstance(mapping, Mapping) else os.fspath(mapping),
         body=body,
         rotation=rotation,
         body_axes=body_axes,
@@ -118,7 +116,7 @@ def read(
         bad_stamps=bad_stamps,
         log=number if log is None else log,
     )
-    flight = _with_limits(flight)
+    flight = _with_limits(_whole(datasets.locate(file), options))
     return flight if window is None else cut(flight, *window, where=file)
 
 
@@ -129,33 +127,11 @@ def _with_limits(flight: Flight) -> Flight:
     return replace(flight, provenance=replace(origin, damage=(*origin.damage, *told))) if told else flight
 
 
-def _whole(
-    path: str | os.PathLike[str],
-    *,
-    units: Mapping[str, str] | None,
-    mapping: str | os.PathLike[str] | Mapping[str, Any] | None,
-    body: str | None,
-    rotation: str | None,
-    body_axes: str | None,
-    world_axes: str | None,
-    bad_stamps: str,
-    log: int | None,
-) -> Flight:
+def _whole(path: str | os.PathLike[str], options: Options) -> Flight:
     """One log of a file from its first sample to its last."""
     source = open_source(path)
     no_log.refuse(source)
-    options = Options(
-        units=units or {},
-        mapping=load_mapping(mapping),
-        mapping_file="" if mapping is None or isinstance(mapping, Mapping) else os.fspath(mapping),
-        body=body,
-        rotation=rotation,
-        body_axes=body_axes,
-        world_axes=world_axes,
-        bad_stamps=bad_stamps,
-        log=log,
-    )
-    if log is not None and not blackbox.recognises(source):
+    if options.log is not None and not blackbox.recognises(source):
         raise FlightError(
             "holds one log only.",
             where=source.path,

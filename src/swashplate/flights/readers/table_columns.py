@@ -15,7 +15,7 @@ from typing import Any
 from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
-from swashplate.flights.readers.faults import Faults
+from swashplate.flights.readers.checks import Faults
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.table_layout import ColumnTable
 from swashplate.flights.schema import CHANNELS, channel, is_known

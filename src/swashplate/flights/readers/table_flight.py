@@ -17,8 +17,8 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, clocked, table_columns, table_time, tables
+from swashplate.flights.readers.checks import Faults
 from swashplate.flights.readers.clocked import Remarks, share
-from swashplate.flights.readers.faults import Faults
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.readers.table_columns import Column

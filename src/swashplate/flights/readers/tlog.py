@@ -27,7 +27,7 @@ from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event
 from swashplate.flights.readers import clocked
-from swashplate.flights.readers.ardupilot_modes import is_firmware, mode_name
+from swashplate.flights.readers.ardupilot_events import is_firmware, mode_name
 from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 

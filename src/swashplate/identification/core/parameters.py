@@ -15,9 +15,9 @@ from swashplate.errors import CardError, ExpressionError, IdentificationError
 from swashplate.filtering.disturbances import SEPARATE
 from swashplate.filtering.nuisance import PUSHES, USUAL_PUSH, Nuisance
 from swashplate.models.card import Card
-from swashplate.models.choices import Choice
-from swashplate.models.choices import Free as Free
 from swashplate.models.linear.expressions import Expression, parse_tie
+from swashplate.models.traits import Choice
+from swashplate.models.traits import Free as Free
 from swashplate.models.vehicle import Vehicle
 
 FROM_CARD = "card: "

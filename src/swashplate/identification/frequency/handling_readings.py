@@ -10,7 +10,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
-from swashplate.flights.senses import expected_sense
+from swashplate.flights.motion_signs import expected_sense
 from swashplate.identification.frequency.handling import (
     Handling,
     ReadNumber,

@@ -24,7 +24,7 @@ from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPla
 from swashplate.filtering.sensor_suite import Suite
 from swashplate.identification.recursive.fourier_regression import CLOCK, EARLY, GAP, LATE, NO_NUMBER
 from swashplate.identification.time.equation_error import EquationError
-from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.trim import Trim, trim
 

@@ -14,7 +14,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
-from swashplate.flights.straight_line import detrended
+from swashplate.flights.conditioning.filters import detrended
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.responses.spectra import Signals, runs
 

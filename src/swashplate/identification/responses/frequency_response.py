@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,11 @@ from swashplate.identification.core.sources import DataSource, sources_named
 from swashplate.identification.responses import response_file
 from swashplate.identification.responses.shared_errors import SharedErrors
 from swashplate.meant import taking_names
-from swashplate.public import resolve
 from swashplate.registry import listed, nearest
+from swashplate.shown import Shown
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 LEAST_COHERENCE = 0.6
 """Coherence from which on a response is used, where it stays there (Tischler and Remple 2012, ch. 7)."""
@@ -31,7 +31,7 @@ TWO_PI = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
-class FrequencyResponse:
+class FrequencyResponse(Shown):
     """Responses of outputs to inputs; NaN where there is no number.
 
     Attributes:
@@ -209,35 +209,6 @@ class FrequencyResponse:
             "problems": list(self.problems),
             "settings": dict(self.settings),
         }
-
-    def plot(
-        self,
-        *,
-        pairs: Sequence[tuple[str, str]] | None = None,
-        theme: Literal["paper", "light", "dark"] = "paper",
-        frequency: Literal["Hz", "rad/s"] = "Hz",
-    ) -> Figure:
-        """Bode diagrams with coherence as a matplotlib figure: (output, input) pairs side by side.
-
-        Where no pairs are given, the matrix of all outputs and inputs that answer coherently: outputs down, inputs
-        across.
-        """
-        figure: Figure = resolve("plot_responses")(self, pairs=pairs, theme=theme, frequency=frequency)
-        return figure
-
-    def explore(
-        self,
-        *,
-        pairs: Sequence[tuple[str, str]] | None = None,
-        theme: Literal["paper", "light", "dark"] = "light",
-        frequency: Literal["Hz", "rad/s"] = "Hz",
-    ) -> Any:
-        """The same as a `plotly.graph_objects.Figure`, to zoom and point at."""
-        return resolve("explore_responses")(self, pairs=pairs, theme=theme, frequency=frequency)
-
-    def _repr_html_(self) -> str:
-        page: str = resolve("html_of")(self)
-        return page
 
     # ---- looking -----------------------------------------------------------------------------------------------
     def rows(self, output: str, input: str, *, lines: int = 12) -> list[tuple[float, float, float, float, float]]:

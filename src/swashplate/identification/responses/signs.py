@@ -7,9 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from swashplate.flights.flight import Flight
-from swashplate.flights.motion_signs import FEWEST, LINES, LOWEST, ResponseSign, sign_of
-from swashplate.flights.readers.given_units import unit_to_give
-from swashplate.flights.senses import INTEGRATIONS, expected_sense, plain
+from swashplate.flights.motion_signs import (
+    FEWEST,
+    INTEGRATIONS,
+    LINES,
+    LOWEST,
+    ResponseSign,
+    expected_sense,
+    plain,
+    sign_of,
+)
+from swashplate.flights.readers.options import unit_to_give
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 
 

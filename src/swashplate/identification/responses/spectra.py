@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
+from swashplate.flights.conditioning.filters import detrended
 from swashplate.flights.flight import Flight
-from swashplate.flights.straight_line import detrended
 from swashplate.identification.core.records import uniform_table
 
 

@@ -20,8 +20,7 @@ from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.links.live.picture import inputs_of, picture, pose_of
 from swashplate.models.catalogue import from_card
 from swashplate.models.catalogue import vehicle as named_vehicle
-from swashplate.models.delays import input_delays
-from swashplate.models.surroundings import environment_of
+from swashplate.models.surroundings import environment_of, input_delays
 from swashplate.models.usual import HELICOPTER, USUAL
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import Mode, Pilot, pilot
-from swashplate.models.delays import input_delays
-from swashplate.models.surroundings import environment_of
+from swashplate.models.surroundings import environment_of, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.controller import Controller
 from swashplate.simulation.stepping import LONGEST_STEP

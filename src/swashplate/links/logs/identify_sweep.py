@@ -14,10 +14,10 @@ from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
 from swashplate.control.analysis.rate_gain_names import ROTORFLIGHT
 from swashplate.errors import SwashError
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import Sweep
 from swashplate.flights.schema import channel
+from swashplate.flights.tabular import write_csv
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.alone import alone, off_axis
 from swashplate.links.logs.hold_out import Part, hold_out

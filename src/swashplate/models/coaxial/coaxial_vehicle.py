@@ -10,7 +10,6 @@ from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.models.card import Card
-from swashplate.models.choices import PhysicalEffect
 from swashplate.models.coaxial.coaxial import (
     CoaxialState,
     TwinRotorLoads,
@@ -20,12 +19,11 @@ from swashplate.models.coaxial.coaxial import (
     specific_force,
     stops,
 )
-from swashplate.models.coaxial.coaxial_checks import checked_numbers
 from swashplate.models.coaxial.coaxial_options import coaxial_options
-from swashplate.models.coaxial.coaxial_parameters import UNITS, CoaxialParameters
+from swashplate.models.coaxial.coaxial_parameters import UNITS, CoaxialParameters, checked_numbers
 from swashplate.models.conventional.helicopter_limits import rotor_doubts
 from swashplate.models.nesting import rebuild
-from swashplate.models.traits import Axis, Pose, RecordingFit, Traits
+from swashplate.models.traits import Axis, PhysicalEffect, Pose, RecordingFit, Traits
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.engine import EngineLag, RotorSpeed

@@ -11,10 +11,10 @@ import numpy as np
 
 from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter
-from swashplate.models.delays import BY_ENTRY, BY_OUTPUT, SECTION
 from swashplate.models.linear.card_vehicle import NAME, SIZE, entry_name, entry_unit, linear
 from swashplate.models.linear.state_space import UNMOVED, ModelParameter, StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
+from swashplate.models.surroundings import BY_ENTRY, BY_OUTPUT, SECTION
 from swashplate.models.vehicle import Vehicle
 
 USUAL_RANGE = {"1": 1.0, "rad": np.radians(20.0), "deg": 20.0}

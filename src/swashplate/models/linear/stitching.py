@@ -10,13 +10,11 @@ import numpy as np
 
 from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter
-from swashplate.models.delays import SECTION
 from swashplate.models.linear.card_vehicle import NEEDED, entry_name, entry_unit
 from swashplate.models.linear.linear_vehicle import USUAL_RANGE
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import trim_of
-from swashplate.models.linear.stitched import NAME, gradient_unit
-from swashplate.models.linear.stitched_points import STILL, SpeedPoint
+from swashplate.models.linear.stitched import NAME, STILL, SpeedPoint, gradient_unit
 from swashplate.models.linear.trimmed_matrices import (
     TRIMMED,
     TrimmedMatrices,
@@ -24,7 +22,8 @@ from swashplate.models.linear.trimmed_matrices import (
     own_gradients,
     without_kinematics,
 )
-from swashplate.physics.atmosphere import SEA_LEVEL_DENSITY
+from swashplate.models.surroundings import SECTION
+from swashplate.physics.environment import SEA_LEVEL_DENSITY
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 
 Gradients = Literal["derivatives", "trims"]

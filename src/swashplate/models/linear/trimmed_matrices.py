@@ -10,7 +10,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import CardError
 from swashplate.models.linear.card_vehicle import NEEDED
-from swashplate.models.linear.stitched_points import RATES, STILL, gravity_slope
+from swashplate.models.linear.stitched import RATES, STILL, gravity_slope
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from swashplate.flights.schema import channel
-from swashplate.reporting.downsample import joined, kept
 from swashplate.reporting.structure import Figure, Key, Section, Text, tabulate
 from swashplate.reporting.theme import (
     BAND,
@@ -20,6 +19,8 @@ from swashplate.reporting.theme import (
     axis_number,
     grid,
     inputs_title,
+    joined,
+    kept,
     line,
     numbers,
     quantity,

@@ -13,7 +13,6 @@ from swashplate.flights import spectrum as spectra
 from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import Inspection
 from swashplate.flights.schema import channel
-from swashplate.reporting.downsample import kept
 from swashplate.reporting.structure import Cell, Figure, Key, Section, Text, tabulate
 from swashplate.reporting.theme import (
     BLACK,
@@ -27,6 +26,7 @@ from swashplate.reporting.theme import (
     axis,
     axis_number,
     base_layout,
+    kept,
     line,
     numbers,
     over_frequency,

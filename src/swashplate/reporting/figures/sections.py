@@ -10,7 +10,7 @@ from swashplate.reporting.structure import Section
 
 _HERE = "swashplate.reporting.figures"
 _MODELS, _RESULTS = f"{_HERE}.of_models", f"{_HERE}.of_results"
-SECTIONS: Registry[Callable[[Any], Section]] = Registry(
+SECTIONS: Registry[Callable[..., Section]] = Registry(
     "sections",
     what="an object that shows itself",
     own={
@@ -36,9 +36,9 @@ SECTIONS: Registry[Callable[[Any], Section]] = Registry(
 """What shows an object, by the name of its class; loaded when it is asked for."""
 
 
-def own_section(shown: Any) -> Section | None:
+def own_section(shown: Any, **choice: Any) -> Section | None:
     """The section of an object of a class that has one; None for others, which have a page or nothing."""
     for kind in type(shown).__mro__:
         if kind.__name__ in SECTIONS:
-            return SECTIONS[kind.__name__](shown)
+            return SECTIONS[kind.__name__](shown, **choice)
     return None

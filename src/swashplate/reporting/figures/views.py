@@ -16,8 +16,6 @@ from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.registry import nearest
 from swashplate.reporting.figures import bode_matrix
-from swashplate.reporting.figures.interactive import interactive
-from swashplate.reporting.figures.of_flight import over_time
 from swashplate.reporting.figures.sections import own_section
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import Frequency, Theme
@@ -29,16 +27,66 @@ from swashplate.validation.validation import Validation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Still
 
-    from swashplate.simulation.derivatives_over_speed import Derivatives
+
+from swashplate.extras import library
+from swashplate.reporting.figures.themes import checked, coloured, in_unit
+from swashplate.reporting.structure import Key
+
+_PLAIN_MARKERS = {"line": "line-ns-open"}
 
 
-def section_of(shown: Any) -> Section:
+def interactive(figure: Figure, *, theme: str = "light", frequency: str = "Hz", title: str = "") -> Any:
+    """The figure as a `plotly.graph_objects.Figure`.
+
+    Args:
+        figure: of a report. theme, frequency: as of `still.still`. title: above it.
+
+    Raises:
+        SwashError: a theme or a unit that there is not; plotly missing.
+    """
+    look = checked(theme)
+    objects = library("plotly.graph_objects", what="drawing")
+    spec = in_unit(figure.spec, frequency)
+    layout = dict(spec["layout"]) | {"showlegend": bool(figure.keys)}
+    margin = dict(layout.get("margin", {}))
+    top = 34 * bool(title) + (14 + 20 * -(-len(figure.keys) // 5)) * bool(figure.keys)
+    margin["t"] = margin.get("t", 8) + top
+    layout |= {
+        "margin": margin,
+        "height": figure.height + top,
+        "legend": {"orientation": "h", "yref": "container", "y": 1.0 - 34 * bool(title) / (figure.height + top),
+                   "yanchor": "top", "x": 0.0},
+    }  # fmt: skip
+    if title:
+        layout["title"] = {
+            "text": title.replace("<", "‹"),
+            "font": {"size": 14},
+            "x": 0.01,
+            "y": 0.99,
+            "yanchor": "top",
+        }
+    traces = [{**trace, "showlegend": False} for trace in spec["data"]]
+    traces += [_entry(key) for key in figure.keys]
+    drawn = coloured({"data": traces, "layout": layout}, look)
+    return objects.Figure(data=drawn["data"], layout=drawn["layout"], skip_invalid=False)
+
+
+def _entry(key: Key) -> dict[str, Any]:
+    """A trace without points, whose entry in the legend is the key."""
+    entry: dict[str, Any] = {"type": "scatter", "x": [None], "y": [None], "name": key.words, "showlegend": True}
+    if key.style in ("solid", "dash", "dot", "dashdot"):
+        return entry | {"mode": "lines", "line": {"color": key.color, "dash": key.style, "width": 2}}
+    symbol = "square" if key.style in ("band", "bar") else _PLAIN_MARKERS.get(key.style, key.style)
+    return entry | {"mode": "markers", "marker": {"color": key.color, "symbol": symbol, "size": 11}}
+
+
+def section_of(shown: Any, **choice: Any) -> Section:
     """What an object shows; the first figure is the main one.
 
     Raises:
         SwashError: an object that shows nothing.
     """
-    if (section := own_section(shown)) is not None:
+    if (section := own_section(shown, **choice)) is not None:
         return section
     return _of_report(structure_of(shown, modes={}) if _has_modes(shown) else structure_of(shown), shown)
 
@@ -73,7 +121,7 @@ def _of_report(page: Report, shown: Any) -> Section:
     return Section("shown", page.title, (*banners, *picture, *rest, summary))
 
 
-def section_of_responses(responses: FrequencyResponse) -> Section:
+def section_of_responses(responses: FrequencyResponse, *, pairs: Sequence[tuple[str, str]] | None = None) -> Section:
     """Coherent bands of every pair, and Bode plots of those that have one."""
     rows = []
     for output in responses.outputs:
@@ -84,13 +132,13 @@ def section_of_responses(responses: FrequencyResponse) -> Section:
     warnings = tuple(Text(text, tone="caution") for text in (*responses.problems, *responses.warnings))
     table = tabulate("Where they may be used", ("output / input", "coherent band [Hz]"), rows)
     title = f"Frequency responses ({responses.method}): {responses.omega.size} lines"
-    return Section("responses", title, (*warnings, bode_matrix.of_responses(responses), table))
+    return Section("responses", title, (*warnings, bode_matrix.of_responses(responses, pairs), table))
 
 
 # ---- the verbs behind the methods ------------------------------------------------------------------------------
-def figures_of(shown: Any) -> dict[str, Figure]:
+def figures_of(shown: Any, **choice: Any) -> dict[str, Figure]:
     """The figures that an object has, by name, the main one first."""
-    return {block.identifier: block for block in section_of(shown).blocks if isinstance(block, Figure)}
+    return {block.identifier: block for block in section_of(shown, **choice).blocks if isinstance(block, Figure)}
 
 
 def figure_names(shown: Any) -> tuple[str, ...]:
@@ -98,13 +146,13 @@ def figure_names(shown: Any) -> tuple[str, ...]:
     return tuple(figures_of(shown))
 
 
-def _chosen(shown: Any, name: str | None) -> Figure:
+def _chosen(shown: Any, name: str | None, **choice: Any) -> Figure:
     """A figure by its name, the main one where None.
 
     Raises:
         SwashError: a name that it has not, or an object without figures.
     """
-    figures = figures_of(shown)
+    figures = figures_of(shown, **choice)
     if not figures:
         raise SwashError("has nothing to draw.", channel=type(shown).__name__)
     if name is None:
@@ -123,59 +171,16 @@ def _title(shown: Any) -> str:
     return str(name)
 
 
-def plot(shown: Any, figure: str | None = None, *, theme: Theme = "paper", frequency: Frequency = "Hz") -> Still:
-    """One figure of an object, with matplotlib; see `swashplate.shown.Shown.plot`."""
-    return still(
-        [_chosen(shown, figure)], theme=theme, frequency=frequency, title="" if theme == "paper" else _title(shown)
-    )
-
-
-def explore(shown: Any, figure: str | None = None, *, theme: Theme = "light", frequency: Frequency = "Hz") -> Any:
-    """One figure of an object, with plotly; see `swashplate.shown.Shown.explore`."""
-    return interactive(_chosen(shown, figure), theme=theme, frequency=frequency, title=_title(shown))
-
-
-def plot_flight(flight: Flight, *, channels: Sequence[str] | None = None, theme: Theme = "paper") -> Still:
-    """Channels over time; see `Flight.plot`."""
-    return still([over_time([flight], channels=channels)], theme=theme, title=flight.provenance.source)
-
-
-def explore_flight(flight: Flight, *, channels: Sequence[str] | None = None, theme: Theme = "light") -> Any:
-    """Channels over time, to zoom; see `Flight.explore`."""
-    return interactive(over_time([flight], channels=channels), theme=theme, title=flight.provenance.source)
-
-
-def plot_responses(
-    response: FrequencyResponse,
-    *,
-    pairs: Sequence[tuple[str, str]] | None = None,
-    theme: Theme = "paper",
-    frequency: Frequency = "Hz",
+def plot(
+    shown: Any, figure: str | None = None, *, theme: Theme = "paper", frequency: Frequency = "Hz", **choice: Any
 ) -> Still:
-    """Bode diagrams; see `FrequencyResponse.plot`."""
-    return still([bode_matrix.of_responses(response, pairs)], theme=theme, frequency=frequency)
+    """One figure of an object, with matplotlib; see `swashplate.shown.Shown.plot`."""
+    title = "" if theme == "paper" and not isinstance(shown, Flight) else _title(shown)
+    return still([_chosen(shown, figure, **choice)], theme=theme, frequency=frequency, title=title)
 
 
-def explore_responses(
-    response: FrequencyResponse,
-    *,
-    pairs: Sequence[tuple[str, str]] | None = None,
-    theme: Theme = "light",
-    frequency: Frequency = "Hz",
+def explore(
+    shown: Any, figure: str | None = None, *, theme: Theme = "light", frequency: Frequency = "Hz", **choice: Any
 ) -> Any:
-    """Bode diagrams, to zoom; see `FrequencyResponse.explore`."""
-    return interactive(bode_matrix.of_responses(response, pairs), theme=theme, frequency=frequency)
-
-
-def plot_derivatives(derivatives: Derivatives, *, row: str = "M", theme: Theme = "paper") -> Still:
-    """Derivatives over speed by contributor; see `Derivatives.plot`."""
-    from swashplate.reporting.speed_page import by_contributor
-
-    return still([by_contributor(derivatives, row)], theme=theme)
-
-
-def explore_derivatives(derivatives: Derivatives, *, row: str = "M", theme: Theme = "light") -> Any:
-    """Derivatives over speed by contributor, to zoom; see `Derivatives.explore`."""
-    from swashplate.reporting.speed_page import by_contributor
-
-    return interactive(by_contributor(derivatives, row), theme=theme)
+    """One figure of an object, with plotly; see `swashplate.shown.Shown.explore`."""
+    return interactive(_chosen(shown, figure, **choice), theme=theme, frequency=frequency, title=_title(shown))

@@ -24,7 +24,7 @@ import made_campaigns
 import proof_page
 import swashplate as sp
 from swashplate.api.campaigns.store import CampaignStore
-from swashplate.control.controller_file import save_controller
+from swashplate.control.kinds import save_controller
 from swashplate.control.lqg.design import design
 from swashplate.filtering.sensor_suite import suite
 

@@ -9,12 +9,11 @@ import pytest
 
 import swashplate as sp
 from swashplate.control.analysis.check import ControlCheck, check_controller
-from swashplate.control.analysis.check_gusts import fly_gusts
+from swashplate.control.analysis.check_steps import cross_ratio, fly_gusts, step_metrics
 from swashplate.control.analysis.judged_loop import Aircraft
 from swashplate.control.analysis.requirements import BANDWIDTH, PHASE_MARGIN, REJECTION_PEAK, froude_scale
 from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.control.analysis.stability import loop_margins, loop_modes
-from swashplate.control.analysis.step_response import cross_ratio, step_metrics
 from swashplate.control.laws.autopilot import Autopilot, autopilot
 from swashplate.control.lqg.analysis import analyse, sensitivity
 from swashplate.control.lqg.design import design

@@ -15,16 +15,16 @@ from swashplate.api.design_controller import _fast
 from swashplate.control.analysis.check import ControlCheck, check_controller, with_delay_verdict
 from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.control.analysis.stability import loop_modes, margins_at, margins_of, modes_of
-from swashplate.control.draws.robustness import draw_models
+from swashplate.control.draws.variations import draw_models
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
+from swashplate.control.lqg.optimal import crossover_limits, total_delays
 from swashplate.control.lqg.steady_loop import Watched, crossovers
-from swashplate.control.lqg.weights import crossover_limits, total_delays
 from swashplate.errors import ControllerError
 from swashplate.filtering.sensor_suite import suite
-from swashplate.models.delays import input_delays
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.control_check import compose_check
 from swashplate.simulation.closed_loop import flown_delays, simulate_closed_loop

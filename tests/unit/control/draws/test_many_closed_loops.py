@@ -9,8 +9,8 @@ import pytest
 
 import swashplate as sp
 from made_results import result
-from swashplate.control.draws.robustness import draw_models
 from swashplate.control.draws.spread import spread
+from swashplate.control.draws.variations import draw_models
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.errors import CardError, DocumentError, SwashError
 from swashplate.models.vehicle import Vehicle

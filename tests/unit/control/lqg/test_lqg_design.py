@@ -9,14 +9,13 @@ import pytest
 
 from swashplate.control.analysis.margins import promised_disc
 from swashplate.control.analysis.stability import loop_modes
-from swashplate.control.controller_file import read_controller, save_controller
+from swashplate.control.kinds import read_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
 from swashplate.control.lqg.file import lqg_document, lqg_from
-from swashplate.control.lqg.optimal import regulator, steady_filter, unreached, unseen
+from swashplate.control.lqg.optimal import DISC, regulator, steady_filter, total_delays, unreached, unseen
 from swashplate.control.lqg.steady_loop import Watched, crossovers, response
-from swashplate.control.lqg.weights import DISC, total_delays
 from swashplate.errors import ControllerError
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.catalogue import vehicle

@@ -15,7 +15,7 @@ from swashplate.control.laws.autopilot_kind import KIND as LAW
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
-from swashplate.control.lqg.other_model import differences
+from swashplate.control.lqg.kind import differences
 from swashplate.control.lqg.steady_loop import observed_loop
 from swashplate.errors import ControllerError
 from swashplate.filtering.sensor_suite import suite

@@ -7,8 +7,7 @@ import pytest
 
 from conditioning_flights import hover, tracked
 from swashplate.flights.conditioning.condition import condition, replay
-from swashplate.flights.conditioning.reconstruction import reconstruct
-from swashplate.flights.conditioning.regression import regress
+from swashplate.flights.conditioning.reconstruction import reconstruct, regress
 from swashplate.flights.flight import Flight, stream
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
-from swashplate.flights.readers.blackbox_chirp import chirps
+from swashplate.flights.readers.blackbox import chirps
 from swashplate.flights.readers.blackbox_header import Header
 
 START, STOP, SECONDS, BEGIN = 0.2, 600.0, 20.0, 8.003

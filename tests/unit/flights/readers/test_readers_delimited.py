@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from swashplate.errors import FlightError, UnitError, WriteError
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers.read import read
+from swashplate.flights.tabular import write_csv
 
 
 def _file(folder: Path, text: str, name: str = "log.csv") -> Path:

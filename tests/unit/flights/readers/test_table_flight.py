@@ -9,7 +9,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import FlightError, UnitError
-from swashplate.flights.readers.faults import Faults
+from swashplate.flights.readers.checks import Faults
 
 
 def _file(folder: Path, text: str) -> Path:

@@ -15,9 +15,9 @@ from swashplate.errors import FlightError
 from swashplate.filtering.disturbances import Noise
 from swashplate.flights.conditioning.condition import condition
 from swashplate.flights.conditioning.filters import lowpass
-from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
+from swashplate.flights.tabular import write_csv
 from swashplate.identification.core.low_passed import (
     noise_too_small,
     refuse_lowpassed,

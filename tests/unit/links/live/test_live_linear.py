@@ -21,10 +21,10 @@ from swashplate.links.live.pilots import MODES
 from swashplate.links.live.replay import Replay, as_json, replay
 from swashplate.links.live.session import LiveSession
 from swashplate.links.live.world import delays_of, steps_back
-from swashplate.models.delays import input_delays
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse, structure, to_toml
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.linearize import linearize

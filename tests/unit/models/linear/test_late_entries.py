@@ -13,10 +13,10 @@ from swashplate.export.formats import export_model
 from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.linear_simulation import answers
-from swashplate.models.delays import input_delays, known_delays
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse
+from swashplate.models.surroundings import input_delays, known_delays
 
 TEXT = """
 kind = "state-space"

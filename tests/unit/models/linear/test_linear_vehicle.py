@@ -8,20 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate.control.controller_file import read_controller, save_controller
+from swashplate.control.kinds import read_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
-from swashplate.control.lqg.transfer import about, flown_on
+from swashplate.control.lqg.kind import about, flown_on
 from swashplate.errors import CardError, ControllerError, TrimError
 from swashplate.export.linear import logged_delays, of_vehicle
 from swashplate.filtering.sensor_suite import suite
-from swashplate.models.delays import input_delays
 from swashplate.models.linear.card_vehicle import linear
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse, structure, to_toml
 from swashplate.models.nesting import rebuild
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment

@@ -20,7 +20,7 @@ from swashplate.models.doubts import doubts
 from swashplate.models.linear.matrices_file import state_space_of_matrices
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse, to_toml
-from swashplate.models.linear.stitched_points import StitchedVehicle, disagreement
+from swashplate.models.linear.stitched import StitchedVehicle, disagreement
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment

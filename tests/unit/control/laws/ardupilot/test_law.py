@@ -10,8 +10,7 @@ import pytest
 import scipy.signal
 
 import swashplate as sp
-from swashplate.control.controller_file import save_controller
-from swashplate.control.kinds import kind_of
+from swashplate.control.kinds import kind_of, save_controller
 from swashplate.control.laws.ardupilot.filters import low_pass, notch
 from swashplate.control.laws.ardupilot.law import ArduPilotLaw, square_root
 from swashplate.control.laws.ardupilot.mixers import CoaxialMixer, SwashplateMixer

@@ -10,8 +10,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.control.analysis.rotorflight_gains import judge_rotorflight, rotorflight_gains
-from swashplate.control.controller_file import save_controller
-from swashplate.control.kinds import kind_of
+from swashplate.control.kinds import kind_of, save_controller
 from swashplate.control.laws.rotorflight.law import RotorflightLaw, rotorflight_law
 from swashplate.control.laws.rotorflight.parameters import cli_dump, known
 from swashplate.errors import ControllerError
