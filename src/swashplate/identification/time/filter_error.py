@@ -117,8 +117,11 @@ class FilterError(Likelihood):
 
     def widened(self, added: Sequence[str]) -> FilterError:
         """The same likelihood with more of the vehicle's numbers free, under a constant gain."""
-        table = self.table.wider(added)
-        return FilterError(table, self.records, noise=self.noise, estimate_noise=self.estimate_noise)
+        return self.of(self.table.wider(added), self.records)
+
+    def of(self, table: Parameterization, pieces: Sequence[Record]) -> FilterError:
+        """The likelihood of other parameters or records, under a constant gain."""
+        return FilterError(table, pieces, noise=self.noise, estimate_noise=self.estimate_noise)
 
     @property
     def constant(self) -> FilterError:

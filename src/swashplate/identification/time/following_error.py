@@ -11,6 +11,7 @@ off a record's first states may be, and goes on by itself where the pose was not
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -24,9 +25,11 @@ from swashplate.filtering.filter_code import Followed, Following, RecordSeries, 
 from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import steady_gain
-from swashplate.identification.core.likelihood import Errors, MovedErrors, factor_of
+from swashplate.identification.core.likelihood import Errors, Likelihood, MovedErrors, factor_of
+from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Comparison, Record
+from swashplate.identification.core.scoring import Optimum, Solver, minimise
 from swashplate.identification.time.beginning import (
     FilterNumbers,
     FirstMotion,
@@ -141,6 +144,79 @@ class FollowingError(FilterError):
                 )
             )
         return followed
+
+
+class CarriedSlopes(Likelihood):
+    """A likelihood whose slopes are carried along a search, by what each step shows of them (secants: Broyden 1965).
+
+    Slopes that are differences of whole runs cost a run for every entry; a secant costs none. Where a search that takes
+    them ends, exact ones judge (`searched`).
+
+    Args:
+        base: the likelihood.
+    """
+
+    def __init__(self, base: Likelihood) -> None:
+        self.row, self.records, self._base = base.row, base.records, base
+        self._tried: tuple[bytes, list[Errors]] | None = None
+        self._at: tuple[Array, list[MovedErrors]] | None = None
+
+    def errors_of(self, row: Array) -> list[Errors]:
+        asked = np.asarray(row, dtype=np.float64).tobytes()
+        if self._tried is None or self._tried[0] != asked:
+            self._tried = asked, self._base.errors_of(row)
+        return self._tried[1]
+
+    def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
+        if self._at is None:
+            self._at = np.array(row), list(self._base._moved_here(row))
+        before, carried = self._at
+        way = row - before
+        if np.any(way):
+            weight = way * sum(np.sum(part.slopes**2, axis=(1, 2)) for part in carried)  # far in what shows most
+            weight /= way @ weight
+            parts = zip(carried, self.errors_of(row), strict=True)
+            self._at = np.array(row), [_carried(part, now, way, weight) for part, now in parts]
+        return iter(self._at[1])
+
+    def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
+        return self._base.errors_ahead_moved(row, ahead, places)
+
+    def comparisons(self, row: Array) -> tuple[Comparison, ...]:
+        return self._base.comparisons(row)
+
+
+def _carried(part: MovedErrors, now: Errors, way: Array, weight: Array) -> MovedErrors:
+    """The slopes of a part where its errors and covariance are `now`, that way further, changed along it alone."""
+    assert part.turned is not None
+    before, after = part.factor, now.factor
+    slopes = part.slopes + np.multiply.outer(weight, now.errors - part.errors - np.tensordot(way, part.slopes, 1))
+    dS = before @ part.turned @ np.swapaxes(before, -1, -2)
+    spread = (factor @ np.swapaxes(factor, -1, -2) for factor in (after, before))
+    dS += np.multiply.outer(weight, next(spread) - next(spread) - np.tensordot(way, dS, 1))
+    Li = np.linalg.inv(after)
+    turned = Li @ dS @ np.swapaxes(Li, -1, -2)
+    flat = turned.reshape(len(way), -1)
+    return MovedErrors(now.number, now.errors, after, part.places, slopes, turned, (None, 0.5 * flat @ flat.T))
+
+
+def searched(likelihood: FollowingError, solver: Solver, *, start: Array) -> Optimum:
+    """The optimum of a likelihood with dear slopes: a step by exact ones, then searches by carried ones, each from the
+    exact slopes where the last ended, until one gains too little to go on for.
+
+    Args:
+        likelihood, solver, start: as of `minimise`.
+    """
+    found = minimise(CarriedSlopes(likelihood), replace(solver, iterations=1), start=start)
+    while True:
+        done = len(found.history) - 1
+        more = replace(solver.after(done), iterations=solver.iterations - done)
+        further = minimise(CarriedSlopes(likelihood), more, start=found.row)
+        settled = further.converged and found.cost - further.cost < solver.tolerance
+        if not settled:
+            found = replace(further, history=(*found.history, *further.history[1:]))
+        if settled or not further.converged:
+            return replace(found, information=likelihood.scores(found.row)[2], converged=settled)
 
 
 def following_from(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Array) -> Following:

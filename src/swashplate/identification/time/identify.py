@@ -33,7 +33,7 @@ from swashplate.identification.time.belonging import unrelated
 from swashplate.identification.time.estimates import Found, constants, estimates_of, found_at
 from swashplate.identification.time.feedback import FlightDetails, moving_air
 from swashplate.identification.time.filter_error import SETTLING, FilterError
-from swashplate.identification.time.following_error import FollowingError
+from swashplate.identification.time.following_error import FollowingError, searched
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.linear_residual import (
     LinearResidual,
@@ -120,8 +120,8 @@ def identify_flight(
     parameters = tuple(estimate for estimate in every if not estimate.name.startswith(PREFIX))
     noise = likelihood.noise_of(row)
     problems += [*smoothed_outputs(pieces, flights), *noise_too_small(noise, flights)]
-    if noise is not None:  # output error fits starts to its commands: others lose
-        apart = unrelated(lambda others: by.likelihood_of(best.table, others, question).constant.cost(row), pieces)
+    if isinstance(likelihood, FilterError) and noise is not None:  # output error fits starts to its commands: others lose
+        apart = unrelated(lambda others: likelihood.of(best.table, others).cost(row), pieces)
         problems += [apart] if apart else []
         notes += [told] if (told := moving_air(noise)) else []
     notes += [
@@ -242,11 +242,11 @@ def _output_error(table: Parameterization, pieces: Sequence[Record], question: Q
 
 def _scoring(likelihood: FilterError, solver: Solver) -> Optimum:
     quick = likelihood.constant
-    if quick is likelihood:
+    if not isinstance(likelihood, FollowingError):
         return minimise_over_valleys(likelihood, solver)
     first = minimise_over_valleys(quick, replace(solver, tolerance=_BEGIN))
     after = replace(solver, tolerance=_FOLLOWING).after(len(first.history) - 1)
-    last = minimise(likelihood, after, start=first.row)
+    last = searched(likelihood, after, start=first.row)
     return replace(last, history=(*first.history, *last.history[1:]))
 
 

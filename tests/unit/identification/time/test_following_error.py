@@ -23,9 +23,16 @@ from swashplate.filtering.following import AWAY, SHARES, FollowingRows
 from swashplate.identification.core import robust
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
+from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.time.beginning import FilterNumbers, FirstMotion, numbers_and_constants, seen_at_start
 from swashplate.identification.time.calibration import first_part
-from swashplate.identification.time.following_error import FollowingError, _off, following_from
+from swashplate.identification.time.following_error import (
+    CarriedSlopes,
+    FollowingError,
+    _off,
+    following_from,
+    searched,
+)
 from swashplate.identification.time.record_filter import record_filter
 from swashplate.identification.time.start_states import slopes_ahead
 
@@ -182,6 +189,31 @@ def test_scores_are_slopes_of_the_cost_whatever_the_filter(name: str, monkeypatc
     white, moved, rest = likelihood.whitened(row)
     weighed = robust.weights(white[0])[None]
     assert information == pytest.approx(np.einsum("pno,qno->pq", weighed * moved[0], moved[0]) + rest, rel=1e-9)
+
+
+def test_a_search_by_carried_slopes_ends_where_one_by_exact_ones_does() -> None:
+    likelihood, solver = _likelihood(), Solver(iterations=30, tolerance=0.2)
+    start = minimise(likelihood.constant, Solver(tolerance=1.0)).row
+    exact, carried = minimise(likelihood, solver, start=start), searched(likelihood, solver, start=start)
+    assert carried.converged
+    assert carried.cost < exact.history[0]
+    assert abs(carried.cost - exact.cost) < 1.0  # of log-likelihood, in 27 numbers
+    np.testing.assert_array_equal(carried.information, likelihood.scores(carried.row)[2])
+
+
+def test_a_secant_shows_the_step_that_it_was_taken_from() -> None:
+    """Carried slopes times the step are the change of the errors and of their covariance, to the letter."""
+    likelihood = _likelihood()
+    slopes, start = CarriedSlopes(likelihood), likelihood.row.starts()
+    (before,) = slopes.moved_errors(start)
+    way = 1e-2 * np.random.default_rng(1).standard_normal(start.size)
+    (after,) = slopes.moved_errors(start + way)
+    np.testing.assert_allclose(np.tensordot(way, after.slopes, 1), after.errors - before.errors, atol=1e-12)
+    assert after.turned is not None
+    L = after.factor
+    changed = L @ np.tensordot(way, after.turned, 1) @ np.swapaxes(L, 1, 2)
+    old = before.factor @ np.swapaxes(before.factor, 1, 2)
+    np.testing.assert_allclose(changed, L @ np.swapaxes(L, 1, 2) - old, atol=1e-12)
 
 
 @pytest.mark.proof
