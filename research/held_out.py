@@ -11,9 +11,8 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.identification.core.records import records
+from swashplate.identification.core.records import CALIBRATION, records
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.spans import CALIBRATION
 from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.validation import block_bootstrap

@@ -15,8 +15,7 @@ from swashplate.flights import datasets
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record, records
-from swashplate.identification.time.belonging import unrelated
-from swashplate.identification.time.filter_error import FilterError
+from swashplate.identification.time.filter_error import FilterError, unrelated
 
 NAME = "nanobench/B2_circle_fast_rep2"
 

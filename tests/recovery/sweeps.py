@@ -15,9 +15,9 @@ from swashplate.arrays import Array
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
+from swashplate.identification.time.filter_error import in_wind
 from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.identify import SHORTEST
-from swashplate.identification.time.noise_entries import in_wind
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.sensors import MotionCapture
 from swashplate.simulation.trim import Trim

@@ -16,7 +16,7 @@ from scipy import signal
 import proof_page
 from swashplate.arrays import Array, Complex
 from swashplate.flights.flight import Flight, stream
-from swashplate.identification.frequency import form_error
+from swashplate.identification.frequency import reading_accuracy
 from swashplate.identification.frequency.handling import ResponseMargins, margins
 from swashplate.identification.frequency.handling_readings import margin_lines
 from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, fit_transfer_function
@@ -121,7 +121,7 @@ def test_true_margins_lie_where_the_printed_errors_say(monkeypatch: pytest.Monke
     assert np.isfinite(np.concatenate(found)).sum() > 40
     assert share(found) >= 90.0
     assert 0.5 < np.nanmedian(np.abs(np.concatenate(found))) < 1.3, "nor are they merely wide"
-    monkeypatch.setattr(form_error, "_process", lambda *_: form_error.Process(0.0, 1.0))
+    monkeypatch.setattr(reading_accuracy, "_process", lambda *_: reading_accuracy.Process(0.0, 1.0))
     assert share([distances(*one) for one in fits]) < 85.0
 
 

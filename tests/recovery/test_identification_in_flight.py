@@ -19,7 +19,7 @@ import proof_page
 import swashplate as sp
 from flown_here import World
 from short_period import TRUTH, short_period
-from swashplate.engine.run import runnable
+from swashplate.engine.law import runnable
 from swashplate.filtering.sensor_suite import suite
 from swashplate.identification.recursive.equation import regression_equation
 from swashplate.identification.recursive.fourier_regression import RecursiveRegression, regression_plan

@@ -19,7 +19,7 @@ import proof_page
 import r50
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers import sweep_tracking
-from swashplate.identification.responses import own_references
+from swashplate.identification.responses import references
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -102,7 +102,7 @@ def test_a_reference_that_follows_the_wrong_frequency_makes_nothing_wrong_usable
         return sweep_tracking.Course(inside, TWO_PI * np.cumsum(frequency) / r50.RATE, lawful=False)
 
     right = counted(truth, responses(truth, flights), "by hand")
-    monkeypatch.setattr(own_references, "course_of", mistracked)
+    monkeypatch.setattr(references, "course_of", mistracked)
     wrong = counted(truth, responses(truth, flights), "by hand")
     assert wrong.usable.sum() < left * right.usable.sum()
     assert wrong.right.sum() >= 0.98 * wrong.usable.sum()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from swashplate.control.kinds import read_controller
-from swashplate.engine.c_text import Precision, identifier
+from swashplate.engine.c_expression import Precision, identifier
 from swashplate.export import formats
 from swashplate.export.control_json import read_linear
 from swashplate.export.controller_c import controller_code

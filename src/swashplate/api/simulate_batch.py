@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.engine.c_text import Precision as Digits
+from swashplate.engine.c_expression import Precision as Digits
 from swashplate.engine.card import fly_on_card
 from swashplate.engine.equations import SURROUNDINGS, parameter_row
 from swashplate.engine.fly import FlightPlan, fly
@@ -16,7 +16,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop_batch import Batch, Precision
 from swashplate.simulation.driving import Interpolation
-from swashplate.simulation.late import Delays, acting_rows
+from swashplate.simulation.record import Delays, acting_rows
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
 
 

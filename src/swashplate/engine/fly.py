@@ -19,12 +19,10 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
-from swashplate.engine.c_expression import ROOTS, body, split, statements
-from swashplate.engine.c_text import REAL, Precision, literal
+from swashplate.engine.c_expression import REAL, ROOTS, Precision, body, filled, literal, split, statements
+from swashplate.engine.c_loops import KERNELS, LANES, REDUCED, WHOLE, horner, moving, plain
 from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, Equations, equations_of
-from swashplate.engine.lanes import KERNELS, LANES, REDUCED, WHOLE, horner, moving, plain
 from swashplate.engine.law import FELT, REFERENCES, LawGraph, law_code
-from swashplate.engine.template import filled
 from swashplate.engine.trace import traced_angles, traced_force, traced_rates
 from swashplate.engine.tumbling import from_euler, steep_at, tumbling
 from swashplate.engine.virtual import fly_virtually

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.engine.c_text import Precision
+from swashplate.engine.c_expression import Precision
 from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of
 from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swashplate.atomic import folder_when_complete, write_bytes
-from swashplate.engine.c_text import Precision, identifier
+from swashplate.engine.c_expression import Precision, identifier
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear, logged_delays, of_state_space, of_vehicle
 from swashplate.export.origin import origin_of

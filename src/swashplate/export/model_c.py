@@ -15,9 +15,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from swashplate.engine.c_expression import FIXED, body, printed, split, statements
+from swashplate.engine.c_expression import FIXED, REAL, Precision, array, body, printed, split, statements, words
 from swashplate.engine.c_loops import looped
-from swashplate.engine.c_text import REAL, Precision, array, words
 from swashplate.export.traced import Traced, Variable, late_notes
 
 if TYPE_CHECKING:

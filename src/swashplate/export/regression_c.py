@@ -11,7 +11,7 @@ from importlib import resources
 
 import numpy as np
 
-from swashplate.engine.c_text import REAL, Precision, identifier, literal, words
+from swashplate.engine.c_expression import REAL, Precision, identifier, literal, words
 from swashplate.errors import ExportError
 from swashplate.identification.recursive import fourier_regression
 from swashplate.identification.recursive.equation import BIAS

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.engine.c_text import identifier
+from swashplate.engine.c_expression import identifier
 from swashplate.engine.roots import Looped, Looping, require_casadi
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear

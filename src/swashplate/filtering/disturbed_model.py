@@ -17,9 +17,9 @@ import numpy as np
 
 from swashplate.arrays import Array, Values
 from swashplate.engine.equations import Equations, equations_of
-from swashplate.filtering.block_matrices import blocks, diagonal
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.riccati import blocks, diagonal
 from swashplate.flights.schema import POSITION, RATES
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, Scalar

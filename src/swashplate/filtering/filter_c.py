@@ -13,13 +13,12 @@ from types import ModuleType
 
 import numpy as np
 
-from swashplate.engine.c_expression import ROOTS, Statements, printed, split, statements
+from swashplate.engine.c_expression import ROOTS, Statements, filled, printed, split, statements
 from swashplate.engine.c_loops import looped
 from swashplate.engine.c_tangents import VECTORS, Tangents
 from swashplate.engine.equations import Equations
 from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
-from swashplate.engine.template import filled
 from swashplate.engine.trace import traced_rates
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.following import AWAY, SHARES, STILL

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from swashplate.arrays import IMAGINARY, Array, Complex
-from swashplate.filtering.block_matrices import diagonal
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel
 from swashplate.filtering.filter_code import FilterCode, Followed, Following, Pushed, RecordSeries
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.riccati import diagonal
 from swashplate.physics.backend import ArrayBackend
 from swashplate.simulation.discretisation import held_series
 

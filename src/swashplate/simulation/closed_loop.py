@@ -20,8 +20,7 @@ from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.controller import Controller
-from swashplate.simulation.late import quantum_of, steps_late
-from swashplate.simulation.record import check_divergence, simulated_flight
+from swashplate.simulation.record import check_divergence, quantum_of, simulated_flight, steps_late
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start, trim
 
 

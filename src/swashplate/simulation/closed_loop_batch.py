@@ -19,8 +19,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import flown_delays, limits_of
 from swashplate.simulation.controller import Controller
-from swashplate.simulation.late import steps_late
-from swashplate.simulation.record import check_divergence, simulated_flight
+from swashplate.simulation.record import check_divergence, simulated_flight, steps_late
 from swashplate.simulation.trim import Trim, surroundings_of_start
 from swashplate.simulation.trim import trim as find_trim
 

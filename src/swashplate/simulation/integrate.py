@@ -15,8 +15,7 @@ from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
-from swashplate.simulation.late import Delays, acting_rows
-from swashplate.simulation.record import check_divergence, simulated_flight
+from swashplate.simulation.record import Delays, acting_rows, check_divergence, simulated_flight
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
 
 if TYPE_CHECKING:

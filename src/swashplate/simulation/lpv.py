@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array, lengthened
 from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, Equations, equations_of, parameter_row
+from swashplate.engine.law import runnable
 from swashplate.engine.roots import require_casadi
-from swashplate.engine.run import runnable
 from swashplate.engine.slopes import rates_at
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight, stream

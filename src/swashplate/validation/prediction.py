@@ -24,8 +24,7 @@ from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, St
 from swashplate.filtering.filter_code import RecordSeries, driving_rows
 from swashplate.filtering.nuisance import Nuisance, commands_moved, motors
 from swashplate.filtering.riccati import gain_at, steady_gain
-from swashplate.identification.core.records import Record
-from swashplate.identification.core.spans import HORIZONS
+from swashplate.identification.core.records import HORIZONS, Record
 from swashplate.identification.time.beginning import (
     FilterNumbers,
     begun,
@@ -39,6 +38,28 @@ from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.vehicle import Vehicle
 from swashplate.validation.controller_law import Law, learnt, shares_of
+
+
+def rms(rows: Array) -> Array:
+    """Root mean square over the first axis."""
+    return np.asarray(np.sqrt(np.mean(np.square(rows), axis=0)), dtype=np.float64)
+
+
+def fit_percent(predicted: Array, truth: Array, at_start: Array) -> Array:
+    """100 (1 - rms error / rms of the change since the start), per column.
+
+    Holding the last value scores 0, a perfect prediction 100; below 0 it would have been better to predict nothing.
+    """
+    return 100.0 * (1.0 - rms(predicted - truth) / rms(truth - at_start))
+
+
+def theil(predicted: Array, truth: Array, at_start: Array) -> Array:
+    """Theil's inequality coefficient of the changes since the start: 0 perfect, 1 no better than the opposite sign.
+
+    rms(error) / (rms(predicted change) + rms(true change)) (Theil 1966; Jategaonkar 2015, sec. 11.2.3).
+    """
+    return rms(predicted - truth) / (rms(predicted - at_start) + rms(truth - at_start))
+
 
 _REFERENCE = 0.5
 """Seconds before a start over which the reference is averaged; it stays there."""

@@ -14,10 +14,9 @@ from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight, as_flights
-from swashplate.identification.core.records import Record, records
+from swashplate.identification.core.records import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION, Record, records
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.sources import sources_of
-from swashplate.identification.core.spans import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION
 from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.feedback import AxisExcitation, excitation
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
@@ -31,9 +30,17 @@ from swashplate.validation.black_box import FilteredMotion
 from swashplate.validation.contact import Contact, contact
 from swashplate.validation.controller_law import Law, check_closed
 from swashplate.validation.flight_floors import ClosedRecord, ScoredRecord, closed_floors, flight_floors, motion_of
-from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.paths import spread
-from swashplate.validation.prediction import SETTLING, Predictions, naive, predict, prediction_sigma
+from swashplate.validation.prediction import (
+    SETTLING,
+    Predictions,
+    fit_percent,
+    naive,
+    predict,
+    prediction_sigma,
+    rms,
+    theil,
+)
 from swashplate.validation.validation import Example, Score, Validation
 from swashplate.validation.verdict import JUDGED_AHEAD, THRESHOLDS, verdict
 

@@ -17,11 +17,10 @@ from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.schema import channel
 from swashplate.identification.core.parameters import Parameterization
-from swashplate.identification.core.records import records
+from swashplate.identification.core.records import CALIBRATION, HORIZONS, records
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.core.sources import sources_of
-from swashplate.identification.core.spans import CALIBRATION, HORIZONS
 from swashplate.identification.responses.response_warnings import damaged
 from swashplate.identification.time.feedback import FlightDetails
 from swashplate.identification.time.kinematics import PREDICTED

@@ -15,7 +15,7 @@ import pytest
 import swashplate as sp
 from exported import compiled
 from swashplate.compiler import compiler, shared_library
-from swashplate.engine.c_text import identifier, literal, words
+from swashplate.engine.c_expression import identifier, literal, words
 from swashplate.errors import ExportError
 from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space

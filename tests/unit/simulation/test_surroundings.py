@@ -11,7 +11,7 @@ from swashplate.api.simulate_batch import simulate_batch
 from swashplate.errors import CardError
 from swashplate.models.surroundings import environment_of
 from swashplate.physics.environment import air_density
-from swashplate.simulation.late import acting_rows
+from swashplate.simulation.record import acting_rows
 
 HEAVE = sp.structure("heave")
 

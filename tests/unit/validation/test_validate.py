@@ -13,8 +13,7 @@ from simulated_flights import ten_seconds
 from swashplate.errors import FlightError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.core.records import Record, records
-from swashplate.identification.core.spans import CALIBRATION
+from swashplate.identification.core.records import CALIBRATION, Record, records
 from swashplate.identification.time.calibration import calibrate, first_part
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.validation.prediction import Predictions, predict

@@ -11,8 +11,7 @@ from swashplate.identification.time.feedback import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.validation.bands import Band
 from swashplate.validation.innovations import check, log_likelihood
-from swashplate.validation.metrics import fit_percent, rms, theil
-from swashplate.validation.prediction import naive
+from swashplate.validation.prediction import fit_percent, naive, rms, theil
 from swashplate.validation.validation import AxisVerdict, Score
 from swashplate.validation.verdict import THRESHOLDS, in_brief, verdict
 

@@ -15,7 +15,7 @@ import numpy as np
 from swashplate.control.lqg.law import LAW_MEMORY, Feedback, lqr_law
 from swashplate.engine.law import REFERENCES
 from swashplate.engine.roots import require_casadi
-from swashplate.filtering import constant_gain, observer
+from swashplate.filtering import observer, periodic_gain
 from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.filtering.sensor_suite import readings
@@ -90,7 +90,7 @@ def lqg_step(
         w = M.column([*before, voltage])
         if plan.period:
             phase = carried.counts[-1]
-            estimate = constant_gain.corrected_steadily(plan, numbers, estimate, y, phase, w, M)
+            estimate = periodic_gain.corrected_steadily(plan, numbers, estimate, y, phase, w, M)
             counts.append(xp.where(phase > plan.period - 1.5, 0.0, phase + 1.0))
         else:
             estimate, _, _ = observer.corrected(plan, numbers, estimate, y, due, w, M)
@@ -103,7 +103,7 @@ def lqg_step(
     given = [commands, *carried.given[:-1]]
     if plan.sensors:
         acting = [given[delay][j] for j, delay in enumerate(plan.delays)]
-        moved = constant_gain.predicted_steadily if plan.period else observer.predicted
+        moved = periodic_gain.predicted_steadily if plan.period else observer.predicted
         estimate = moved(plan, numbers, estimate, M.column([*acting, voltage]), taken, M)
     return Carried(estimate, given, counts, kept), commands
 

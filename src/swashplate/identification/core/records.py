@@ -17,6 +17,14 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
 
+HORIZONS = (0.5, 1.0, 2.0, 5.0)
+"""Seconds ahead at which predictions are judged."""
+CALIBRATION = 5.0
+"""Seconds at the start of a record that may be used; no prediction starts before they are over."""
+
+SHORTEST_CALIBRATION = 1.0
+"""Seconds: the filter has settled and a delay of a tenth of a second has left its trace."""
+
 
 class Compared(Protocol):
     """One piece of data beside the model."""

@@ -10,8 +10,7 @@ import numpy as np
 
 from swashplate.identification.core.result import percent
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
-from swashplate.identification.frequency.structure_misfit import misfits, parts_in
-from swashplate.identification.frequency.structure_score import hidden, score
+from swashplate.identification.frequency.structure_score import hidden, misfits, parts_in, score
 
 _ALIKE = 0.02
 """Share of the misfit within which two structures fit alike."""

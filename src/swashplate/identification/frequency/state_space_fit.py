@@ -28,7 +28,7 @@ from swashplate.identification.frequency.response_cost import (
 )
 from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit, words
 from swashplate.identification.frequency.state_space_search import STARTED, best_below, better_start, pairs_of
-from swashplate.identification.frequency.structure_misfit import misfit_words
+from swashplate.identification.frequency.structure_score import misfit_words
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.model_units import unit_words

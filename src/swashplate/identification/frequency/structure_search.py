@@ -29,8 +29,7 @@ from swashplate.identification.frequency.search_candidates import (
 from swashplate.identification.frequency.search_result import Contender, StructureSearch, reasons
 from swashplate.identification.frequency.state_space_fit import fit_targets, silent
 from swashplate.identification.frequency.state_space_search import led, price_of
-from swashplate.identification.frequency.structure_misfit import parts_in
-from swashplate.identification.frequency.structure_score import spread_of, squared_misfit
+from swashplate.identification.frequency.structure_score import parts_in, spread_of, squared_misfit
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.composition import PREFIX, in_order
 from swashplate.models.linear.state_space import StateSpaceModel

@@ -8,9 +8,8 @@ from dataclasses import replace
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Parameterization, trim_of_record
-from swashplate.identification.core.records import Record
+from swashplate.identification.core.records import CALIBRATION, Record
 from swashplate.identification.core.scoring import Solver, minimise
-from swashplate.identification.core.spans import CALIBRATION
 from swashplate.identification.time.filter_error import FilterError
 from swashplate.models.residual import HEADING, facing
 from swashplate.models.vehicle import Vehicle

@@ -18,13 +18,12 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.filtering.block_matrices import diagonal
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_code import Followed, Following, RecordSeries, driving_rows
 from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.filtering.riccati import steady_gain
+from swashplate.filtering.riccati import diagonal, steady_gain
 from swashplate.identification.core.likelihood import Errors, Likelihood, MovedErrors, factor_of
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameters import Parameterization

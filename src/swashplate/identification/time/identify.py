@@ -29,10 +29,9 @@ from swashplate.identification.core.sources import scale_words, sources_of
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time import feedback
-from swashplate.identification.time.belonging import unrelated
 from swashplate.identification.time.estimates import Found, constants, estimates_of, found_at
 from swashplate.identification.time.feedback import FlightDetails, moving_air
-from swashplate.identification.time.filter_error import SETTLING, FilterError
+from swashplate.identification.time.filter_error import SETTLING, FilterError, in_wind, unrelated
 from swashplate.identification.time.following_error import FollowingError, searched
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.linear_residual import (
@@ -42,7 +41,6 @@ from swashplate.identification.time.linear_residual import (
     beside_physics,
     moved,
 )
-from swashplate.identification.time.noise_entries import in_wind
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.record_fit import LAGS
 from swashplate.identification.time.residual_fit import fit_residual
@@ -120,7 +118,9 @@ def identify_flight(
     parameters = tuple(estimate for estimate in every if not estimate.name.startswith(PREFIX))
     noise = likelihood.noise_of(row)
     problems += [*smoothed_outputs(pieces, flights), *noise_too_small(noise, flights)]
-    if isinstance(likelihood, FilterError) and noise is not None:  # output error fits starts to its commands: others lose
+    if (
+        isinstance(likelihood, FilterError) and noise is not None
+    ):  # output error fits starts to its commands: others lose
         apart = unrelated(lambda others: likelihood.of(best.table, others).cost(row), pieces)
         problems += [apart] if apart else []
         notes += [told] if (told := moving_air(noise)) else []

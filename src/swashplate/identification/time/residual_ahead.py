@@ -32,8 +32,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core.multi_step import Ahead, Horizon
 from swashplate.identification.core.parameters import Free, Parameterization
-from swashplate.identification.core.records import Record
-from swashplate.identification.core.spans import CALIBRATION
+from swashplate.identification.core.records import CALIBRATION, Record
 from swashplate.identification.time.calibration import as_begun, calibrate
 from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.linear_residual import (

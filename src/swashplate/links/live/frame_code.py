@@ -9,12 +9,11 @@ import numpy as np
 
 from swashplate.atomic import scratch_folder
 from swashplate.compiler import ran, web_compiler
-from swashplate.engine.c_expression import body
+from swashplate.engine.c_expression import body, filled
 from swashplate.engine.equations import equations_of
 from swashplate.engine.fly import flight_code
 from swashplate.engine.law import FELT, print_function
 from swashplate.engine.roots import require_casadi
-from swashplate.engine.template import filled
 from swashplate.engine.trace import traced_force, traced_placing
 from swashplate.errors import ExportError
 from swashplate.extras import missing

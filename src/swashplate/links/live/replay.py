@@ -13,8 +13,7 @@ from swashplate.arrays import Array
 from swashplate.engine.equations import SURROUNDINGS
 from swashplate.errors import DivergenceError, FlightError, SwashError
 from swashplate.flights.flight import Flight
-from swashplate.identification.core.records import records
-from swashplate.identification.core.spans import CALIBRATION, SHORTEST_CALIBRATION
+from swashplate.identification.core.records import CALIBRATION, SHORTEST_CALIBRATION, records
 from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.links.live.picture import inputs_of, picture, pose_of

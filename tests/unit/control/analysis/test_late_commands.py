@@ -30,8 +30,8 @@ from swashplate.reporting.control_check import compose_check
 from swashplate.simulation.closed_loop import flown_delays, simulate_closed_loop
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 from swashplate.simulation.discretisation import held_late, with_late_inputs
-from swashplate.simulation.late import steps_late
 from swashplate.simulation.linearize import linearize
+from swashplate.simulation.record import steps_late
 from swashplate.simulation.trim import Trim
 
 SERVO, MOTOR = 0.034, 0.062

@@ -16,7 +16,7 @@ from swashplate.errors import CardError, DocumentError, SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
-from swashplate.simulation.late import quantum_of
+from swashplate.simulation.record import quantum_of
 from swashplate.simulation.trim import Trim, trim
 from swashplate.simulation.wind import INDOOR, dryden, indoor, outdoor
 

@@ -13,7 +13,7 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.response_names import under_names_of
 from swashplate.identification.frequency.state_space_fit import fit_state_space
-from swashplate.identification.frequency.structure_misfit import lacking_words, parts_in
+from swashplate.identification.frequency.structure_score import lacking_words, parts_in
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.models.linear.state_space_file import structure
 

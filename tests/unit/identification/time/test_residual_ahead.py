@@ -16,8 +16,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.multi_step import Horizon
-from swashplate.identification.core.records import Record, records
-from swashplate.identification.core.spans import CALIBRATION
+from swashplate.identification.core.records import CALIBRATION, Record, records
 from swashplate.identification.time import residual_ahead
 from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.kinematics import PREDICTED

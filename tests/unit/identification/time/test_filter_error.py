@@ -12,8 +12,7 @@ import swashplate as sp
 from simulated_flights import FREE, ten_seconds
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
-from swashplate.identification.time.belonging import SHIFTS, unrelated
-from swashplate.identification.time.filter_error import FilterError
+from swashplate.identification.time.filter_error import SHIFTS, FilterError, unrelated
 
 
 @lru_cache(maxsize=1)

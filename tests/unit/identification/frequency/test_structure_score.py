@@ -11,7 +11,7 @@ import pytest
 from swashplate.identification.frequency.response_cost import Target, ceiling, target
 from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.frequency.state_space_search import best_end
-from swashplate.identification.frequency.structure_misfit import misfit_words, misfits
+from swashplate.identification.frequency.structure_score import misfit_words, misfits
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure
