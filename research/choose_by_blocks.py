@@ -87,7 +87,7 @@ def learnt(
                 likelihood, optimum.row, pieces, horizon=Horizon(first, last), settling=SETTLING, known=beside
             )
             solved = minimise(criterion, start=criterion.start)
-            rows[f"{first:g} to {last:g} s ahead, {how}"] = criterion.whole(solved.row)
+            rows[f"{first:g} to {last:g} s ahead, {how}"] = criterion.whole_row(solved.row)
     for name, row in rows.items():
         numbers = (row * likelihood.row.scale)[: len(table.names)]
         told = Nuisance(*(float(np.asarray(value).ravel()[0]) for value in likelihood.nuisances_of(row)))

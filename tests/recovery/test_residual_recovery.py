@@ -47,7 +47,7 @@ def test_a_known_residual_is_found() -> None:
     truth = {"residual_p_p": -4.0, "residual_q_u": 3.0, "residual_u_theta": 0.0}
     pieces = flown(with_residual(plain, trim).with_values(truth))
     found = fit_residual(plain, pieces, [Nuisance()] * len(pieces), NOISE)
-    assert np.isfinite(found.strength), found.words
+    assert np.isfinite(found.strength), found.summary_text
     card = found.vehicle.card.parameters
     for name, value in truth.items():
         sigma = card[name].sigma
@@ -70,7 +70,7 @@ def test_no_residual_is_found_where_there_is_none() -> None:
     plain = sp.vehicle("crazyflie")
     pieces = flown(plain)
     found = told(plain, pieces, judged=True)
-    assert max(found.shares.values()) < 1.0, found.words
+    assert max(found.shares.values()) < 1.0, found.summary_text
     assert told(plain, pieces, judged=False).shares["w"] > 10.0
 
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
 from swashplate.engine.c_expression import identifier
+from swashplate.engine.graph import Expression, Graph
 from swashplate.engine.roots import Looped, Looping, require_casadi
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear
 from swashplate.flights.schema import channel, is_known
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import CasadiBackend, Scalar
+from swashplate.physics.backend import Backend, CasadiBackend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim
 
@@ -66,9 +67,9 @@ class Traced:
     surroundings: tuple[Variable, ...]
     parameters: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
-    rates: Any = field(repr=False)
-    readings: Any = field(repr=False)
-    jacobians: Any = field(repr=False)
+    rates: Graph = field(repr=False)
+    readings: Graph = field(repr=False)
+    jacobians: Graph = field(repr=False)
     looped: Looped | None = field(default=None, repr=False)
     delays: tuple[float, ...] = ()
     origin: tuple[str, ...] = ()
@@ -83,18 +84,18 @@ def late_notes(model: Traced) -> tuple[str, ...]:
 class _Remembering(CasadiBackend):
     """Values that differentiation must not look into become symbols, and are put back afterwards."""
 
-    def __init__(self, casadi: Any) -> None:
+    def __init__(self, casadi: ModuleType) -> None:
         super().__init__()
-        self.hidden: list[tuple[Any, Any]] = []
+        self.hidden: list[tuple[Expression, Expression]] = []
         self._casadi = casadi
         self.detached: Callable[[Scalar], Scalar] = self._hide
 
-    def _hide(self, x: Any) -> Any:
+    def _hide(self, x: Expression) -> Expression:
         symbol = self._casadi.SX.sym(f"hidden_{len(self.hidden)}")
         self.hidden.append((symbol, x))
         return symbol
 
-    def shown(self, expressions: Sequence[Any]) -> list[Any]:
+    def shown(self, expressions: Sequence[Expression]) -> list[Expression]:
         substituted = list(expressions)
         for symbol, value in reversed(self.hidden):  # later ones may be made of earlier ones
             substituted = self._casadi.substitute(substituted, [symbol], [value])
@@ -123,7 +124,7 @@ def trace_vehicle(
     parameters = vehicle.parameters(*(p[i] for i in range(k)))
     environment = Environment(**{a: s[i] for i, a in enumerate(around)})
 
-    def rates(xp: Any) -> Any:
+    def rates(xp: Backend) -> Expression:
         return casadi.vertcat(*vehicle.rates(x, u, parameters, environment, xp))
 
     hiding = _Remembering(casadi)
@@ -135,7 +136,7 @@ def trace_vehicle(
 
     rest = s[used] if used else casadi.SX(0, 1)
 
-    def function(results: Sequence[Any]) -> Any:
+    def function(results: Sequence[Expression]) -> Graph:
         return casadi.Function("f", [x, u, rest, p], list(results), {"cse": True})
 
     looping = Looping(casadi)
@@ -186,12 +187,12 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
     x, u = casadi.SX.sym("x", len(model.states)), casadi.SX.sym("u", len(model.inputs))
     nothing = casadi.SX(0, 1)
 
-    def sparse(matrix: Any) -> Any:
+    def sparse(matrix: Expression) -> Expression:
         return casadi.SX(casadi.sparsify(casadi.DM(np.asarray(matrix))))
 
     A, B, C, D = (sparse(matrix) for matrix in (model.A, model.B, model.C, model.D))
 
-    def function(results: Sequence[Any]) -> Any:
+    def function(results: Sequence[Expression]) -> Graph:
         return casadi.Function("f", [x, u, nothing, nothing], list(results), {"cse": True})
 
     def variables(names: Sequence[str]) -> tuple[Variable, ...]:

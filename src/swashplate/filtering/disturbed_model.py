@@ -186,7 +186,7 @@ class StochasticModel:
         x, gust = _turn(x, self.vehicle.state_names, psi, xp), _turn(gust, _GUST_NAMES[: self.n_gusts], psi, xp)
         return FilterState(state.x + x, state.gust + gust, state.drift + drift), innovation
 
-    def moved(self, state: FilterState, joined: Array) -> FilterState:
+    def displace(self, state: FilterState, joined: Array) -> FilterState:
         """States by row, and what is added to them, joined rows (states, gusts, drifts) with the nose north."""
         n, g = len(self.vehicle.state_names), self.n_gusts
         psi, added = state.x[:, self.vehicle.index("psi")], joined.copy()

@@ -119,14 +119,14 @@ def sample_source(equations: Equations, sample: Sample, following: Following | N
         "OF_CARD_MOVED": _indented(card_lines),
         "OF_INPUTS": printed(of_inputs, "double", "double", ["c"]),
         "OF_INPUTS_MOVED": _indented(input_lines),
-        "MOVING": _plain(rest, rates.steps),
+        "MOVING": _rates_in_c(rest, rates.steps),
         "MOVING_MOVED": _indented([*lines, *moving.stores(stored, {0: "k"})]),
         "FOLLOWING": follow,
     }
     return filled("filter.c", blanks)
 
 
-def _plain(code: Statements, steps: Sequence[int]) -> str:
+def _rates_in_c(code: Statements, steps: Sequence[int]) -> str:
     """Rates, by loops around their roots where there are some."""
     if steps:
         return looped(code, steps, real="double", precision="double", outputs=["k"])
@@ -148,7 +148,7 @@ def _following(model: StochasticModel, rates: Statements, steps: Sequence[int]) 
         "SURE": repr(STILL),
         "STILL_AIR": max(1, len(still.outputs)),
         "IN_STILL_AIR": printed(still, "double", "double", ["ca"]),
-        "IN_WIND": _plain(windy, steps),
+        "IN_WIND": _rates_in_c(windy, steps),
         "SENSE": printed(sensed, "double", "double", ["y", "by_s"]),
     }
     return filled("follow.c", blanks)

@@ -89,10 +89,12 @@ class FilterCode(Protocol):
     compiled_by: str
 
     def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
-        """Innovations (n, outputs), states after each reading (n, joined), and what `moved` asks for."""
+        """Innovations (n, outputs), states after each reading (n, joined), and what `filter_slopes` asks for."""
         ...
 
-    def moved(self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along) -> tuple[Array, Array]:
+    def filter_slopes(
+        self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along
+    ) -> tuple[Array, Array]:
         """Slopes of innovations (count, n, outputs), and of the states after some readings (count, marks, joined)."""
         ...
 

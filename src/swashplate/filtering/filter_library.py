@@ -67,7 +67,9 @@ class FilterLibrary:
         self._c.run_along(n, dt, *map(flat, fixed), *map(flat, series), *told)
         return told
 
-    def moved(self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along) -> tuple[Array, Array]:
+    def filter_slopes(
+        self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along
+    ) -> tuple[Array, Array]:
         n, count = len(series.readings), len(along.fixed.start)
         slopes, states = np.empty((count, n, self._outputs)), np.empty((count, len(along.marks), fixed.start.size))
         here = *map(flat, fixed), *map(flat, series), went

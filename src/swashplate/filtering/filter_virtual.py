@@ -72,7 +72,9 @@ class VirtualFilter:
             total = total + weight * dt * k
         return casadi.Function("sample", [s, y, row, g, p], [casadi.vertcat(total, rest), nu, corrected])
 
-    def moved(self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along) -> tuple[Array, Array]:
+    def filter_slopes(
+        self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along
+    ) -> tuple[Array, Array]:
         model, directions, arriving, commands, marks = self._model, *along
         n, count, y, joined = len(went), len(directions.start), model.n_outputs, fixed.start.size
         slopes, states = np.empty((count, n, y)), np.empty((count, len(marks), joined))

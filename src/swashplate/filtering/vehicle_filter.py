@@ -73,7 +73,7 @@ class VehicleFilter:
         series, marks, inputs = RecordSeries(readings, rows), np.arange(len(rows)), rows.shape[1] - 4
         errors, states, went = self._library.along(self.dt, fixed, series)
         along = Along(moved, 0, np.empty((0, len(rows), inputs)), marks)
-        return Ran(errors, states, *self._library.moved(self.dt, fixed, series, went, along))
+        return Ran(errors, states, *self._library.filter_slopes(self.dt, fixed, series, went, along))
 
     def _parts(self, start: Array, numbers: Array) -> Iterator[tuple[Array, Array, Array]]:
         """Where it begins, what is given and the equations' numbers: themselves, and how they move."""

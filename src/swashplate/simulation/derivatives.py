@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swashplate.arrays import Complex
 from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of, parameter_row, unpack_rows
 from swashplate.engine.slopes import Slopes, slopes_of
 from swashplate.errors import SwashError
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from swashplate.arrays import Array
@@ -132,8 +132,8 @@ class CardSpread:
     derivatives: Mapping[str, tuple[float, float, float]]
     by_card: Mapping[str, tuple[float, float]]
     model: Mapping[str, ModelError]
-    eigenvalues: NDArray[np.complexfloating[Any, Any]]
-    samples: NDArray[np.complexfloating[Any, Any]]
+    eigenvalues: Complex
+    samples: Complex
     draws: int
     refused: int
 
@@ -198,7 +198,7 @@ def spread(
     nominal = linearize(vehicle, at)
     values = np.linalg.eigvals(nominal.A).astype(complex)
     tables: list[Array] = []
-    modes: list[NDArray[np.complexfloating[Any, Any]]] = []
+    modes: list[Complex] = []
     refused, why = 0, ""
     names = list(derivative_table(vehicle, at).names())
     for _ in range(draws):
@@ -245,9 +245,7 @@ def spread(
     )
 
 
-def _matched(
-    values: NDArray[np.complexfloating[Any, Any]], wanted: NDArray[np.complexfloating[Any, Any]]
-) -> NDArray[np.complexfloating[Any, Any]]:
+def _matched(values: Complex, wanted: Complex) -> Complex:
     """Eigenvalues in the order of others, by the assignment that moves them least."""
     from scipy.optimize import linear_sum_assignment
 

@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from swashplate.arrays import Array
+from swashplate.physics.backend import Scalar
 
-Rates = Callable[[Any, Any], Any]
+Rates = Callable[[Scalar, Scalar], Scalar]
 """`f(x, w)`: the rates of a row (or column, or number) under what drives it."""
-Driving = Callable[[Any], Any]
+Driving = Callable[[Scalar], Scalar]
 """What drives it at a fraction 0 to 1 of the step."""
 
 
-def rk4_change(rates: Rates, x: Any, w: Driving, dt: Any) -> Any:
+def rk4_change(rates: Rates, x: Scalar, w: Driving, dt: Scalar) -> Scalar:
     """How far a step takes `x`; arguments as in `rk4_step`."""
     k, total = 0.0 * x, 0.0 * x
     for fraction, weight in ((0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)):
@@ -26,7 +27,7 @@ def rk4_change(rates: Rates, x: Any, w: Driving, dt: Any) -> Any:
     return total
 
 
-def rk4_step(rates: Rates, x: Any, w: Driving, dt: Any) -> Any:
+def rk4_step(rates: Rates, x: Scalar, w: Driving, dt: Scalar) -> Scalar:
     """The state one step later.
 
     Args:
@@ -68,7 +69,7 @@ def first_order_hold(A: NDArray[Any], B: NDArray[Any], dt: float) -> tuple[Any, 
     return step[..., :n, :n], step[..., :n, n : n + m], step[..., :n, n + m :]
 
 
-def held_series(A: Any, dt: Any, one: Any, *, terms: int = 4) -> tuple[Any, Any]:
+def held_series(A: Scalar, dt: Scalar, one: Scalar, *, terms: int = 4) -> tuple[Scalar, Scalar]:
     """(F, H) with F = e^(A dt) = 1 + dt A H, by the series to so many terms; inputs B held for dt act by dt H B.
 
     To fourth order it is what a Runge-Kutta step makes of a linear system. Only `@`, `*` and `+` are used: it can be

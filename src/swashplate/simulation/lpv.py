@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +33,7 @@ from swashplate.models.catalogue import from_card
 from swashplate.models.linear.matrices_file import state_space_of_matrices
 from swashplate.models.linear.stitching import stitch_points
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 from swashplate.simulation.integrate import simulate
@@ -145,7 +146,7 @@ def simulate_lpv(
     return Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate_lpv", scheme=scheme, rate=rate)
 
 
-def _linear_step(A: Any, c: Any, x: Any, dt: Any) -> Any:
+def _linear_step(A: Scalar, c: Scalar, x: Scalar, dt: Scalar) -> Scalar:
     """One Runge-Kutta step of dx/dt = A x + c: the Taylor series to fourth order."""
     term = A @ x + c
     total = x + dt * term

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import IMAGINARY, Array
 from swashplate.engine.equations import Equations
 from swashplate.engine.slopes import Slopes, rates_and_slopes
-from swashplate.physics.backend import ArrayBackend, Backend
+from swashplate.physics.backend import ArrayBackend, Backend, Scalar
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody
 
@@ -21,7 +20,7 @@ ANGULAR_ACCELERATIONS = slice(9, 12)
 _XP = ArrayBackend()
 
 
-def assemble(equations: Equations, z: Array, course: Array, xp: Backend) -> tuple[Any, Any]:
+def assemble(equations: Equations, z: Array, course: Array, xp: Backend) -> tuple[Scalar, Scalar]:
     """State and input rows of a steady flight from the unknowns.
 
     Args:

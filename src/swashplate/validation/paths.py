@@ -144,10 +144,10 @@ def _shown(filtered: Observed, starts: NDArray[np.intp], aside: Array, kicks: Ar
     noise, nuisance = Noise(*filtered.numbers.noise), Nuisance(*filtered.numbers.nuisance)
     fade, step = model.fade(noise), record_filter(model).step
     state = FilterState(*(np.asarray(part)[starts] for part in filtered.filtered))
-    state, shown = model.moved(state, aside), []
+    state, shown = model.displace(state, aside), []
     for k in range(kicks.shape[1]):
         here = starts + k
         x = step(state.x, state.gust, state.drift, filtered.commands[here], filtered.voltage[here], numbers)
-        state = model.moved(FilterState(x, fade * state.gust, state.drift), kicks[:, k])
+        state = model.displace(FilterState(x, fade * state.gust, state.drift), kicks[:, k])
         shown.append(model.measure(state.x.T, nuisance, _ARRAYS).T)
     return np.stack(shown, axis=1)

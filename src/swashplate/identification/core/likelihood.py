@@ -305,12 +305,12 @@ class OwnCovariance(Likelihood):
         return []
 
     @abstractmethod
-    def _plain(self, row: Array) -> Array:
+    def _errors_in_a_row(self, row: Array) -> Array:
         """Errors of every record, one after the other, (n_t, n_outputs)."""
 
     def errors_of(self, row: Array) -> list[Errors]:
         factor = factor_of(self.covariance)
-        return [Errors(number, part, factor) for number, part in enumerate(self._by_record(self._plain(row)))]
+        return [Errors(number, part, factor) for number, part in enumerate(self._by_record(self._errors_in_a_row(row)))]
 
     def _loss(self, white: Array) -> float:
         return 0.0  # at their own covariance it is the same for all errors
@@ -323,7 +323,7 @@ class OwnCovariance(Likelihood):
         return [replace(part, factor=factor) for part in parts]
 
     def refresh(self, row: Array) -> None:
-        errors = self._plain(row)
+        errors = self._errors_in_a_row(row)
         if np.all(np.isfinite(errors)) and np.max(np.abs(errors)) < _DIVERGED:
             self.covariance = self._covariance(errors)
 
@@ -345,5 +345,5 @@ class OwnCovariance(Likelihood):
                 sigma=sigma,
                 states=np.zeros((record.time.size, 0)),
             )
-            for record, errors in zip(self.records, self._by_record(self._plain(row)), strict=True)
+            for record, errors in zip(self.records, self._by_record(self._errors_in_a_row(row)), strict=True)
         )

@@ -176,7 +176,7 @@ class MultiStepErrors:
         """Where the search begins."""
         return np.asarray(self._found[self._places])
 
-    def whole(self, row: Array) -> Array:
+    def whole_row(self, row: Array) -> Array:
         """The likelihood's row with what the criterion moved."""
         full = self._found.copy()
         full[self._places] = row
@@ -192,7 +192,7 @@ class MultiStepErrors:
 
     def cost(self, row: Array) -> float:
         with np.errstate(over="ignore", invalid="ignore"):
-            errors = np.concatenate(self._base.errors_ahead(self.whole(row), self.ahead))
+            errors = np.concatenate(self._base.errors_ahead(self.whole_row(row), self.ahead))
         return self._cost(errors) + self._apart(row)[0] if np.isfinite(errors).all() else float("inf")
 
     def _apart(self, row: Array) -> tuple[float, Array]:
@@ -206,7 +206,7 @@ class MultiStepErrors:
         return self._share * robust.huber(errors * self._scale / np.sqrt(self._share))
 
     def scores(self, row: Array) -> tuple[float, Array, Array]:
-        errors, slopes = (np.concatenate(part, axis=k) for k, part in enumerate(self._moved(row)))
+        errors, slopes = (np.concatenate(part, axis=k) for k, part in enumerate(self._errors_and_slopes(row)))
         if not (np.isfinite(errors).all() and np.isfinite(slopes).all()):
             p = len(self.row)
             return float("inf"), np.zeros(p), np.zeros((p, p))
@@ -219,15 +219,15 @@ class MultiStepErrors:
 
     def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
         """Per record: whitened errors (starts, horizons x outputs) and sensitivities (p, ...); what is known beside."""
-        errors, slopes = self._moved(row)
+        errors, slopes = self._errors_and_slopes(row)
         kept = [i for i, part in enumerate(errors) if len(part)]
         white = [(errors[i] * self._scale).reshape(len(errors[i]), -1) for i in kept]
         moved = [(slopes[i] * self._scale).reshape(*slopes[i].shape[:2], -1) for i in kept]
         return white, moved, self.known
 
-    def _moved(self, row: Array) -> tuple[list[Array], list[Array]]:
+    def _errors_and_slopes(self, row: Array) -> tuple[list[Array], list[Array]]:
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._base.errors_ahead_moved(self.whole(row), self.ahead, self._places)
+            return self._base.errors_ahead_moved(self.whole_row(row), self.ahead, self._places)
 
 
 def told_horizon(horizon: Horizon | None) -> dict[str, list[float]]:

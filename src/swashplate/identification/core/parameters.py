@@ -47,7 +47,7 @@ class Layout:
             numbers[name] = expression(numbers)
         return self.parameters(**numbers)
 
-    def moved(self, card: Array, row: Array) -> Array:
+    def value_slopes(self, card: Array, row: Array) -> Array:
         """Slopes of `values` by each free parameter (free, parameters), by complex steps (Squire and Trapp 1998)."""
         step = 1j * IMAGINARY * np.eye(len(self.free))
         moved = [np.imag(np.array(self.values(card, row + one))) / IMAGINARY for one in step]

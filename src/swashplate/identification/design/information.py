@@ -143,13 +143,15 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
     def slopes(row: Array) -> Array:
         return np.concatenate(rates_and_slopes(equations, about.state, w, row)[1:], axis=1)
 
-    def moved(name: str, step: float) -> Array:
+    def slopes_aside(name: str, step: float) -> Array:
         if vehicle.structure is not None:
             return _structured(vehicle, name, step)
         return slopes(p + step * np.eye(p.size)[vehicle.parameter_names.index(name)])
 
     steps = {name: _STEP * max(abs(vehicle.numbers[name].value), 1e-6) for name in unknown}
-    by = np.stack([(moved(n, step) - moved(n, -step)) / (2.0 * step) for n, step in steps.items()], axis=-1)
+    by = np.stack(
+        [(slopes_aside(n, step) - slopes_aside(n, -step)) / (2.0 * step) for n, step in steps.items()], axis=-1
+    )
     here, n = slopes(p), len(vehicle.state_names)
     return Sensed(
         here[:, :n],

@@ -185,21 +185,21 @@ def best_below(
     if starts == 1 or not ceilings:
         return *search((*targets, *ceilings)), tuple(ceilings)
     alone, cost = search(targets)
-    enough = _WORTH * _seen(cost, alone) + 1.0
+    enough = _WORTH * _mean_cost_of_responses(cost, alone) + 1.0
     fine = _ENOUGH * max(1.0, alone.cost)
     values, kept = alone.row * cost.row.scale, tuple(ceilings)
     while True:
         cost = cost_function(model, (*targets, *kept), cost.row.scale)
         end = _down(cost, start=values / cost.row.scale, tolerance=fine, iterations=iterations, progress=progress)
         over = _over(cost, end.row)
-        if _seen(cost, end) <= enough or not kept:
+        if _mean_cost_of_responses(cost, end) <= enough or not kept:
             break
         over = over or _over(cost, values / cost.row.scale)
         worst = {name for name, j in over.items() if 2.0 * j >= max(over.values())}
         kept = tuple(c for c in kept if c.name not in worst) if worst else ()
     if over and len(kept) == len(ceilings):
         other, priced = search((*targets, *ceilings))
-        if _seen(priced, other) <= enough and len(_over(priced, other.row)) < len(over):
+        if _mean_cost_of_responses(priced, other) <= enough and len(_over(priced, other.row)) < len(over):
             return other, priced, kept
     return replace(end, history=(*alone.history, *end.history[1:])), cost, kept
 
@@ -212,7 +212,7 @@ def _down(
     return minimise(cost, solver, start=start)
 
 
-def _seen(cost: ResponseCost, end: Optimum) -> float:
+def _mean_cost_of_responses(cost: ResponseCost, end: Optimum) -> float:
     """J_ave of the responses that were seen (not of those that may not be exceeded)."""
     return float(np.mean([j for j, t in zip(cost.each(end.row), cost.targets, strict=True) if not t.ceiling]))
 

@@ -7,7 +7,7 @@ at once.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,10 +61,10 @@ class FilterNumbers(NamedTuple):
         inputs: mean of the commands that reach the vehicle while it starts.
     """
 
-    parameters: Any
-    noise: Any
-    nuisance: Any
-    inputs: Any
+    parameters: Array
+    noise: Array
+    nuisance: Array
+    inputs: Array
 
 
 class FirstMotion(NamedTuple):
@@ -77,18 +77,18 @@ class FirstMotion(NamedTuple):
         running: seconds since the flight's time zero, where motors begin.
     """
 
-    value: Any
-    rate: Any
-    velocity: Any
-    voltage: Any
-    running: Any = 0.0
+    value: Array
+    rate: Array
+    velocity: Array
+    voltage: Array
+    running: float = 0.0
 
 
 class Begun(NamedTuple):
     """The constant gain of a run, and the state that it begins with."""
 
     gain: FilterGain
-    x: Any
+    x: Array
 
 
 def seen_at_start(vehicle: Vehicle, record: Record) -> FirstMotion:
@@ -110,7 +110,7 @@ def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> 
     return Begun(model.gain_of(K, S), starting_rows(model, rows, seen)[0])
 
 
-def first_state(model: StochasticModel, x: Any, nuisance: Array) -> FilterState:
+def first_state(model: StochasticModel, x: Array, nuisance: Array) -> FilterState:
     """State rows (..., states) with nothing known of the air yet, and drifts where the records' numbers have them."""
     return FilterState(x, np.zeros((*x.shape[:-1], model.n_gusts)), nuisance[..., _PUSHES])
 

@@ -102,7 +102,7 @@ def unrelated(cost: Callable[[Sequence[Record]], float], pieces: Sequence[Record
     """
     here = cost(pieces)
     shares = np.arange(1, SHIFTS + 1) / (SHIFTS + 1)
-    better = [share for share in shares if cost([_moved(piece, share) for piece in pieces]) <= here]
+    better = [share for share in shares if cost([_shifted_record(piece, share) for piece in pieces]) <= here]
     if not better:
         return ""
     longest = max(float(piece.time[-1] - piece.time[0]) for piece in pieces)
@@ -112,7 +112,7 @@ def unrelated(cost: Callable[[Sequence[Record]], float], pieces: Sequence[Record
     )
 
 
-def _moved(piece: Record, share: float) -> Record:
+def _shifted_record(piece: Record, share: float) -> Record:
     """The record with its commands later by a share of its length, the last ones first."""
     return replace(piece, inputs=np.roll(piece.inputs, round(share * len(piece.inputs)), axis=0))
 
@@ -266,7 +266,7 @@ class FilterError(Likelihood):
     def _along(self, row: Array, runs: Sequence[Filtered]) -> Iterator[MovedErrors]:
         places = np.arange(len(self.row))
         for mine, run, counted, part in zip(self._runs, runs, self.counted, self._parts(runs), strict=True):
-            slopes, dS = mine.moved(run, self.table.card_row, row * self.row.scale, self.row.scale)
+            slopes, dS = mine.innovation_slopes(run, self.table.card_row, row * self.row.scale, self.row.scale)
             Li = np.linalg.inv(part.factor)
             S = np.asarray(run.begin.gain.covariance)
             telling = self._foreseen(slopes[:, counted], part.errors, dS, S, mine.log)

@@ -206,16 +206,16 @@ def searched(likelihood: FollowingError, solver: Solver, *, start: Array) -> Opt
     Args:
         likelihood, solver, start: as of `minimise`.
     """
-    found = minimise(CarriedSlopes(likelihood), replace(solver, iterations=1), start=start)
+    optimum = minimise(CarriedSlopes(likelihood), replace(solver, iterations=1), start=start)
     while True:
-        done = len(found.history) - 1
+        done = len(optimum.history) - 1
         more = replace(solver.after(done), iterations=solver.iterations - done)
-        further = minimise(CarriedSlopes(likelihood), more, start=found.row)
-        settled = further.converged and found.cost - further.cost < solver.tolerance
+        further = minimise(CarriedSlopes(likelihood), more, start=optimum.row)
+        settled = further.converged and optimum.cost - further.cost < solver.tolerance
         if not settled:
-            found = replace(further, history=(*found.history, *further.history[1:]))
+            optimum = replace(further, history=(*optimum.history, *further.history[1:]))
         if settled or not further.converged:
-            return replace(found, information=likelihood.scores(found.row)[2], converged=settled)
+            return replace(optimum, information=likelihood.scores(optimum.row)[2], converged=settled)
 
 
 def following_from(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Array) -> Following:

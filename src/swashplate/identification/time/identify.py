@@ -39,7 +39,7 @@ from swashplate.identification.time.linear_residual import (
     begun,
     begun_where_it_ended,
     beside_physics,
-    moved,
+    physics_shifts,
 )
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.record_fit import LAGS
@@ -112,7 +112,7 @@ def identify_flight(
         if residual.kept and horizon is None:
             alone = best
             likelihood, best, row = _together(by, likelihood, row, residual, question)
-            residual, began = residual.at(best.vehicle, moved(alone, best)), begun(vehicle, residual)
+            residual, began = residual.at(best.vehicle, physics_shifts(alone, best)), begun(vehicle, residual)
     optimum = best.optimum
     every, problems = estimates_of(best, began)
     parameters = tuple(estimate for estimate in every if not estimate.name.startswith(PREFIX))
@@ -141,8 +141,8 @@ def identify_flight(
             entries = {**residual.vehicle.card.parameters, **identified.card.parameters}
             card = replace(identified.card, parameters=entries, observer={**identified.card.observer, **wanders})
             identified = residual.vehicle.with_card(card)
-        settings["residual"] = residual.told
-        notes.append(residual.words)
+        settings["residual"] = residual.settings_entry
+        notes.append(residual.summary_text)
     own, plain = constants(best), best.scaled(best.plain)[:k, :k]
     if vehicle.traits.balance is not None:
         trims = {name: [c.value for c in own if c.name == name] for name in {c.name for c in own}}
@@ -298,7 +298,7 @@ def _found_ahead(
     ahead = minimise(criterion, _solver(question), start=criterion.start)
     ahead = replace(ahead, converged=ahead.converged and optimum.converged)
     best = found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags)
-    return replace(best, corrected=TWICE * best.corrected), criterion.whole(ahead.row)
+    return replace(best, corrected=TWICE * best.corrected), criterion.whole_row(ahead.row)
 
 
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from swashplate.arrays import IMAGINARY, Array
+from swashplate.arrays import IMAGINARY, Array, Complex
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel
 from swashplate.filtering.filter_code import RecordSeries, driving_rows
@@ -106,10 +107,10 @@ class RecordRun:
         run = self._filter.along(begin, at, self._series(reaching))
         return Filtered(reaching, at, begin, run)
 
-    def moved(self, run: Filtered, card: Array, numbers: Array, scale: Array) -> tuple[Array, Array]:
+    def innovation_slopes(self, run: Filtered, card: Array, numbers: Array, scale: Array) -> tuple[Array, Array]:
         """Slopes by every scaled entry of the row: innovations (p, n, outputs), covariance (p, outputs, outputs)."""
         moves = self._moves(run, card, numbers, scale, len(numbers))
-        slopes, _ = self._filter.moved(run.begin, run.numbers, self._series(run.commands), run.run, moves)
+        slopes, _ = self._filter.run_slopes(run.begin, run.numbers, self._series(run.commands), run.run, moves)
         return slopes, np.asarray(moves.begin.gain.covariance)
 
     def ahead(self, run: Filtered, starts: Sequence[int], steps: Sequence[int]) -> Array:
@@ -134,14 +135,14 @@ class RecordRun:
         """
         at, of = np.asarray(starts, dtype=np.intp), np.asarray(steps, dtype=np.intp)
         moves, series = self._moves(run, *given, count), self._series(run.commands)
-        _, by_start = self._filter.moved(run.begin, run.numbers, series, run.run, moves, starts)
+        _, by_start = self._filter.run_slopes(run.begin, run.numbers, series, run.run, moves, starts)
         states, moved = self._filter.ahead_moved(run.states, by_start, run.numbers, series, moves, at, steps)
         nuisance, to = run.numbers.nuisance, moves.numbers.nuisance
         errors = self.readings[at[:, None] + of] - np.real(self._measured(states, Nuisance(*nuisance)))
         aside = Nuisance(*(nuisance + 1j * IMAGINARY * to).T[..., None, None])
         return errors, -np.imag(self._measured(states + 1j * IMAGINARY * moved, aside)) / IMAGINARY
 
-    def _measured(self, states: Any, nuisance: Nuisance) -> Any:
+    def _measured(self, states: Complex | Array, nuisance: Nuisance) -> Complex:
         """The measured channels of states (..., states), in the last axis too; imaginary parts are slopes."""
         seen = self.plan.model.measure(np.moveaxis(states, -1, 0), nuisance, COMPLEX_ARRAYS)
         return np.moveaxis(seen, 0, -1)
@@ -165,7 +166,7 @@ class RecordRun:
             np.zeros((p, len(run.numbers.nuisance))),
             np.zeros((p, len(run.numbers.inputs))),
         )
-        directions.parameters[:k] = self.plan.layout.moved(card, numbers[:k])
+        directions.parameters[:k] = self.plan.layout.value_slopes(card, numbers[:k])
         directions.nuisance[np.arange(own, own + m), _places(Nuisance, self.plan.nuisances)] = 1.0
         directions.noise[np.arange(p - noises.size, p), noises] = run.numbers.noise[noises]
         directions.inputs[own : own + m] = by_command[:, : starting_samples(model.dt)].mean(axis=1)
@@ -175,5 +176,5 @@ class RecordRun:
         return Moves(begin, directions, own, late[: max(0, count - own)])
 
 
-def _places(of: Any, names: Sequence[str]) -> Any:
+def _places(of: type[Noise | Nuisance], names: Sequence[str]) -> NDArray[np.intp]:
     return np.array([of._fields.index(name) for name in names], dtype=np.intp)

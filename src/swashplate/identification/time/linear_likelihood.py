@@ -94,7 +94,7 @@ class LinearErrors(OwnCovariance):
 
         def run(gain: Array) -> tuple[float, list[Array]]:
             with np.errstate(over="ignore", invalid="ignore"):
-                errors = self._plain(with_gain(gain))
+                errors = self._errors_in_a_row(with_gain(gain))
             parts = [Errors(0, errors, factor_of(self.covariance))]
             return self.cost_of(parts), self._by_record(errors)
 
@@ -108,14 +108,14 @@ class LinearErrors(OwnCovariance):
     def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
         return gain_entries(self.model.states, size, spread) if self._gained else []
 
-    def _plain(self, row: Array) -> Array:
+    def _errors_in_a_row(self, row: Array) -> Array:
         loops = self._loops(self._stepped(row, NOTHING))
         return np.concatenate([_ran(*(np.real(part) for part in one))[0] for (one,) in loops])
 
     def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
         factor = factor_of(self.covariance)
         for number in range(len(self.records)):
-            places, noises = self._own(number)
+            places, noises = self._places_of_record(number)
             base, moved = self._tangents(number, row, places, noises)
             late, later = self._later(number, base.lag)
             inputs = np.real(late)
@@ -124,7 +124,7 @@ class LinearErrors(OwnCovariance):
             for part, slopes in slopes_along(base, moved, inputs, later, errors, states):
                 yield MovedErrors(number, part, factor, every, slopes)
 
-    def _own(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _places_of_record(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Places of the entries that move a record's errors: by more than the gain, and by the gain alone."""
         names, groups = self.row.names, [entry.group for entry in self.row.entries]
         ours = [i for i, n in enumerate(names) if n.endswith(f"[{number}]") or not n.endswith("]")]

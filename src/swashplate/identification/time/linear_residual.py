@@ -60,7 +60,7 @@ class LinearResidual:
         return replace(self, vehicle=vehicle, moved=moved, shares=shares(vehicle, *self.along))
 
     @property
-    def told(self) -> dict[str, Any]:
+    def settings_entry(self) -> dict[str, Any]:
         """For the settings of a result."""
         shares = {row: round(share, 1) for row, share in self.shares.items()}
         joint = {"sigmas by which the physics moved": dict(self.moved)} if self.moved else {}
@@ -68,7 +68,7 @@ class LinearResidual:
                 "its standard error": self.error, "share of each acceleration [%]": shares, **joint}  # fmt: skip
 
     @property
-    def words(self) -> str:
+    def summary_text(self) -> str:
         """For a reader, in a line or two."""
         gained = f"{self.gain:.0f} +- {self.error:.0f} of log-likelihood on blocks left out"
         if not self.kept:
@@ -166,7 +166,7 @@ def begun_where_it_ended(row: Row, alone: Row, reached: Array, residual: LinearR
     return np.array([known[name] for name in row.names]) / row.scale
 
 
-def moved(alone: Found, together: Found) -> dict[str, float]:
+def physics_shifts(alone: Found, together: Found) -> dict[str, float]:
     """How far the physics moved, in standard deviations of what is free with the residual."""
     sigma = np.sqrt(np.maximum(np.diag(together.scaled(together.corrected)), 1e-300))
     before = alone.table.identified(alone.numbers[: len(alone.table.free)])

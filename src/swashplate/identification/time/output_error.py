@@ -146,7 +146,7 @@ class OutputError(Likelihood):
 
     def residuals(self, row: Array) -> tuple[Array, Array]:
         """Residuals (windows, n, outputs) and states (windows, n, states)."""
-        return self._beside(self._shooting.flown(row))
+        return self._beside(self._shooting.simulate_windows(row))
 
     def _beside(self, flown: list[FlownWindow]) -> tuple[Array, Array]:
         """Residuals and states of simulated windows."""
@@ -154,8 +154,8 @@ class OutputError(Likelihood):
 
     def _with_slopes(self, row: Array) -> tuple[Array, Array]:
         """Residuals, and their slopes by the shared entries and by each window's own (windows, entries, n, outputs)."""
-        flown = self._shooting.flown(row)
-        return self._beside(flown)[0], -self._shooting.moved(row, flown)
+        flown = self._shooting.simulate_windows(row)
+        return self._beside(flown)[0], -self._shooting.output_slopes(row, flown)
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def errors_of(self, row: Array) -> list[Errors]:

@@ -68,7 +68,7 @@ class RecordFilter:
         innovations, states, went = self._code.along(self.model.dt, self._fixed(begin, numbers), series)
         return FilterRun(innovations, self._state(states), went)
 
-    def moved(
+    def run_slopes(
         self,
         begin: Begun,
         numbers: FilterNumbers,
@@ -91,7 +91,7 @@ class RecordFilter:
             numbers_moved(self.model.vehicle, to.parameters),
         )
         along = Along(directions, moves.arriving, moves.commands, np.asarray(marks, dtype=np.intp))
-        slopes, states = self._code.moved(self.model.dt, self._fixed(begin, numbers), series, run.went, along)
+        slopes, states = self._code.filter_slopes(self.model.dt, self._fixed(begin, numbers), series, run.went, along)
         return slopes, self._state(states)
 
     def ahead_of(
@@ -141,7 +141,7 @@ class RecordFilter:
 
         Args:
             states, numbers, series: as of `along`. moves: in which directions.
-            slopes: of the states at the starts, of `moved`.
+            slopes: of the states at the starts, of `run_slopes`.
             starts: samples. steps: how far to predict, ascending.
         """
         x, gust, drift = (np.asarray(part)[starts] for part in states[:3])

@@ -165,7 +165,7 @@ def fit(
         converged=optimum.converged,
         problems=(*problems, *scale_words(data)),
         failed=bool(problems),
-        warnings=(*_words(free, optimum), *_colour_words(method, solved.colour), *problem.words(estimates)),
+        warnings=(*_fit_warnings(free, optimum), *_colour_words(method, solved.colour), *problem.words(estimates)),
         directions=accuracy.blind_directions(row.names[:k], marginal),
         constants=tuple(_constants(solved, likelihood.records, spread, k)),
         comparisons=likelihood.comparisons(solved.whole),
@@ -213,7 +213,7 @@ def _solved_ahead(likelihood: OwnCovariance, first: Optimum, horizon: Horizon, k
     plain = accuracy.covariance(row, optimum.information, prior)
     white, sensitivities, rest = criterion.whitened(optimum.row)
     corrected = TWICE * accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=criterion.lags)
-    units, whole = np.outer(row.scale, row.scale), criterion.whole(optimum.row)
+    units, whole = np.outer(row.scale, row.scale), criterion.whole_row(optimum.row)
     named = dict(zip(likelihood.row.names, map(float, _numbers(likelihood.row, whole)), strict=True))
     return Solved(named, optimum, plain * units, corrected * units, row, whole)
 
@@ -255,7 +255,7 @@ def _colour_words(method: str, colour: Array) -> tuple[str, ...]:
     )
 
 
-def _words(parameters: Sequence[Estimate], optimum: Optimum) -> tuple[str, ...]:
+def _fit_warnings(parameters: Sequence[Estimate], optimum: Optimum) -> tuple[str, ...]:
     words = [] if optimum.converged else [stopping.unfinished()]
     vague = [p.name for p in parameters if not p.sigma_percent <= VAGUE]
     if vague:

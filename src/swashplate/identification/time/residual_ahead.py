@@ -288,7 +288,7 @@ def _met_cost(met: _Meets, factors: Array, before: Sequence[FlightAhead], noise:
     return _cost(met(factors, noise, before), factors)
 
 
-def _told(flights: Sequence[FlightAhead], at: Array, size: Array) -> list[LeftOutBlock]:
+def _blocks_of(flights: Sequence[FlightAhead], at: Array, size: Array) -> list[LeftOutBlock]:
     return [block for flight in flights for block in flight.blocks(at, size)]
 
 
@@ -298,7 +298,7 @@ def _search(flights: Sequence[FlightAhead], at: Array, size: Array, held: float)
     def cost(scaled: Array) -> float:
         return _cost(flights, scaled / size) + 0.5 * held * float(scaled @ scaled)
 
-    told, lowest = _told(flights, at, size), cost(at)
+    told, lowest = _blocks_of(flights, at, size), cost(at)
     for _ in range(_ROUNDS):
         way = shrunk(told, held)[0] - at
         lower = ((cost(at + share * way), share) for share in _SHORTER)
@@ -306,7 +306,7 @@ def _search(flights: Sequence[FlightAhead], at: Array, size: Array, held: float)
         if not share:
             break
         done, lowest, at = lowest - least < _ENOUGH, least, at + share * way
-        told = _told(flights, at, size)
+        told = _blocks_of(flights, at, size)
         if done:
             break
     return told

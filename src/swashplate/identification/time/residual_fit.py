@@ -89,7 +89,7 @@ def fit_residual(
         return fit_ahead(wider, pieces, nuisances, noise, horizon=horizon, constants=constants)
     cut = [(block, nuisance) for piece, nuisance in zip(pieces, nuisances, strict=True) for block in _blocks(piece)]
     enough_blocks(len(cut), pieces[0].name)
-    still = {row for row, axis in _AXIS.items() if not _moved(axis, axes)}
+    still = {row for row, axis in _AXIS.items() if not _moves_by_itself(axis, axes)}
     names = {name: pair for name, pair in coefficients(vehicle).items() if pair[0] not in still}
     if not names:
         return none_found(vehicle, noise, 0.0, 0.0)
@@ -130,7 +130,7 @@ def fit_residual(
     return LinearResidual(made_of, strength, gain, error, shares(made_of, *along), noise, units, along)
 
 
-def _moved(axis: str, judged: Sequence[AxisExcitation]) -> bool:
+def _moves_by_itself(axis: str, judged: Sequence[AxisExcitation]) -> bool:
     """Whether a record moves an axis by itself, or none was judged."""
     mine = [one for one in judged if one.axis == axis]
     return not mine or any(by_itself(one) for one in mine)

@@ -115,14 +115,14 @@ class Shooting:
         self._drifting = np.array([Nuisance._fields.index(name) for name in plan.drifting], dtype=np.intp)
         self._noise = np.array(Noise(), dtype=np.float64)
 
-    def flown(self, row: Array) -> list[FlownWindow]:
+    def simulate_windows(self, row: Array) -> list[FlownWindow]:
         """Every window as simulated at a scaled row."""
-        return [self._flown(window, *self._parts(row, place)) for place, window in enumerate(self._windows)]
+        return [self._simulate_window(window, *self._parts(row, place)) for place, window in enumerate(self._windows)]
 
-    def moved(self, row: Array, flown: list[FlownWindow]) -> Array:
+    def output_slopes(self, row: Array, flown: list[FlownWindow]) -> Array:
         """Slopes of the outputs by the shared entries and by the window's own (windows, entries, n, outputs)."""
         shared = row[: self._plan.shared] * self._scale
-        return np.array([self._moved(*each, shared) for each in zip(self._windows, flown, strict=True)])
+        return np.array([self._window_slopes(*each, shared) for each in zip(self._windows, flown, strict=True)])
 
     def _parts(self, row: Array, place: int) -> tuple[Array, Array]:
         """The shared numbers and those of a window, in their units."""
@@ -130,7 +130,7 @@ class Shooting:
         own = row[shared + place * size : shared + (place + 1) * size]
         return row[:shared] * self._scale, own * self._own_scale
 
-    def _flown(self, window: Window, shared: Array, own: Array) -> FlownWindow:
+    def _simulate_window(self, window: Window, shared: Array, own: Array) -> FlownWindow:
         model, n = self._plan.model, len(self._plan.model.vehicle.state_names)
         k, m = len(self._plan.layout.free), self._nuisances.size
         nuisance = np.zeros(len(Nuisance._fields))
@@ -146,7 +146,7 @@ class Shooting:
         outputs = np.asarray(model.measure(run.states.x.T, Nuisance(*nuisance), _XP)).T
         return FlownWindow(numbers, reaching[here], late[here], begin, run, outputs)
 
-    def _moved(self, window: Window, flown: FlownWindow, shared: Array) -> Array:
+    def _window_slopes(self, window: Window, flown: FlownWindow, shared: Array) -> Array:
         """Directions of the filter: parameters, the flight's numbers, the window's drifts, its states."""
         plan, model, numbers = self._plan, self._plan.model, flown.numbers
         n, k, m, d = len(model.vehicle.state_names), len(plan.layout.free), self._nuisances.size, self._drifting.size
@@ -154,7 +154,7 @@ class Shooting:
         scale = np.concatenate([self._scale[:k], self._scale[own : own + m], self._own_scale[n:], self._own_scale[:n]])
         by_command = commands_by(model.vehicle, flown.late, (*plan.nuisances, *plan.drifting))
         parts = FilterNumbers(*(np.zeros((count, np.size(part))) for part in numbers))
-        parts.parameters[:k] = plan.layout.moved(self._card, shared[:k])
+        parts.parameters[:k] = plan.layout.value_slopes(self._card, shared[:k])
         for i, place in enumerate([*self._nuisances, *self._drifting]):
             parts.nuisance[k + i, place] = 1.0
         parts.inputs[k : k + m + d] = by_command[:, 0]
@@ -167,7 +167,7 @@ class Shooting:
         late = by_command * scale[k : k + m + d, None, None]
         series = RecordSeries(flown.outputs, driving_rows(flown.commands, window.voltage))
         moves = Moves(Begun(self._no_gain(count), begins), directions, k, late)
-        slopes = -self._filter.moved(flown.begin, numbers, series, flown.run, moves)[0]
+        slopes = -self._filter.run_slopes(flown.begin, numbers, series, flown.run, moves)[0]
         heading = flown.run.states.x[:, model.vehicle.index("psi")]
         slopes = turned_rows(slopes, model.output_names, heading)
         every = np.zeros((plan.shared + n + d, *slopes.shape[1:]))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from swashplate.arrays import Array
@@ -11,7 +9,7 @@ from swashplate.errors import TrimError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend
+from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body, turned_about_z
 from swashplate.simulation.trim import trim
 
@@ -80,16 +78,16 @@ def slopes_ahead(record: Record) -> tuple[Array, Array]:
 def measured_start(
     vehicle: Vehicle,
     output_names: tuple[str, ...],
-    parameters: Any,
+    parameters: Scalar,
     nuisance: Nuisance,
     *,
-    value: Any,
-    rate: Any,
-    inputs: Any,
-    voltage: Any,
+    value: Scalar,
+    rate: Scalar,
+    inputs: Scalar,
+    voltage: Scalar,
     xp: Backend,
-    running: Any = 0.0,
-) -> Any:
+    running: Scalar = 0.0,
+) -> Scalar:
     """A flat state: pose and its rates from the measurement, inner states by `Traits.settled`, where there is one.
 
     Args:

@@ -110,7 +110,7 @@ class VehicleErrors(OwnCovariance):
         whole = super()._covariance(errors)
         return np.diag(np.diag(whole)) if self.gain == "from the noise" else whole
 
-    def _plain(self, row: Array) -> Array:
+    def _errors_in_a_row(self, row: Array) -> Array:
         every = range(len(self.records))
         return np.concatenate([self._ran(number, row, NOTHING)[0].errors for number in every])
 
@@ -140,7 +140,7 @@ class VehicleErrors(OwnCovariance):
         p = np.zeros((len(every), len(card) + len(CONSTANTS)))
         p[0] = *layout.values(card, plain[:free]), *self._constants
         if free:
-            p[1:, : len(card)] = directions[:, :free] @ layout.moved(card, plain[:free])
+            p[1:, : len(card)] = directions[:, :free] @ layout.value_slopes(card, plain[:free])
         start, shift = (at([f"{what} {s}[{number}]" for s in states]) for what in ("start", "shift"))
         bias = at([f"bias {o}[{number}]" for o in self.outputs])
         if self.gain == "from the noise":

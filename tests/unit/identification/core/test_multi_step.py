@@ -77,7 +77,7 @@ def test_what_the_likelihood_knows_stays() -> None:
 def test_only_parameters_and_constants_move() -> None:
     criterion = _criterion()
     assert {entry.group for entry in criterion.row.entries} == {"parameter", "nuisance"}
-    whole, found = criterion.whole(criterion.start + 1.0), _filter_error().row
+    whole, found = criterion.whole_row(criterion.start + 1.0), _filter_error().row
     moved = np.flatnonzero(whole != found.starts())
     assert [found.names[i] for i in moved] == list(criterion.row.names)
 
@@ -87,7 +87,9 @@ def test_one_step_ahead_is_the_innovation() -> None:
     base = _filter_error()
     (errors,) = base.errors_ahead(base.row.starts(), _criterion().ahead)
     assert len(errors) == len(base.records[0].time) - 5
-    np.testing.assert_allclose(errors[:, 0], base._plain(base.row.starts())[1 : len(errors) + 1], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        errors[:, 0], base._errors_in_a_row(base.row.starts())[1 : len(errors) + 1], rtol=1e-9, atol=1e-12
+    )
 
 
 @pytest.mark.proof

@@ -163,4 +163,4 @@ def test_a_free_parameter_may_be_described(coax: Vehicle) -> None:
 
 def test_slopes_of_no_free_parameter_are_an_empty_table(coax: Vehicle) -> None:
     table = Parameterization(coax, ())
-    assert table.layout.moved(np.asarray(table.card_row), np.zeros(0)).shape == (0, len(coax.parameter_names))
+    assert table.layout.value_slopes(np.asarray(table.card_row), np.zeros(0)).shape == (0, len(coax.parameter_names))

@@ -24,31 +24,31 @@ from swashplate.identification.time.residual_fit import fit_residual
 def test_words_say_what_was_gained_and_where() -> None:
     vehicle = sp.vehicle("crazyflie")
     none = LinearResidual(vehicle, np.inf, 12.0, 9.0, {"p": 0.0}, Noise())
-    assert none.words == "residual: none, the best would gain 12 +- 9 of log-likelihood on blocks left out"
+    assert none.summary_text == "residual: none, the best would gain 12 +- 9 of log-likelihood on blocks left out"
     some = LinearResidual(vehicle, 2.0, 120.0, 9.0, {"p": 14.2, "q": 3.0}, Noise())
-    assert "gains 120 +- 9" in some.words
-    assert "p 14 %, q 3 %" in some.words
-    assert some.told["share of each acceleration [%]"] == {"p": 14.2, "q": 3.0}
+    assert "gains 120 +- 9" in some.summary_text
+    assert "p 14 %, q 3 %" in some.summary_text
+    assert some.settings_entry["share of each acceleration [%]"] == {"p": 14.2, "q": 3.0}
 
 
 def test_words_name_the_physics_that_moved_far() -> None:
     vehicle = sp.vehicle("crazyflie")
     shares = dict.fromkeys(("u", "v", "w", "p", "q", "r"), 0.0)
     found = LinearResidual(vehicle, 2.0, 120.0, 9.0, shares, Noise(), moved={"tau_drive": 24.2, "inertia_xx": -1.4})
-    assert found.words.endswith("; with it the physics moves: tau_drive by +24 sigma")
-    assert found.told["sigmas by which the physics moved"] == {"tau_drive": 24.2, "inertia_xx": -1.4}
+    assert found.summary_text.endswith("; with it the physics moves: tau_drive by +24 sigma")
+    assert found.settings_entry["sigmas by which the physics moved"] == {"tau_drive": 24.2, "inertia_xx": -1.4}
 
 
 def test_an_axis_that_its_controller_moves_has_no_residual() -> None:
     def axis(explained: float, *, answer: bool, identifiable: bool = True) -> AxisExcitation:
         return AxisExcitation("record", "heave", "", explained, 1.0, 0.0, 0.01, identifiable, "", answer)
 
-    assert residual_fit._moved("heave", [])  # not judged
-    assert residual_fit._moved("heave", [axis(0.5, answer=False)])
-    assert residual_fit._moved("heave", [axis(0.97, answer=False)])  # the motion follows
-    assert not residual_fit._moved("heave", [axis(0.965, answer=True)])  # mostly an answer
-    assert not residual_fit._moved("heave", [axis(np.nan, answer=False, identifiable=False)])  # stands still
-    assert residual_fit._moved("heave", [axis(0.965, answer=True), axis(0.5, answer=False)])
+    assert residual_fit._moves_by_itself("heave", [])  # not judged
+    assert residual_fit._moves_by_itself("heave", [axis(0.5, answer=False)])
+    assert residual_fit._moves_by_itself("heave", [axis(0.97, answer=False)])  # the motion follows
+    assert not residual_fit._moves_by_itself("heave", [axis(0.965, answer=True)])  # mostly an answer
+    assert not residual_fit._moves_by_itself("heave", [axis(np.nan, answer=False, identifiable=False)])  # stands still
+    assert residual_fit._moves_by_itself("heave", [axis(0.965, answer=True), axis(0.5, answer=False)])
 
 
 def test_too_few_blocks_are_refused_before_anything_is_computed() -> None:
