@@ -1,6 +1,7 @@
 """The Python reference: every public name of `swashplate` with signature and docstring, as MyST text for the site.
 
-The sources are read, not imported: signatures stand on the page as they are written, and no library is loaded.
+The sources are read, not imported: signatures stand on the page as they are written, and no library is loaded. A verb's
+is made of its question's fields.
 """
 
 from __future__ import annotations
@@ -66,6 +67,10 @@ def entry(name: str, place: str) -> str:
         return f"`````{{py:class}} {name}\n{_markdown(docstring, _types(node))}\n\n{members}\n`````"
     if isinstance(node, _Function):
         return f"`````{{py:function}} {name}{signature(node)}\n{_markdown(docstring)}\n`````"
+    if isinstance(node, ast.Assign) and ast.unparse(node.value).startswith("verb("):
+        asked = public.resolve(name)  # of its question: nothing heavy is loaded
+        fields = re.sub(r"(: |-> )'([^']*)'", r"\1\2", str(inspect.signature(asked)))
+        return f"`````{{py:function}} {name}{fields}\n{_markdown(inspect.getdoc(asked))}\n`````"
     return f"`````{{py:data}} {name}\n{_markdown(docstring)}\n`````"
 
 

@@ -35,6 +35,7 @@ _BEHIND_METHODS: Mapping[str, str] = {
     "flight_from_dataframe": "swashplate.flights.tabular:from_dataframe",
     "flight_to_dataframe": "swashplate.flights.tabular:to_dataframe",
     "encode": "swashplate.identification.core.document_codec:encode",
+    "FitTransferFunctions": "swashplate.api.verbs.identify:FitTransferFunctions",
     "explore": "swashplate.reporting.figures.views:explore",
     "compose_speeds": "swashplate.reporting.speed_page:compose_speeds",
     "figure_names": "swashplate.reporting.figures.views:figure_names",
@@ -91,7 +92,8 @@ def resolve(name: str) -> Any:
     """
     try:
         named = _load(place(name))
-        return _taking_names(name, named) if inspect.isfunction(named) else named
+        asks = getattr(named, "__module__", "") == __package__  # a question, whose own fields take texts
+        return _taking_names(name, named) if inspect.isfunction(named) and not asks else named
     except ModuleNotFoundError as error:
         if isinstance(error, MissingLibraryError) or (error.name or "").partition(".")[0] not in EXTRA_OF:
             raise

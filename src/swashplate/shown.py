@@ -15,10 +15,13 @@ if TYPE_CHECKING:
 class Saved:
     """A result that can be kept as a file."""
 
+    def to_document(self) -> Any:
+        """All of it as what becomes JSON."""
+        return resolve("encode")(self)
+
     def save(self, path: str | Path, /) -> Path | tuple[Path, ...]:
         """Write its numbers as a JSON file; what has a file of its own kind (a controller, a flight) says so there."""
-        told = getattr(self, "to_document", None) or getattr(self, "as_dict", None)
-        return write_json(path, resolve("encode")(self) if told is None else told())
+        return write_json(path, self.to_document())
 
 
 class Shown(Saved):

@@ -50,8 +50,8 @@ except ImportError as error:
 from pathlib import Path
 from swashplate.links.logs.app import logs_app
 try:
-    from swashplate.api.open_logs import open_logs
-    open_logs("nowhere.bin")
+    from swashplate.api.verbs.look import Open
+    Open("nowhere.bin").answer()
 except sp.SwashError as error:
     assert "there is no such file" in str(error), "the verb itself runs without JAX"
 from swashplate.links.logs.desk import Desk

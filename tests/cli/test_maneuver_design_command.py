@@ -10,6 +10,7 @@ from commands import one_message, swash
 
 import swashplate as sp
 from swashplate.api.designed_maneuver import DesignedManeuver, Offer
+from swashplate.api.verbs.maneuver import DesignManeuver
 from swashplate.flights.maneuvers.composed import composed
 from swashplate.flights.maneuvers.series import parse
 
@@ -39,11 +40,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """What the verb was asked; it answers at once."""
     found: dict[str, Any] = {"best": "multisine"}
 
-    def stand_in(vehicle: Any, unknown: Any, **rest: Any) -> DesignedManeuver:
-        found.update(rest, vehicle=vehicle.name, unknown=unknown)
+    def stand_in(question: DesignManeuver, say: Any) -> DesignedManeuver:
+        found.update(vars(question))
         return made(found["best"])
 
-    monkeypatch.setattr("swashplate.api.design_maneuver.design_maneuver", stand_in)
+    monkeypatch.setattr("swashplate.api.design_maneuver.design_for", stand_in)
     return found
 
 

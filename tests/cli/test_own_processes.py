@@ -34,7 +34,7 @@ batch = 1
 vehicle = "coax"
 maneuver = "hover:0.2s"
 controller = "place.toml"
-varies = {numbers = {mass = "5%"}}
+vary = {mass = "5%"}
 """
 
 

@@ -68,9 +68,9 @@ def test_version(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_without_a_verb_the_page_opens_and_help_lists_the_verbs(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("swashplate.api.open_logs.open_logs", lambda logs, **given: asked.append((logs, given)))
+    monkeypatch.setattr("swashplate.api.open_logs.serve_logs", lambda question, say: asked.append(question))
     assert swash().code == 0
-    assert [(logs, given["port"], given["open_page"]) for logs, given in asked] == [((), None, True)]
+    assert [(one.logs, one.port, one.open_page) for one in asked] == [((), None, True)]
     told = swash("--help")
     assert told.code == 0
     assert "identify" in told.out

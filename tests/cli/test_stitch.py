@@ -37,7 +37,7 @@ def test_what_is_refused(points: Path, tmp_path: Path, simulated: Path) -> None:
         ("vehicle", "stitch", slow, fast, "--out", tmp_path / "s.json"): "ends in '.json', expected .toml",
         ("vehicle", "stitch", slow, tmp_path / "none.toml", "--out", made): "there is no such file",
         ("vehicle", "stitch", tmp_path, "--out", made): "has no .toml file in it",
-        ("vehicle", "stitch", slow, fast, "--out", made, "--trim", simulated): "1 logs for 2 points",
+        ("vehicle", "stitch", slow, fast, "--out", made, "--trim", simulated): "1 given for 2 points",
         ("vehicle", "stitch", slow, "six_dof_coupled", "--out", made): "states: are",
     }
     for command, words in refused.items():

@@ -12,9 +12,9 @@ import pytest
 import swashplate as sp
 from made_results import result
 from proof_page import leave
-from swashplate.api.demo import demo
-from swashplate.api.fly_maneuver import fly_maneuver
 from swashplate.api.monte_carlo import MonteCarlo
+from swashplate.api.verbs.data import Demo
+from swashplate.api.verbs.simulate import Simulate
 from swashplate.control.draws.spread import Limits
 from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
@@ -49,8 +49,8 @@ def test_a_design_that_knows_its_delays_flies_and_one_that_does_not_is_lost() ->
             fit=fit,
             gusts=indoor(0.1),
             battery=(12.5, 11.5),
-            bits=BITS,
-            limits=LIMITS,
+            command_bits=BITS,
+            limit=LIMITS,
         )
         lost[name] = flown.lost
         assert flown.flights["x"].shape[1] == 6
@@ -63,7 +63,7 @@ def test_a_design_that_knows_its_delays_flies_and_one_that_does_not_is_lost() ->
 @pytest.mark.proof
 def test_the_coax_from_its_real_log_to_a_hundred_aircraft(shared_data: Path) -> None:
     """The August flight: what the fit found of delays is flown, in still air and in gusts of 0.3 m/s."""
-    found = demo()
+    found = Demo().answer()
     model = found.fit.model
     made = sp.design_controller(model, sensors=SENSORS)
     assert "identified" in made.late
@@ -79,8 +79,8 @@ def test_the_coax_from_its_real_log_to_a_hundred_aircraft(shared_data: Path) -> 
             fit=found.fit,
             gusts=gusts,
             battery=(12.5, 10.5),
-            bits=BITS,
-            limits=LIMITS,
+            command_bits=BITS,
+            limit=LIMITS,
         )
     _left("log_to_flight_coax", "The CoaX from its August log to 100 aircraft", made.late, flights)
     assert {air: flown.lost for air, flown in flights.items()} == {"still": 0, "0.3 m/s": 0}
@@ -91,7 +91,7 @@ def test_the_raptor_from_its_log_to_a_hundred_aircraft(tmp_path: Path) -> None:
     """Servos and 30 ms between logged command and motion: the fit finds the delay; hover, then to 10 m/s."""
     card = sp.vehicle("raptor50", servos=True)
     truth = card.with_values({"hub_stiffness": 30.0, "wake_distortion": 1.2, "blade_inertia": 0.0215})
-    log = fly_maneuver(truth, "multisine:roll+pitch,0.6-5Hz,9s,0.02", sensors="clean", seed=1).flight
+    log = Simulate(truth, "multisine:roll+pitch,0.6-5Hz,9s,0.02", sensors="clean", seed=1).answer().flight
     for name in truth.input_names:  # logged 30 ms before they act
         values, late_by = log.values(name), round(0.03 * log.rate(name))
         log = log.with_channel(name, np.concatenate([values[late_by:], np.repeat(values[-1:], late_by)]), like=name)
@@ -101,12 +101,19 @@ def test_the_raptor_from_its_log_to_a_hundred_aircraft(tmp_path: Path) -> None:
     assert list(input_delays(model).values()) == pytest.approx([0.03] * 4, abs=0.001)
     sensors = "gyro@100,mocap@100+10ms"
     hovers = sp.design_controller(model, sensors=sensors)
-    ahead = sp.design_controller(model, sensors=sensors, holding="speed", speeds=(0.0, 2.5, 5.0, 7.5, 10.0))
+    ahead = sp.design_controller(model, sensors=sensors, holding="speed", speed=(0.0, 2.5, 5.0, 7.5, 10.0))
     flights = {}
     for air, gusts in (("still", None), ("0.3 m/s", indoor(0.3))):
         for what, made, maneuver in (("hover", hovers, "hover:20s"), ("to 10 m/s", ahead, "step:ahead,16s,10")):
             flights[f"{what}, {air}"] = sp.monte_carlo(
-                model, made.controller, maneuver=maneuver, count=100, fit=fit, gusts=gusts, bits=10, limits=LIMITS
+                model,
+                made.controller,
+                maneuver=maneuver,
+                count=100,
+                fit=fit,
+                gusts=gusts,
+                command_bits=10,
+                limit=LIMITS,
             )
     _left("log_to_flight_raptor", "The Raptor 50 from a log to 100 aircraft", hovers.late, flights)
     for flown in flights.values():

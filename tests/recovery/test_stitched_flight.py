@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from proof_page import leave
-from swashplate.api.stitch import stitch
+from swashplate.api.verbs.vehicle import stitch
 from swashplate.arrays import Array
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle

@@ -159,4 +159,4 @@ def besiege() -> dict[str, object] | None:
 
 
 if __name__ == "__main__":
-    print(json.dumps(besiege_here(COMMANDS).as_dict()))
+    print(json.dumps(besiege_here(COMMANDS).to_document()))

@@ -27,7 +27,7 @@ class Found:
     rows: Sequence[Sequence[Any]]
     bad: list[str] = field(default_factory=list)
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         told = "" if not self.bad else " First: " + "; ".join(self.bad[:5]) + "."
         return {
             "title": self.title,

@@ -52,7 +52,7 @@ batch = 1
 vehicle = "coax"
 maneuver = "hover:0.2s"
 controller = "hold.toml"
-varies = {numbers = {mass = "5%"}}
+vary = {mass = "5%"}
 """
 
 

@@ -51,7 +51,7 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
             seed=chosen.seed,
             kept=FOLDER / "files.kept",
         )
-        return [siege.run().as_dict()]
+        return [siege.run().to_document()]
 
     def besiege_containers(seconds: float) -> list[dict[str, object]]:
         if not chosen.resume:
@@ -65,7 +65,7 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
             workers=workers,
             seed=seed,
         )
-        return [siege.run().as_dict()]
+        return [siege.run().to_document()]
 
     def besiege_writers(seconds: float) -> list[dict[str, object]]:
         every = {**kills.QUICK, **kills.SLOW}
@@ -73,7 +73,7 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
         results = kills.besiege(every, **counts, seconds=seconds, seed=chosen.seed, kept=FOLDER / "kills.kept")
         for one in (one for one in results if not one.rows[-1][2]):
             print(f"No time was left to strike ({one.title}): its section stays as it is.", file=sys.stderr)
-        return [one.as_dict() for one in results if one.rows[-1][2]]
+        return [one.to_document() for one in results if one.rows[-1][2]]
 
     def besiege_disks(seconds: float) -> list[dict[str, object]]:
         outcome = disks.besiege()
@@ -82,19 +82,19 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
         return [] if outcome is None else [outcome]
 
     def besiege_places(seconds: float) -> list[dict[str, object]]:
-        return [places.besiege().as_dict()]
+        return [places.besiege().to_document()]
 
     def besiege_links(seconds: float) -> list[dict[str, object]]:
-        return [packets.besiege(packets=chosen.packets, seconds=seconds, seed=chosen.seed).as_dict()]
+        return [packets.besiege(packets=chosen.packets, seconds=seconds, seed=chosen.seed).to_document()]
 
     def besiege_pages(seconds: float) -> list[dict[str, object]]:
-        return [pages.besiege(half_open=chosen.half_open).as_dict()]
+        return [pages.besiege(half_open=chosen.half_open).to_document()]
 
     def besiege_neighbours(seconds: float) -> list[dict[str, object]]:
-        return [neighbours.besiege().as_dict()]
+        return [neighbours.besiege().to_document()]
 
     def besiege_small(seconds: float) -> list[dict[str, object]]:
-        return [small.besiege(seconds=max(seconds, _LEAST)).as_dict()]
+        return [small.besiege(seconds=max(seconds, _LEAST)).to_document()]
 
     return {
         "files": besiege_files,

@@ -126,7 +126,7 @@ def _responses() -> bytes:
 def _use_responses(path: Path) -> None:
     found = FrequencyResponse.load(path)
     str(found)
-    found.as_dict()
+    found.to_document()
 
 
 def _blackbox() -> tuple[bytes, ...]:

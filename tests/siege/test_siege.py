@@ -161,7 +161,7 @@ def test_a_dead_and_a_hanging_process_are_counted_and_the_rest_goes_on(monkeypat
     assert found.rows[0] == ["dying", 9, 7, 0, 0, 0, 1, 1]
     assert f"seed 3 ended the process with {-signal.SIGSEGV}" in found.bad[0]
     assert "seed 6 took more than 0.3 s" in found.bad[1]
-    assert not found.as_dict()["passed"]
+    assert not found.to_document()["passed"]
 
 
 def _case(old: dict[str, bytes], new: dict[str, bytes]) -> Case:

@@ -15,11 +15,15 @@ import pytest
 
 import swashplate as sp
 from swashplate import public
+from swashplate.api.languages import language_of
 from swashplate.errors import CardError
 from swashplate.flights.flight import Flight, stream
 from swashplate.meant import taking_names
 
-FUNCTIONS = {name: thing for name in public.NAMES if inspect.isfunction(thing := getattr(sp, name))}
+PUBLIC = {name: thing for name in public.NAMES if inspect.isfunction(thing := getattr(sp, name))}
+FUNCTIONS = {name: thing for name, thing in PUBLIC.items() if ".verbs." not in public.place(name)}
+QUESTIONS = {name: thing for name, thing in PUBLIC.items() if name not in FUNCTIONS}
+"""Verbs, which read texts by the languages of their fields."""
 SEQUENCES = ("Sequence[str", "Iterable[str", "tuple[str, ...]")
 LOADED = ("Vehicle", "Flight", "FrequencyResponse")
 
@@ -58,9 +62,10 @@ def recorded(function: Callable[..., Any], loads: Any) -> Callable[..., dict[str
 
 
 def test_there_is_something_to_walk_and_all_of_it_is_wrapped() -> None:
-    assert len(FUNCTIONS) > 40
-    assert len(arguments(SEQUENCES)) > 15
-    assert len(arguments(LOADED)) > 25
+    assert len(FUNCTIONS) > 25
+    assert len(QUESTIONS) > 15
+    assert len(arguments(SEQUENCES)) > 10
+    assert len(arguments(LOADED)) > 20
     assert all(hasattr(function, "__wrapped__") for function in FUNCTIONS.values())
 
 
@@ -69,6 +74,15 @@ def test_one_name_is_a_list_of_one(name: str, argument: str) -> None:
     called = recorded(FUNCTIONS[name].__wrapped__, {})
     assert called(**{argument: "mixer_roll"})[argument] == ("mixer_roll",), "one name, and not its letters"
     assert called(**{argument: ["p", "q"]})[argument] == ["p", "q"], "a list stays as it is"
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_of_a_verb_every_field_has_a_language_that_reads_one_name_as_one(name: str) -> None:
+    for field in inspect.signature(QUESTIONS[name]).parameters.values():
+        language = language_of(str(field.annotation))
+        if "Names" in str(field.annotation):
+            assert language.taken("mixer_roll", called=field.name) == ("mixer_roll",)
+            assert language.taken(["p", "q"], called=field.name) == ("p", "q")
 
 
 @pytest.mark.parametrize(("name", "argument"), arguments(LOADED))

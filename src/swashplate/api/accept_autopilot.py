@@ -1,4 +1,4 @@
-"""The verb `accept_autopilot`: a SITL binary of ArduPilot started, flown and judged with a vehicle."""
+"""A SITL binary of ArduPilot started, flown and judged with a vehicle."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swashplate.api.acceptance import Acceptance
+from swashplate.api.asking import name_of, strings
 from swashplate.api.link import gains_to_write, link_engine, mapping_of
-from swashplate.api.saying import Say, silent
+from swashplate.api.saying import Say
 from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
@@ -46,12 +48,14 @@ from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.sensing import Sensing
 from swashplate.links.sockets import listen_udp
-from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import Environment, standard_altitude
+from swashplate.physics.environment import standard_altitude
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.standing import airborne, standing
 from swashplate.simulation.trim import trim
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.link import Accept
 
 _RATE = 100.0
 """Hz of the records: what the System ID mode logs by default."""
@@ -61,60 +65,20 @@ _COMPENSATED = ("MOT_BAT_VOLT_MAX", "MOT_BAT_V_MAX")
 """Multicopters' motors and flaps get more where the battery has less."""
 
 
-def accept_autopilot(
-    vehicle: Vehicle,
-    binary: str | Path,
-    *,
-    out: str | Path,
-    name: str | None = None,
-    servos: str | Path | None = None,
-    truth: Vehicle | None = None,
-    axes: Sequence[str] = tuple(MIXER_AXES),
-    band: tuple[float, float] = (0.4, 8.0),
-    seconds: float = 40.0,
-    hover: float = 10.0,
-    height: float = 5.0,
-    ekf: float = 120.0,
-    defaults: Sequence[str | Path] = (),
-    environment: Environment | None = None,
-    instance: int = 0,
-    speedup: float = 10.0,
-    timeout: float = 15.0,
-    say: Say = silent,
-) -> Acceptance:
-    """Start a SITL binary with a vehicle's files, fly it by itself, and put truth beside what its log says.
+def accept_helicopter(asked: Accept, vehicle: Vehicle, say: Say) -> Acceptance:
+    """The trial of ArduPilot that was asked for, of a vehicle with its changes.
 
     First the binary is started beside a vehicle that only stands, and asked who it is: any other program is refused
-    before anything is computed. Then, from a cold start: wait for the EKF, arm, hover in STABILIZE, ALT_HOLD and
-    LOITER, sweep each axis in System ID mode, land; then the log through `respond`, `fit_tf` and `fit_ss`. A sweep
-    begins higher than `band` where the loops leave less of it than whole microseconds resolve. Whatever happens, the
-    binary is ended.
-
-    Args:
-        vehicle: in free flight; what flies.
-        binary: of ArduCopter for SITL (`arducopter-heli`; `arducopter` for a coaxial).
-        out: folder where it runs: `first-start`, then `sitl`, which must not be there yet and keeps its log.
-        name, servos: as of `link_ardupilot`.
-        truth: whose linearisation the estimates are held against; the vehicle's own where None.
-        axes: that are swept, of roll, pitch, yaw and heave.
-        band: of the sweeps [Hz]. seconds: of each. hover: in each mode [s].
-        height: of the hover [m].
-        ekf: simulated time that the autopilot has until it can be armed [s].
-        defaults: parameter files of yours, read last. Without an ATC_RAT_ gain in them the gains are searched.
-        environment: wind and air.
-        instance: of SITL; each has ports of its own. speedup: most simulated seconds a second.
-        timeout: wall clock until the binary has opened its port, is heard, and says who it is, each [s].
-        say: told what is being done.
-
-    Raises:
-        SwashError: a binary that is missing, cannot be run, ends at once or is no ArduCopter of version 4.5 or later;
-            a port that is taken; a vehicle whose frame is not known here; pymavlink missing. What goes wrong later is a
-            line of the result that fails.
+    before anything is computed. A sweep begins higher than the band where the loops leave less of it than whole
+    microseconds resolve. Whatever happens, the binary is ended.
     """
+    axes, name = strings(asked.axes), name_of(asked.vehicle)
+    defaults = tuple(asked.defaults or ())  # pyrefly: ignore[bad-argument-type]
+    band, seconds, instance, timeout = asked.band or (0.4, 8.0), asked.seconds or 40.0, asked.instance, asked.timeout
     if unknown := [axis for axis in axes if axis not in MIXER_AXES]:
         raise SwashError(f"'{unknown[0]}' is none of {', '.join(MIXER_AXES)}.", channel="axes")
     library("pymavlink.dialects.v20.ardupilotmega", what="a trial over MAVLink")
-    folder = Path(out) / "sitl"
+    folder = asked.folder / "sitl"
     if folder.exists():
         raise SwashError("is there already.", where=folder, channel="--out", hint="Give another folder, or remove it.")
     # What can be refused is refused before anything is compiled.
@@ -122,18 +86,21 @@ def accept_autopilot(
     for file in defaults:
         if not Path(file).is_file():
             raise SwashError("there is no such file.", where=file, channel="defaults")
-    called, around = name or vehicle.card.called, environment_of(vehicle, environment)
+    called, around = name or vehicle.card.called, asked.around(vehicle)
     above = standard_altitude(float(around.air_density))
-    sitl = Sitl(binary, folder, files, instance=instance, speedup=speedup, altitude=above)
+    sitl = Sitl(asked.binary, folder, files, instance=instance, speedup=asked.speedup, altitude=above)
     aircraft, flying = standing(vehicle), airborne(vehicle)
-    mapping = mapping_of(aircraft, servos, name=name, suffix="")
+    mapping = mapping_of(aircraft, asked.servos, name=name, suffix="")
     say("asking the binary who it is")
-    first = Sitl(binary, folder.with_name("first-start"), (), instance=instance, speedup=speedup, altitude=above)
+    first = Sitl(
+        asked.binary, folder.with_name("first-start"), (), instance=instance, speedup=asked.speedup, altitude=above
+    )
     version = who_it_is(first, aircraft, mapping, around, timeout=timeout)
     say("trimming and linearising the vehicle")
-    level = trim(flying, environment=environment)
+    level = trim(flying, environment=around)
     model = linearize(flying, level)
-    other = model if truth is None else _linear(airborne(truth), environment)
+    truth = asked.other()
+    other = model if truth is None else linearize(airborne(truth), trim(airborne(truth), environment=around))
     yours = {key: value for file in defaults for key, value in read_parameter_file(file).items()}
     mixing = {key: value for key, value in yours.items() if key.startswith(_MIXING)}
     law, expected = ardupilot_law(mapping, flying, level, given=mixing), parameters(mapping, flying, level)
@@ -170,7 +137,7 @@ def accept_autopilot(
                 depth=plant.standing_depth,
             )
             run_up = float(expected.get("H_RSC_RUNUP_TIME", -1.0)) + 1.0
-            plan = TrialPlan(chirps, run_up, height=height, hover=hover, ekf=ekf)
+            plan = TrialPlan(chirps, run_up, height=asked.height or 5.0, hover=asked.hover or 10.0, ekf=asked.ekf)
             piloted = Piloted(session, pilot)
             with Background(lambda go_on: serve(bound, piloted, go_on=go_on)) as physics, sitl:
                 lines, flown, speed, values = _flown(
@@ -191,11 +158,9 @@ def accept_autopilot(
         swept = {axis: chirps[axis] for axis in flown}
         comparison = _judged(logs, swept, partial(response, other), partial(response, model), loop, pilot, lines)
     log = logs[-1] if logs else None
-    return Acceptance(str(binary), version, called, tuple(sitl.command), tuple(lines), comparison, log, folder, speed)
-
-
-def _linear(vehicle: Vehicle, environment: Environment | None) -> LinearModel:
-    return linearize(vehicle, trim(vehicle, environment=environment))
+    return Acceptance(
+        str(asked.binary), version, called, tuple(sitl.command), tuple(lines), comparison, log, folder, speed
+    )
 
 
 def _heave(model: LinearModel, moved: Array, gravity: float) -> float:

@@ -1,22 +1,25 @@
-"""The verb `accept_betaflight`: a SITL binary of Betaflight started, flown and judged with a multirotor."""
+"""A SITL binary of Betaflight started, flown and judged with a multirotor."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swashplate.api.acceptance import Acceptance
+from swashplate.api.asking import name_of, strings
 from swashplate.api.link import link_engine
-from swashplate.api.saying import Say, silent
+from swashplate.api.saying import Say
 from swashplate.api.truth_beside import GAIN, PHASE, SIGMAS, TruthBeside, gain_and_phase_off
 from swashplate.errors import SwashError
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 from swashplate.identification.responses.respond import respond
+from swashplate.links.ardupilot.mixer_responses import MIXER_AXES
 from swashplate.links.ardupilot.trial import Background, TrialEndedError, TrialLine
 from swashplate.links.betaflight.binary import BetaflightBinary
 from swashplate.links.betaflight.configuration import configuration
@@ -30,74 +33,49 @@ from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.sensing import Sensing
 from swashplate.links.sockets import listen_udp
-from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import Environment
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.standing import airborne, standing
 from swashplate.simulation.trim import trim
 
+if TYPE_CHECKING:
+    from swashplate.api.verbs.link import Accept
+
+_PACE = 0.25
+"""Simulated seconds a second, where nothing slower is asked for: there is no lockstep."""
 _RATE = 200.0
 """Hz of the records."""
 _COHERENT, _LEAST_SHARE = 0.8, 0.5
 """Coherence from which on a line counts, and the share of the band that must have it to be judged."""
 
 
-def accept_betaflight(
-    vehicle: Vehicle,
-    binary: str | Path,
-    *,
-    out: str | Path,
-    name: str | None = None,
-    truth: Vehicle | None = None,
-    axes: Sequence[str] = AXES,
-    band: tuple[float, float] = (0.5, 6.0),
-    seconds: float = 20.0,
-    hover: float = 5.0,
-    height: float = 1.5,
-    gains: Mapping[str, float] | None = None,
-    environment: Environment | None = None,
-    pace: float = 0.25,
-    timeout: float = 15.0,
-    say: Say = silent,
+def accept_multirotor(
+    asked: Accept, vehicle: Vehicle, say: Say, *, gains: Mapping[str, float] | None = None
 ) -> Acceptance:
-    """Start a SITL binary of Betaflight with a multirotor's configuration, fly it, and put truth beside its log.
+    """The trial of Betaflight that was asked for, of a vehicle with its changes.
 
     It is configured (motors, modes, gains with margins), started, armed, hovered in ANGLE mode by a pilot of ours, and
     each stick is swept; then the response of its Blackbox log is held against the vehicle's linearisation. Its clock is
-    not in lockstep with the physics: `pace` says how slow both run, so that a busy machine is not late. The binary is
-    ended in every case.
+    not in lockstep with the physics: both run slowly, so that a busy machine is not late. The binary is ended in every
+    case.
 
     Args:
-        vehicle: a multirotor of at most eight motors. binary: Betaflight's SITL.
-        out: folder where it runs: `sitl`, which must not be there yet and keeps its logs.
-        name: as the vehicle is called.
-        truth: whose linearisation the response is held against; the vehicle's own where None.
-        axes: that are swept, of roll, pitch and yaw. band: of the sweeps [Hz]. seconds: of each.
-        hover: s of it. height: of it [m].
         gains: settings of Betaflight's command line that are flown; those of `betaflight_gains` where None.
-        environment: wind and air.
-        pace: simulated seconds a second.
-        timeout: wall clock until it has loaded its configuration, and opened its ports, each [s].
-        say: told what is being done.
-
-    Raises:
-        SwashError: a binary that is missing, cannot be run or is none of Betaflight; a port that is taken; a vehicle
-            that is no multirotor. What goes wrong later is a line of the result that fails.
     """
+    axes = tuple(axis for axis in strings(asked.axes) if axis != "heave" or asked.axes != tuple(MIXER_AXES))
+    pace, timeout, truth = min(asked.speedup, _PACE), asked.timeout, asked.other()
+    band, seconds = asked.band or (0.5, 6.0), asked.seconds or 20.0
     if unknown := [axis for axis in axes if axis not in AXES]:
         raise SwashError(f"'{unknown[0]}' is none of {', '.join(AXES)}.", channel="axes")
-    if not 0.02 <= pace <= 1.0:
-        raise SwashError(f"is {pace:g}, expected 0.02 to 1 simulated seconds a second.", channel="speedup")
-    folder = Path(out) / "sitl"
+    folder = asked.folder / "sitl"
     if folder.exists():
         raise SwashError("is there already.", where=folder, channel="--out", hint="Give another folder, or remove it.")
-    mapping, sitl = MotorMapping(vehicle), BetaflightBinary(binary, folder)
-    around = environment_of(vehicle, environment)
+    mapping, sitl = MotorMapping(vehicle), BetaflightBinary(asked.binary, folder)
+    around = asked.around(vehicle)
     with listen_udp("127.0.0.1", MOTORS_PORT) as bound:
         say("trimming and linearising the vehicle")
         flying = airborne(vehicle)
-        model = linearize(flying, trim(flying, environment=environment))
+        model = linearize(flying, trim(flying, environment=around))
         say("searching gains with margins")
         settings = dict(gains) if gains is not None else dict(betaflight_gains(model, mapping).settings)
         say("loading the configuration")
@@ -110,7 +88,7 @@ def accept_betaflight(
         session = BetaflightSession(plant, mapping, Sensing(plant), Notices(lambda text: say(text)), sticks=pilot)
         session.pace = pace
         sweeps = tuple(StickSweep(axis, *band, seconds) for axis in axes)
-        trial = BetaflightTrial(session, pilot, sitl, height, hover, sweeps)
+        trial = BetaflightTrial(session, pilot, sitl, asked.height or 1.5, asked.hover or 5.0, sweeps)
         trial.lines.append(TrialLine("configuration", f"{len(settings)} settings", "loaded without an error", True))
         begun = time.monotonic()
         with sitl:
@@ -129,11 +107,13 @@ def accept_betaflight(
         trial.lines.append(TrialLine("exchanges, no lockstep", f"{words}, {1e3 * told.lost:.0f} ms lost"))
     say("reading the log")
     logs = sitl.logs()
-    other = model if truth is None else linearize(airborne(truth), trim(airborne(truth), environment=environment))
+    other = model if truth is None else linearize(airborne(truth), trim(airborne(truth), environment=around))
     comparison = _judged(logs, trial, other, mapping) if trial.flown else None
-    called, log = name or vehicle.card.called, logs[-1] if logs else None
+    called, log = name_of(asked.vehicle) or vehicle.card.called, logs[-1] if logs else None
     command = (str(sitl.binary),)
-    return Acceptance(str(binary), _version(sitl), called, command, tuple(trial.lines), comparison, log, folder, speed)
+    return Acceptance(
+        str(asked.binary), _version(sitl), called, command, tuple(trial.lines), comparison, log, folder, speed
+    )
 
 
 def _version(sitl: BetaflightBinary) -> str:

@@ -51,13 +51,17 @@ class FromLogs(VerbQuestion[Answer]):
         stamps = "drop" if self.drop_bad_stamps else "error"
         mapping = self.mapping or self._kept(text)
         flight = read_log(text, mapping=mapping, units=self.units, bad_stamps=stamps)
-        if getattr(self, "as_logged", False):
+        if self.unchecked():
             flight = flight.done(UNCHECKED)
         if not flight.provenance.simulated:
             return flight
         # Messages and reports name the file, not "simulated coax", of which there may be several.
         called = Path(split_log(split_window(text)[0])[0]).name
         return replace(flight, provenance=replace(flight.provenance, source=called))
+
+    def unchecked(self) -> bool:
+        """Whether channels are used although they contradict each other."""
+        return False
 
     def _kept(self, text: str) -> Path | None:
         """The mapping that was kept for a table with these columns; units that are given speak for themselves."""
@@ -90,6 +94,9 @@ class FromConditioned(FromLogs[Answer]):
         default=False, help="Use channels as they are logged, even where they contradict each other."
     )
 
+    def unchecked(self) -> bool:
+        return self.as_logged
+
     def conditioned(self, given: Any) -> list[Flight]:
         """Flights at one rate, each step in its history; those that are flights already as they are."""
         from swashplate.flights.flight import Flight
@@ -119,6 +126,11 @@ class OfVehicle(VerbQuestion[Answer]):
     def flying(self, given: Any, *, whole: bool = False) -> Vehicle:
         """The vehicle with its changes; with `whole`, one that flies, told before its assumed ranges are."""
         return changed(given, self.changes or {}, whole=whole)
+
+
+def name_of(given: Any) -> str | None:
+    """What a vehicle was called, where it was given by its name or file."""
+    return str(given) if isinstance(given, str | Path) else None
 
 
 def changed(given: Any, changes: Any, *, whole: bool = False) -> Vehicle:
@@ -273,3 +285,50 @@ def one_or_more(speed: Any) -> tuple[float, ...]:
 def strings(given: Iterable[Any] | str | None) -> tuple[str, ...]:
     """Names given as a list, or none."""
     return () if given is None else (given,) if isinstance(given, str) else tuple(given)
+
+
+def turbulence(gusts: Any) -> Any:
+    """What `gusts` asks for: none, indoor, indoor=SIGMA, a mean wind [m/s], or gusts as they are."""
+    from swashplate.api.languages import numbers
+    from swashplate.simulation.wind import INDOOR, indoor, outdoor
+
+    if gusts is None or gusts == "none":
+        return None
+    if not isinstance(gusts, str | int | float):
+        return gusts
+    if gusts == "indoor":
+        return INDOOR
+    kind, told, sigma = str(gusts).partition("=")
+    try:
+        if told and kind.strip() == "indoor":
+            return indoor(numbers(sigma, "--gusts", count=1)[0])
+        return outdoor(numbers(str(gusts), "--gusts", count=1)[0])
+    except SwashError as error:
+        raise SwashError(
+            f"is '{gusts}', expected none, indoor, indoor=0.3 (m/s), or a mean wind in m/s ({error.problem}).",
+            channel="--gusts",
+        ) from None
+
+
+def flight_limits(given: Any) -> Any:
+    """`lean=30deg` and so on as what is judged by; those that are not given keep their defaults."""
+    from dataclasses import replace
+
+    from swashplate.api.languages import numbers
+    from swashplate.control.draws.spread import SHOWN, Limits
+
+    chosen = Limits()
+    if isinstance(given, Limits):
+        return given
+    for name, text in (given or {}).items():
+        if name not in SHOWN:
+            raise SwashError(f"'{name}' is no limit; expected {', '.join(SHOWN)}.", channel="--limit")
+        unit, factor = SHOWN[name]
+        if str(text).strip() == "none":
+            chosen = replace(chosen, **{name: math.inf})
+            continue
+        value = numbers(str(text).strip().removesuffix(unit).strip(), "--limit", count=1)[0]
+        if not value > 0.0:
+            raise SwashError(f"{name} is {text}, expected more than 0 {unit}.", channel="--limit")
+        chosen = replace(chosen, **{name: value / factor})
+    return chosen

@@ -1,4 +1,4 @@
-"""The verb `autopilot_gains`: gains of a whole autopilot from a vehicle's model, judged and flown."""
+"""Gains of a whole autopilot from a vehicle's model, judged and flown."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from swashplate.api.asking import name_of
+from swashplate.api.languages import in_seconds
 from swashplate.api.link import mapping_of
 from swashplate.atomic import write_text
 from swashplate.control.analysis.cascade_gains import CascadeGains, cascade_gains, judge_cascade
@@ -39,6 +41,9 @@ from swashplate.shown import Shown
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.trim import Trim, trim
 from swashplate.text_table import text_table
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.control import FindGains
 
 AutopilotName = Literal["ardupilot", "px4", "rotorflight"]
 FlownModeName = FlightMode | RotorflightMode
@@ -203,77 +208,58 @@ class AutopilotGains(Shown):
         return "\n".join([*lines, *(["", *self.problems] if self.problems else [])])
 
 
-def autopilot_gains(
-    vehicle: Vehicle,
-    *,
-    autopilot: AutopilotName = "ardupilot",
-    name: str | None = None,
-    servos: str | Path | None = None,
-    delays: Mapping[str, float] | float | None = None,
-    notch: tuple[float, float] | None = None,
-    rate: float | None = None,
-    parameters: Mapping[str, float] | str | Path | None = None,
-    voltage: float | None = None,
-    fly: bool = True,
-) -> AutopilotGains:
-    """Gains of a whole autopilot's loops for a vehicle under ArduPilot, PX4 or Rotorflight, judged and flown.
-
-    Every loop keeps 6 dB, 45 degrees and a sensitivity below two with all others closed, with the vehicle's rotors,
-    bar and delays and the autopilot's filters in it. Of what keeps them, that which rejects disturbances best.
-
-    Args:
-        vehicle: in free flight; any model whose outputs an autopilot can be mapped to.
-        autopilot: "ardupilot", "px4" or "rotorflight", which holds neither a place nor a height: a pilot of ours does.
-        name, servos: as of `swashplate.link_ardupilot`.
-        delays: from output to actuator [s], one for all or by input; where not given those that the model knows, and
-            5 ms where it knows none. A SITL has none. What the firmware sends a loop later
-            (`control.laws.ardupilot.outputs`) comes to them.
-        notch: of the gyros, frequency and width [Hz]; ArduPilot only.
-        rate: of the loops [Hz]; 400 for ArduPilot, 250 for PX4, 1000 for Rotorflight.
-        parameters: judge these instead (by name, or a .parm file); ArduPilot's, or Rotorflight's by name.
-        voltage: of the battery [V].
-        fly: also fly the three modes on the nonlinear model.
-
-    Raises:
-        ControllerError: naming the loop for which nothing holds the margins, the command that the vehicle turns
-            against, or the axis that was fitted although no flight moved it.
-        SwashError: where there is no servo mapping.
-    """
-    if autopilot not in _SUFFIX:
-        raise ControllerError(f"is '{autopilot}', expected {', '.join(_SUFFIX)}.", channel="autopilot")
+def find_gains(asked: FindGains) -> AutopilotGains:
+    """The gains that were asked for, judged and flown."""
+    autopilot, notch, parameters = asked.autopilot, asked.notch, asked.parameters
     if autopilot != "ardupilot" and notch is not None:
         raise ControllerError("is for ArduPilot's parameters only.", channel="notch")
     if autopilot == "px4" and parameters is not None:
         raise ControllerError("is for ArduPilot's and Rotorflight's parameters only.", channel="parameters")
+    if notch is not None and len(notch) != 2:
+        raise SwashError("is not HZ, WIDTH.", channel="notch")
     if notch is not None and not (0.0 < notch[1] < 2.0 * notch[0] and notch[0] < 400.0):
         raise ControllerError(f"is {notch[0]:g} Hz, {notch[1]:g} Hz wide.", channel="notch")
+    vehicle = asked.flying(asked.vehicle)
     nominal = vehicle.card.values().get("voltage_nominal")
-    hover = trim(vehicle, voltage=nominal if voltage is None else voltage)
-    late, told = _late(vehicle, delays)
+    hover = trim(vehicle, voltage=nominal if asked.voltage is None else asked.voltage)
+    late, told = _late(vehicle, in_seconds(asked.delay))
+    design: CascadeGains[ArduPilotLaw] | CascadeGains[RotorflightLaw]
+    modes: tuple[FlownModeName, ...] = FLIGHT_MODES
     if autopilot == "rotorflight":
-        return _for_rotorflight(vehicle, hover, late, told, rate or ROTORFLIGHT_RATE, parameters, fly=fly)
-    mapping = mapping_of(vehicle, servos, name=name, suffix="" if autopilot == "ardupilot" else "_px4")
-    if autopilot == "px4":
-        start = px4_law(mapping, vehicle, hover, rate=rate or PX4_RATE)
-        design = cascade_gains(vehicle, hover, start, delays=late)
+        if isinstance(parameters, Path):
+            raise ControllerError("of Rotorflight are given by name, not as a file.", channel="parameters")
+        start = replace(rotorflight_law(vehicle, hover, given=parameters), rate=asked.rate or ROTORFLIGHT_RATE)
+        design = (rotorflight_gains if parameters is None else judge_rotorflight)(vehicle, hover, start, delays=late)
+        lines = gains = {n: v for n, v in design.law.parameters.items() if v != ROTORFLIGHT_DEFAULTS[n]}
+        modes = ROTORFLIGHT_MODES
+    elif autopilot == "px4":
+        mapping = mapping_of(vehicle, asked.servos, name=name_of(asked.vehicle), suffix="_px4")
+        design = cascade_gains(
+            vehicle, hover, px4_law(mapping, vehicle, hover, rate=asked.rate or PX4_RATE), delays=late
+        )
         gains = px4_gains(design.law)
         lines = {**px4_parameters(mapping), **gains}
     else:
-        given = read_parameter_file(parameters) if isinstance(parameters, str | Path) else parameters
-        told_given = None if given is None else dict(given)
-        start = ardupilot_law(mapping, vehicle, hover, given=told_given, notch=notch, rate=rate or RATE_OF_LOOPS)
-        search = cascade_gains if given is None else judge_cascade
-        design = search(vehicle, hover, start, delays=late)
+        mapping = mapping_of(vehicle, asked.servos, name=name_of(asked.vehicle), suffix="")
+        given = read_parameter_file(parameters) if isinstance(parameters, Path) else parameters
+        begun = ardupilot_law(
+            mapping,
+            vehicle,
+            hover,
+            given=None if given is None else dict(given),
+            notch=None if notch is None else (notch[0], notch[1]),
+            rate=asked.rate or RATE_OF_LOOPS,
+        )
+        design = (cascade_gains if given is None else judge_cascade)(vehicle, hover, begun, delays=late)
         gains = written_gains(design.law)
         lines = {**ardupilot_parameters(mapping, vehicle, hover), **gains}
-    flown = tuple(_flown(vehicle, hover, design, mode) for mode in FLIGHT_MODES) if fly else ()
     return AutopilotGains(
-        autopilot,
+        autopilot,  # pyrefly: ignore[bad-argument-type]
         vehicle.card.title,
         design,
         lines,
         tuple(gains),
-        flown,
+        tuple(_flown(vehicle, hover, design, mode) for mode in modes) if asked.fly else (),
         told + _sent_later(design.law),
         refused_by_card(vehicle.card),
         parameters is not None,
@@ -290,28 +276,6 @@ def _late(vehicle: Vehicle, given: Mapping[str, float] | float | None) -> tuple[
     else:
         whose = "assumed: the model knows no delay and may know no servos; --delay says more, and 0 is a SITL's"
     return dict(late), f"{', '.join(f'{name} {1e3 * value:.3g} ms' for name, value in late.items())} ({whose})"
-
-
-def _for_rotorflight(
-    vehicle: Vehicle,
-    hover: Trim,
-    late: Mapping[str, float],
-    told: str,
-    rate: float,
-    parameters: Mapping[str, float] | str | Path | None,
-    *,
-    fly: bool,
-) -> AutopilotGains:
-    if isinstance(parameters, str | Path):
-        raise ControllerError("of Rotorflight are given by name, not as a file.", channel="parameters")
-    start = replace(rotorflight_law(vehicle, hover, given=parameters), rate=rate)
-    search = rotorflight_gains if parameters is None else judge_rotorflight
-    design = search(vehicle, hover, start, delays=late)
-    lines = {name: value for name, value in design.law.parameters.items() if value != ROTORFLIGHT_DEFAULTS[name]}
-    flown = tuple(_flown(vehicle, hover, design, mode) for mode in ROTORFLIGHT_MODES) if fly else ()
-    premise, judged = refused_by_card(vehicle.card), parameters is not None
-    title = vehicle.card.title
-    return AutopilotGains("rotorflight", title, design, lines, tuple(lines), flown, told, premise, judged)
 
 
 def _in_mode(law: ArduPilotLaw | RotorflightLaw, mode: FlownModeName | None) -> ArduPilotLaw | RotorflightLaw:

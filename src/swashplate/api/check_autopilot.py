@@ -1,14 +1,14 @@
-"""The verb `check_autopilot`: whether a running autopilot is set up for a vehicle, would arm, and how fast it runs."""
+"""Whether a running autopilot is set up for a vehicle, would arm, and how fast it runs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from swashplate.api.asking import name_of
 from swashplate.api.link import mapping_of
-from swashplate.errors import SwashError
 from swashplate.links.ardupilot.parameters import as_written
 from swashplate.links.ardupilot.parameters import parameters as for_ardupilot
 from swashplate.links.mavlink.comparison import ComparedParameter, compared, rate_problems
@@ -23,6 +23,9 @@ from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
 from swashplate.simulation.trim import trim
 from swashplate.text_table import text_table
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.link import CheckAutopilot
 
 Firmware = Literal["ardupilot", "px4"]
 ADDRESSES: Mapping[Firmware, str] = {"ardupilot": "tcp:127.0.0.1:5762", "px4": "udp:127.0.0.1:14540"}
@@ -101,44 +104,17 @@ class AutopilotCheck(Shown):
         return [p for p in self.parameters if p.verdict != "right"]
 
 
-def check_autopilot(
-    vehicle: Vehicle,
-    firmware: Firmware,
-    *,
-    name: str | None = None,
-    servos: str | Path | None = None,
-    mavlink: str | None = None,
-    timeout: float = 10.0,
-    listen: float = 4.0,
-) -> AutopilotCheck:
-    """Compare a running autopilot's parameters with what a vehicle needs, and hear why it refuses to be armed.
-
-    The physics (`swash link`) has to run at the same time. Nothing is changed in the autopilot but how often it sends
-    two messages.
-
-    Args:
-        vehicle: what it is to fly.
-        firmware: which is expected.
-        name, servos: as of `link_ardupilot`.
-        mavlink: "tcp:HOST:PORT" connects, "udp:HOST:PORT" listens; `ADDRESSES` where None.
-        timeout: for the first sign of an autopilot [s].
-        listen: how long its checks and clock are heard [s].
-
-    Raises:
-        SwashError: no answer, a port that is taken, another firmware or another kind of vehicle; a vehicle without
-            servo mapping; pymavlink missing.
-    """
-    if firmware not in ADDRESSES:
-        raise SwashError(f"'{firmware}' is none, expected {' or '.join(ADDRESSES)}.", channel="firmware")
-    if not (0.0 < timeout <= 600.0 and 0.0 < listen <= 600.0):
-        raise SwashError("expected seconds above 0 and up to 600.", channel="timeout")
-    expected = _expected(vehicle, firmware, name, servos)
+def hear_autopilot(asked: CheckAutopilot) -> AutopilotCheck:
+    """The check that was asked for."""
+    vehicle, timeout = asked.flying(asked.vehicle), asked.timeout
+    firmware: Any = asked.firmware
+    expected = _expected(vehicle, firmware, name_of(asked.vehicle), asked.servos)
     packed = firmware == "px4"
-    with Connection(mavlink or ADDRESSES[firmware], timeout=timeout) as connection:
+    with Connection(asked.mavlink or ADDRESSES[firmware], timeout=timeout) as connection:
         kind = greet(connection, _AUTOPILOTS[firmware], timeout)
         reading = read_parameters(connection, packed=packed)
         ask_by_name(connection, reading, expected, packed=packed)
-        health = listen_to_health(connection, duration=listen)
+        health = listen_to_health(connection, duration=asked.listen)
     comparisons = compared(expected, reading)
     build = other_build(kind, vehicle.traits.servo_layout) if firmware == "ardupilot" else ""
     problems = [build] if build else [p.problem for p in comparisons if p.problem]

@@ -1,27 +1,26 @@
-"""The verb `check_controller`: what a controller is worth on a model."""
+"""What a controller is worth on a model."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from swashplate.api.asking import turbulence
 from swashplate.api.controllers import flown_by
-from swashplate.control.analysis.check import Command, ControlCheck
-from swashplate.control.analysis.check import check_controller as judge
+from swashplate.api.languages import in_seconds
+from swashplate.control.analysis.check import ControlCheck, check_controller
 from swashplate.control.analysis.check_steps import InGusts
 from swashplate.control.analysis.requirements import ATTITUDE_COUPLING, GAIN_MARGIN, PHASE_MARGIN, REJECTION_PEAK
 from swashplate.control.lateness import lateness
-from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.control_check import compose_check
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
-from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import trim
-from swashplate.simulation.wind import INDOOR, Gusts
 from swashplate.text_table import text_table
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.control import CheckController
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,50 +54,25 @@ class ControllerCheck(Shown):
         return f"late: {self.late}\n{_tables(self.found)}"
 
 
-def check_controller(
-    vehicle: Vehicle,
-    controller: Controller | str | Path,
-    *,
-    speed: float = 0.0,
-    voltage: float | None = None,
-    task: str = "other",
-    command: Command = "auto",
-    scale: float | None = None,
-    duration: float = 20.0,
-    gusts: Gusts | None = INDOOR,
-    delays: Mapping[str, float] | float | None = None,
-    computation: float | None = None,
-    required_delay: float | None = None,
-) -> ControllerCheck:
-    """Judge a controller on a model: margins, disturbance rejection, handling qualities, steps, coupling, gusts.
-
-    Args:
-        vehicle: what flies, which need not be what the controller was designed on.
-        controller: one, or its file.
-        speed: ahead, of the steady flight [m/s].
-        voltage: the battery's [V]; the card's nominal one where not given.
-        task, command, scale, duration, gusts, delays, computation, required_delay: see
-            `swashplate.control.analysis.check.check_controller`.
-
-    Raises:
-        ControllerError: where the controller is for another vehicle, or its file is not one.
-        TrimError: where the speed cannot be flown.
-    """
+def judge_controller(asked: CheckController) -> ControllerCheck:
+    """What was asked of a controller."""
+    vehicle = asked.flying(asked.vehicle)
     nominal = vehicle.card.values().get("voltage_nominal")
-    at = trim(vehicle, speed=speed, voltage=nominal if voltage is None else voltage)
-    made, name = flown_by(controller, vehicle, at)
-    check = judge(
+    at = trim(vehicle, speed=asked.speed, voltage=nominal if asked.voltage is None else asked.voltage)
+    made, name = flown_by(asked.controller, vehicle, at)
+    delays = in_seconds(asked.delay)
+    check = check_controller(
         vehicle,
         made,
         at,
-        task=task,
-        command=command,
-        scale=scale,
-        duration=duration,
-        gusts=gusts,
+        task=asked.task,
+        command=asked.response,  # pyrefly: ignore[bad-argument-type]
+        scale=asked.scale,
+        duration=asked.duration,
+        gusts=turbulence(asked.gusts),
         delays=delays,
-        computation=computation,
-        required_delay=required_delay,
+        computation=in_seconds(asked.computation),
+        required_delay=in_seconds(asked.delay_margin),
     )
     return ControllerCheck(check, name, lateness(vehicle, made, given=delays))
 

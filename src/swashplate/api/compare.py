@@ -1,14 +1,14 @@
-"""The verb `compare`: several responses, models or fits side by side, or models along a flight."""
+"""Several responses, models or fits side by side, or models along a flight."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from swashplate.api.asking import strings
 from swashplate.api.case_comparison import CaseComparison
 from swashplate.errors import SwashError
-from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.result_file import load
 from swashplate.identification.responses.frequency_response import FrequencyResponse
@@ -25,32 +25,14 @@ from swashplate.reporting.case_parts import (
 from swashplate.validation.compare import ModelComparison, along_flights
 from swashplate.validation.verb import fitted
 
+if TYPE_CHECKING:
+    from swashplate.api.verbs.validate import Compare
 
-def compare(
-    cases: Any, flights: Flight | Sequence[Flight] | None = None, *, outputs: Sequence[str] | None = None
-) -> ModelComparison | CaseComparison:
-    """Put cases side by side, or fly models along one flight.
 
-    Without flights by what the cases are, each against the first: frequency responses (coherent bands, mismatch J,
-    difference in random errors), fits (parameters with standard deviations, difference in standard deviations, modes),
-    models (modes, responses over each other; vehicles in hover). Fits beside models are compared as models.
-
-    With flights models follow the recorded inputs, as with MATLAB's `compare`: start states, constant shifts of the
-    rates and biases of the outputs are solved for, for each model and stretch of the flight alike; all else has to
-    come from the model and the recorded inputs (`swashplate.validate` judges more).
-
-    Args:
-        cases: a list of them, cases by the name that they shall have, or with flights a single model. A case is what
-            `respond`, an identification, `vehicle` or `linearize` gives, or its file; a folder of `swash respond` or of
-            a fit stands for the file in it.
-        flights: conditioned; None for none.
-        outputs: channels to compare along the flights; all that a model and the flights share where None.
-
-    Raises:
-        SwashError: fewer than two cases (one model beside flights), responses beside something else, no common pair.
-        FlightError: an input that the flights lack, or no output that both have.
-    """
-    named = _named(cases)
+def compare_cases(asked: Compare) -> ModelComparison | CaseComparison:
+    """The comparison that was asked for."""
+    named, outputs = _named(asked.cases), strings(asked.outputs) or None
+    flights = None if asked.flight is None else asked.conditioned(asked.flight)
     if flights is not None:
         return along_flights(named, flights, outputs=outputs)
     if outputs is not None:

@@ -1,4 +1,4 @@
-"""The verb `decouple`: from a coaxial helicopter's model to the controller that decouples its roll and pitch."""
+"""From a coaxial helicopter's model to the controller that decouples its roll and pitch."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swashplate.api.asking import turbulence
 from swashplate.api.design_controller import margins_document
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.analysis.stability import loop_margins, loop_modes, require_stable
@@ -17,12 +18,11 @@ from swashplate.control.analysis.straightness import DURATION, StepRun, command_
 from swashplate.control.draws.variations import draw_models
 from swashplate.control.kinds import save_controller
 from swashplate.control.lateness import lateness
-from swashplate.control.laws.autopilot import Autopilot, Mode, autopilot
-from swashplate.control.laws.decoupling import Lag, estimated_lag
+from swashplate.control.laws.autopilot import Autopilot, autopilot
+from swashplate.control.laws.decoupling import estimated_lag
 from swashplate.control.laws.learning import corrected_by_step, straightened
 from swashplate.errors import SwashError
 from swashplate.export.controller_c import ControllerCode, Precision, controller_code
-from swashplate.identification.core.result import Result
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.straightness import compose_straightness
 from swashplate.reporting.structure import Report
@@ -31,12 +31,11 @@ from swashplate.simulation.trim import Trim, trim
 from swashplate.simulation.wind import Gusts, dryden
 from swashplate.text_table import text_table
 
-Fitted = Result[Any, Any] | str | Path
-"""What an identification found, or its file."""
+if TYPE_CHECKING:
+    from swashplate.api.verbs.decouple import Decouple
+
 PAPERS_SPEED = 1.8
 """m/s, of the step of Fankhauser et al., Fig. 10."""
-_FURTHEST = 6.0
-"""m of drift, as far as the step goes."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +112,11 @@ class DecouplingDesign(Shown):
     margins: Margins | None
     step: FlownStep | None
     late: str
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """None: a loop that does not stand is an error."""
+        return ()
 
     def lag(self, *, less: float = 0.0) -> float:
         """Phase lag that is taken out at the hover's motor command [deg], with the battery by `less` volts lower."""
@@ -192,58 +196,24 @@ class DecouplingDesign(Shown):
         return "\n\n".join(parts)
 
 
-def decouple(
-    vehicle: Vehicle,
-    *,
-    mode: Mode = "manual",
-    lag: Lag | Literal["straight"] | float | None = None,
-    mixing: Literal["rotation", "as_printed"] | None = None,
-    speed_terms: bool = True,
-    voltage: float | None = None,
-    rate: float = 100.0,
-    step: float | None = None,
-    to_speed: float | None = None,
-    drift: float | None = None,
-    fit: Fitted | None = None,
-    gusts: Gusts | None = None,
-    draws: int = 500,
-    seed: int = 0,
-) -> DecouplingDesign:
-    """Design the decoupling controller of a coaxial helicopter (Fankhauser et al., eqs 19 to 22).
-
-    Args:
-        vehicle: with the CoaX's equations, published or identified.
-        mode: what the servos hold besides a pilot's commands.
-        lag: "straight" chooses the lag with which the model, its delays included, ends the step straight ahead; the
-            others are the rotor's own lag by the paper (eqs 21, 22) or a constant [rad]. Where not given: "straight"
-            in mode "manual", "battery" in the others, which correct a drift themselves.
-        mixing, speed_terms: of the decoupling; see `swashplate.control.laws.autopilot.autopilot`.
-        voltage: battery of the hover [V]; the card's nominal one where not given.
-        rate: of the controller [Hz].
-        step: fly this step of the pitch command for 6 m, with and without the decoupling.
-        to_speed: the same with the step that reaches this speed [m/s].
-        drift: seen on the step with this law [m to the right after 6 m]: take it out.
-        fit: what an identification found, or its file: fly the step also on models drawn from its covariance.
-        gusts: fly these in gusts, each in its own; without a fit the model itself. `INDOOR` or others of
-            `swashplate.simulation.wind`.
-        draws, seed: how many, and of which seed.
-
-    Raises:
-        ControllerError: where the loop does not stand, or a step does not get there.
-        SwashError: for a vehicle with other inputs, or options that contradict each other.
-    """
-    _check(step, to_speed, drift, fit, gusts)
+def decouple_coaxial(asked: Decouple, vehicle: Vehicle) -> DecouplingDesign:
+    """The controller that was asked for, of a vehicle with its changes: Fankhauser et al., eqs 19 to 22."""
+    flown = asked.step is not None or asked.to_speed is not None or asked.paged
+    step, to_speed = asked.step, asked.to_speed
+    if asked.paged and step is None and to_speed is None:
+        to_speed = PAPERS_SPEED
+    _refuse(asked, flown=flown)
     nominal = vehicle.card.values().get("voltage_nominal")
-    hover = trim(vehicle, voltage=nominal if voltage is None else voltage)
-    rule = ("straight" if mode == "manual" else "battery") if lag is None else lag
+    hover = trim(vehicle, voltage=nominal if asked.voltage is None else asked.voltage)
+    rule = ("straight" if asked.mode == "manual" else "battery") if asked.lag is None else _lag_of(asked.lag)
     papers = autopilot(
         vehicle,
         hover,
-        mode=mode,
-        rate=rate,
+        mode=asked.mode,  # pyrefly: ignore[bad-argument-type]
+        rate=asked.rate,
         lag="battery" if rule == "straight" else rule,
-        speed_terms=speed_terms,
-        mixing=mixing,
+        speed_terms=asked.speed_terms,
+        mixing=asked.mixing,  # pyrefly: ignore[bad-argument-type]
     )
     made = papers
     if to_speed is not None:
@@ -253,8 +223,8 @@ def decouple(
         if to_speed is not None:  # the straight law flies the step a little faster
             step = command_for_speed(vehicle, made, hover, speed=to_speed)
             made = _straight(vehicle, papers, hover, step)
-    if drift is not None and step is not None:
-        made = corrected_by_step(vehicle, made, hover, command=step, drift=drift)
+    if asked.drift is not None and step is not None:
+        made = corrected_by_step(vehicle, made, hover, command=step, drift=asked.drift)
     slowest = loop_modes(vehicle, made, hover)[0]
     if made.mode != "manual":  # a pilot damps what "manual" leaves alone
         require_stable(slowest, rate=made.rate, where=str(vehicle.card.path or vehicle.name))
@@ -264,43 +234,20 @@ def decouple(
         made,
         complex(slowest),
         None if made.mode == "manual" else loop_margins(vehicle, made, hover),
-        None
-        if step is None
-        else _flown(vehicle, made, papers if made is not papers else None, hover, step, _Many(fit, gusts, draws, seed)),
+        None if step is None else _flown(asked, vehicle, made, papers if made is not papers else None, hover, step),
         lateness(vehicle, made, given=None),
     )
 
 
-@dataclass(frozen=True)
-class _Many:
-    """What is flown besides the model in still air."""
-
-    fit: Fitted | None
-    gusts: Gusts | None
-    draws: int
-    seed: int
-
-    def words(self) -> str:
-        what = "flights of the model" if self.fit is None else "models drawn from the fit's covariance"
-        return what if self.gusts is None else f"{what}, each in gusts of its own ({self.gusts.sigma[0]:.2g} m/s)"
-
-
-def _check(
-    step: float | None, to_speed: float | None, drift: float | None, fit: Fitted | None, gusts: Gusts | None
-) -> None:
-    flown = step is not None or to_speed is not None
-    if step is not None and to_speed is not None:
+def _refuse(asked: Decouple, *, flown: bool) -> None:
+    if asked.step is not None and asked.to_speed is not None:
         raise SwashError("are two steps.", channel="--step and --to-speed", hint="Give one.")
-    if to_speed is not None and not to_speed > 0.0:
-        raise SwashError(f"is {to_speed:g} m/s, expected a positive speed.", channel="--to-speed")
-    if fit is not None and not flown:
+    if asked.fit is not None and not flown:
         raise SwashError("is for the paths of a --step.", channel="--fit", hint="Add --step 0.2.")
-    if gusts is not None and not flown:
+    if asked.gusts not in (None, "none") and not flown:
         raise SwashError("blow on a flown --step.", channel="--gusts", hint="Add --step 0.2 or --to-speed 1.8.")
-    if drift is not None and not flown:
+    if asked.drift is not None and not flown:
         raise SwashError("was seen on a step.", channel="--drift", hint="Add that step: --step 0.4 or --to-speed 1.8.")
-    if drift is not None and not abs(drift) <= _FURTHEST:
-        raise SwashError(f"is {drift:g} m, expected at most {_FURTHEST:g} either way.", channel="--drift")
 
 
 def _straight(vehicle: Vehicle, papers: Autopilot, hover: Trim, step: float | None) -> Autopilot:
@@ -313,14 +260,16 @@ def _straight(vehicle: Vehicle, papers: Autopilot, hover: Trim, step: float | No
 
 
 def _flown(
-    vehicle: Vehicle, made: Autopilot, papers: Autopilot | None, hover: Trim, step: float, many: _Many
+    asked: Decouple, vehicle: Vehicle, made: Autopilot, papers: Autopilot | None, hover: Trim, step: float
 ) -> FlownStep:
+    fit, gusts, draws, seed = asked.fit, turbulence(asked.gusts), asked.draws, asked.seed
     bare = autopilot(vehicle, hover, mode="manual", rate=made.rate, decoupled=False)
-    drawn = None if many.fit is None else draw_models(vehicle, many.fit, count=many.draws, seed=many.seed)
-    wind = None
-    if many.gusts is not None:  # of another seed than the draws
+    drawn = None if fit is None else draw_models(vehicle, fit, count=draws, seed=seed)
+    wind, many = None, "flights of the model" if fit is None else "models drawn from the fit's covariance"
+    if gusts is not None:  # of another seed than the draws
         samples = round(DURATION * made.rate) + 1
-        wind = dryden(many.gusts, samples=samples, rate=made.rate, seed=many.seed + 1_000_003, count=many.draws)
+        wind = dryden(gusts, samples=samples, rate=made.rate, seed=seed + 1_000_003, count=draws)
+        many = f"{many}, each in gusts of its own ({gusts.sigma[0]:.2g} m/s)"
     flown = {"without": bare, "by the paper": papers, "with": made}
     runs = {
         name: step_run(vehicle, controller, hover, command=step, parameters=drawn, wind=wind)
@@ -328,5 +277,20 @@ def _flown(
         if controller is not None
     }
     if runs["with"].drawn is None:
-        return FlownStep(step, runs, many.draws)
-    return FlownStep(step, runs, many.draws, many.words(), many.gusts)
+        return FlownStep(step, runs, draws)
+    return FlownStep(step, runs, draws, many, gusts)
+
+
+def _lag_of(text: Any) -> Any:
+    """A rule's name, or degrees as radians."""
+    from swashplate.api.languages import numbers
+    from swashplate.control.laws.decoupling import LAGS
+
+    if text in ("straight", *LAGS):
+        return text
+    if str(text).isalpha():
+        raise SwashError(f"is '{text}', expected straight, {', '.join(LAGS)} or a number.", channel="lag")
+    degrees = numbers(str(text), "--lag", count=1)[0]
+    if not abs(degrees) <= 180.0:
+        raise SwashError(f"is {text} degrees, expected at most 180 either way.", channel="--lag")
+    return math.radians(degrees)

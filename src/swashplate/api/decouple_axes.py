@@ -1,11 +1,12 @@
-"""The verb `decouple_axes`: the axes of any linear model by a matrix and by a filter, and what that reaches."""
+"""The axes of any linear model by a matrix and by a filter, and what that reaches."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from swashplate.api.asking import name_of, strings
 from swashplate.control.laws.linear_decoupling import (
     Decoupling,
     HasMatrices,
@@ -23,6 +24,9 @@ from swashplate.shown import Shown
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import trim
 from swashplate.text_table import text_table
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.decouple import Decouple
 
 _USUAL = (
     (("lateral", "p"), ("longitudinal", "q")),
@@ -57,6 +61,11 @@ class AxesDecoupling(Shown):
     frequency: float
     frequencies: tuple[float, ...]
     problem: str | None = None
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why there is no filter; empty where there is one."""
+        return () if self.problem is None else (f"No filter: {self.problem}",)
 
     def ratios(self) -> dict[str, dict[str, Any]]:
         """Off-axis over on-axis response over the frequencies, by what was made and by axis."""
@@ -116,57 +125,31 @@ class AxesDecoupling(Shown):
         )
 
 
-def decouple_axes(
-    model: Vehicle,
-    *,
-    pairs: Mapping[str, str] | None = None,
-    frequency: float = 3.0,
-    bandwidth: float = 10.0,
-    keep: Sequence[str] | None = None,
-    frequencies: Sequence[float] = (1.0, 3.0, 10.0, 20.0),
-    speed: float = 0.0,
-    name: str | None = None,
-) -> AxesDecoupling:
-    """Decouple the axes of a linear model: by a constant matrix, and by a filter that copies its fast states.
-
-    Args:
-        model: a linear model, or any other, which is linearised about its steady flight.
-        pairs: which input is to move which output; roll and pitch rate where not given.
-        frequency: where the matrix decouples best [rad/s].
-        bandwidth: of the filter's axes [rad/s].
-        keep: states of the filter's copy; the fast ones where not given.
-        frequencies: of the table [rad/s].
-        speed: of a vehicle's steady flight [m/s].
-        name: of the model, for the page.
-
-    Raises:
-        SwashError: for names that the model does not have, or axes that no input moves.
-    """
-    if not frequencies or min(frequencies) <= 0.0:
-        raise SwashError(f"{', '.join(map(str, frequencies))} is not all positive.", channel="frequencies")
-    system = _system(model, speed)
-    chosen = tuple(pairs.items()) if pairs else _usual(system)
+def decouple_axes(asked: Decouple, vehicle: Vehicle) -> AxesDecoupling:
+    """The matrix and the filter that were asked for, of a vehicle with its changes."""
+    system, frequency = _system(vehicle, asked.speed), asked.frequency
+    chosen = tuple(asked.pair.items()) if asked.pair else _usual(system)
     axes: dict[str, Any] = {"inputs": [i for i, _ in chosen], "outputs": [o for _, o in chosen]}
     doubled = sorted({o for o in axes["outputs"] if axes["outputs"].count(o) > 1})
     if doubled:
         raise SwashError(f"gives {', '.join(doubled)} to two inputs.", channel="--pair", hint="Give each output once.")
-    kept = list(keep or [n for n in system.states if n not in _SLOW or n in axes["outputs"]])
+    kept = list(strings(asked.keep) or [n for n in system.states if n not in _SLOW or n in axes["outputs"]])
     matrix = static_decoupling(system, frequency=frequency, **axes)
     made: dict[str, Decoupling | None] = {"bare": None, "matrix": matrix}
     problem = None
     try:
-        made["filter"] = dynamic_decoupling(system, bandwidth=bandwidth, keep=kept, **axes)
+        made["filter"] = dynamic_decoupling(system, bandwidth=asked.bandwidth, keep=kept, **axes)
     except SwashError as error:
         problem = str(error)
     return AxesDecoupling(
-        name or model.called,
+        name_of(asked.vehicle) or vehicle.called,
         system,
         tuple(axes["inputs"]),
         tuple(axes["outputs"]),
         made,
         tuple(kept),
         frequency,
-        tuple(frequencies),
+        tuple(asked.at),
         problem,
     )
 

@@ -1,13 +1,15 @@
-"""The verb `demo`: the main job on the real flights where they are found, otherwise on simulated ones."""
+"""The main job on the real flights where they are found, otherwise on simulated ones."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swashplate.api.identification import Identification, identify_and_validate
-from swashplate.api.saying import Say, silent
+from swashplate.api.identification import Identification
+from swashplate.api.saying import Say
+from swashplate.api.verbs.identify import FitVehicle
 from swashplate.control.laws.hold import hover_hold
 from swashplate.flights import datasets
 from swashplate.flights.flight import Flight
@@ -19,6 +21,9 @@ from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.sensors import observe
 from swashplate.simulation.trim import trim
 
+if TYPE_CHECKING:
+    from swashplate.api.verbs.data import Demo
+
 FITTED = "flight_2011-08-01_vertical.mat"
 HELD_OUT = "flight_2011-07-25_hover_crash.mat"
 
@@ -29,29 +34,24 @@ _TRUTH = {"tau_f_upper": 1.3, "linkage_lower": 0.11, "hub_stiffness_upper": 0.09
 """What the simulated aircraft has instead of the card's numbers, for the identification to find."""
 
 
-def demo(*, simulated: bool = False, seed: int = 1, say: Say = silent) -> Identification:
-    """Run the main job: identify the CoaX from one flight and predict another.
+def run_demo(asked: Demo, say: Say) -> Identification:
+    """The demo that was asked for; `fit.data` and the report's first line say which flights it took.
 
-    On the real flights of the data set coax56 where they are found on this machine, otherwise on simulated flights
-    with sensor noise, gaps and outliers; `fit.data` and the report's first line say which. The numbers of the simulated
-    aircraft are `fit.truth`, and stand in the tables beside the published and the identified ones.
-
-    Args:
-        simulated: simulated flights even where real ones are.
-        seed: of the simulated flights' noise.
-        say: told what is being done.
+    The numbers of the simulated aircraft are `fit.truth`, and stand in the tables beside the published and the
+    identified ones.
     """
+    seed = asked.seed
     coax = vehicle("coax")
-    files = [] if simulated else [path for f in (FITTED, HELD_OUT) if (path := datasets.find("coax56", f))]
+    files = [] if asked.simulated else [path for f in (FITTED, HELD_OUT) if (path := datasets.find("coax56", f))]
     if len(files) == 2:
         say("reading the real flights")
         fitted, held_out = (read(path) for path in files)
     else:
         say("simulating two flights")
         fitted, held_out = (simulated_log(coax, maneuver, seed=seed + i) for i, maneuver in enumerate(_MANEUVERS))
-    made = identify_and_validate(
-        coax, fitted.condition(rate=100.0, cutoff=0.0), hold_out=held_out.condition(rate=100.0, cutoff=0.0), say=say
-    )
+    made = FitVehicle(
+        coax, fitted.condition(rate=100.0, cutoff=0.0), hold_out=held_out.condition(rate=100.0, cutoff=0.0)
+    ).answer(say)
     if len(files) == 2:
         return made
     true = _aircraft(coax).card.values()

@@ -1,14 +1,15 @@
-"""The verb `design_controller`: a linear-quadratic controller from a model's own trims and linear models."""
+"""A linear-quadratic controller from a model's own trims and linear models."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from swashplate.arrays import Array
+from swashplate.api.asking import one_or_more
+from swashplate.api.languages import in_seconds
 from swashplate.control.analysis.gain_premises import refused_by_card
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.kinds import save_controller
@@ -16,21 +17,19 @@ from swashplate.control.lateness import lateness
 from swashplate.control.lqg.analysis import Analysis, analyse
 from swashplate.control.lqg.constant_gain import steady_sigmas, with_steady_gain
 from swashplate.control.lqg.controller import Lqg
-from swashplate.control.lqg.design import Holding, design
-from swashplate.errors import ControllerError
+from swashplate.control.lqg.design import design
 from swashplate.export.controller_c import ControllerCode, Precision, controller_code
 from swashplate.filtering.sensor_suite import suite
-from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.controller_design import compose_design
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
+if TYPE_CHECKING:
+    from swashplate.api.verbs.control import DesignController
+
 _NEARLY = 1.05
 """Of a limit: closer is none."""
-USUAL_SENSORS = "imu@100,mocap@100+10ms"
-Method = Literal["lqg", "lqr"]
-Gain = Literal["flying", "steady"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -148,64 +147,32 @@ def spread_rows(made: Lqg, analysis: Analysis) -> list[tuple[str, str, str]]:
     return rows
 
 
-def design_controller(
-    vehicle: Vehicle,
-    *,
-    method: Method = "lqg",
-    sensors: str = USUAL_SENSORS,
-    holding: Holding = "place",
-    speeds: Sequence[float] = (0.0,),
-    rate: float = 100.0,
-    delays: Mapping[str, float] | float | None = None,
-    computation: float | None = None,
-    allowed: Mapping[str, float] | None = None,
-    effort: Mapping[str, float] | float | None = None,
-    Q: Array | Sequence[float] | None = None,
-    R: Array | Sequence[float] | None = None,
-    gain: Gain = "flying",
-    voltage: float | None = None,
-) -> ControllerDesign:
-    """Design a linear-quadratic controller with integral action.
-
-    Args:
-        vehicle: the model, published or identified.
-        method: "lqg" with an observer on sensors, "lqr" fed with the states.
-        sensors: KIND@RATE+DELAYms, by commas; see `swashplate.filtering.sensor_suite.suite`.
-        gain: of the observer: "flying", found as it flies, or "steady", constant.
-        holding, speeds, rate, delays, computation, allowed, effort, Q, R, voltage: see
-            `swashplate.control.lqg.design.design`.
-
-    Raises:
-        ControllerError: what cannot be seen, held or reached, with the direction; TrimError for a speed that cannot be
-            flown.
-    """
-    if method not in ("lqg", "lqr") or gain not in ("flying", "steady"):
-        raise ControllerError(f"method {method!r}, gain {gain!r}: expected lqg or lqr, flying or steady.")
+def design_lq_controller(asked: DesignController) -> ControllerDesign:
+    """The controller that was asked for."""
+    vehicle, speeds, delays = asked.flying(asked.vehicle), one_or_more(asked.speed), in_seconds(asked.delay)
     made = design(
         vehicle,
-        sensors=() if method == "lqr" else suite(sensors),
-        rate=rate,
+        sensors=() if asked.method == "lqr" else suite(asked.sensors),
+        rate=asked.rate,
         delays=delays,
-        computation=computation,
-        holding=holding,
+        computation=in_seconds(asked.computation),
+        holding=asked.holding,  # pyrefly: ignore[bad-argument-type]
         speeds=speeds,
-        allowed=allowed,
-        effort=effort,
-        Q=Q,
-        R=R,
-        voltage=voltage,
+        allowed=asked.allow or {},
+        effort=asked.effort or None,
+        Q=asked.state_weights,
+        R=asked.input_weights,
+        voltage=asked.voltage,
     )
     where = str(vehicle.card.path or vehicle.name)
     analyses = [analyse(made, at=i, where=where) for i in range(len(speeds))]
-    if gain == "steady":
+    if asked.gain == "steady":
         made = with_steady_gain(made)
         kept = dict(zip(made.plan.names, map(float, steady_sigmas(made)), strict=True))
         analyses = [replace(each, uncertainty={n: kept[n] for n in each.uncertainty if n in kept}) for each in analyses]
-    took = "not known, one sample is left for it" if computation is None else f"{1e3 * computation:g} ms"
+    took = "not known, one sample is left for it" if asked.computation is None else f"{asked.computation:g} ms"
     late = f"{lateness(vehicle, None, given=delays)}; computation: {took}"
-    return ControllerDesign(
-        made, tuple(analyses), tuple(speeds), late, _fast(made, analyses), refused_by_card(vehicle.card)
-    )
+    return ControllerDesign(made, tuple(analyses), speeds, late, _fast(made, analyses), refused_by_card(vehicle.card))
 
 
 def _fast(made: Lqg, analyses: Sequence[Analysis]) -> str:

@@ -1,13 +1,17 @@
-"""The verb `design_maneuver`: what to fly so that a flight tells some parameters best, and what each second buys."""
+"""What to fly so that a flight tells some parameters best, and what each second buys."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from swashplate.api.asking import strings
+from swashplate.api.controllers import from_file
 from swashplate.api.designed_maneuver import LEAD, DesignedManeuver
-from swashplate.api.saying import Say, silent
+from swashplate.api.saying import Say
 from swashplate.api.told_by_maneuvers import DesignDraws, offer_of
 from swashplate.arrays import Array
 from swashplate.control.laws.hold import hover_hold
@@ -18,11 +22,15 @@ from swashplate.flights.maneuvers.composed import composed
 from swashplate.flights.maneuvers.multisine import dealt
 from swashplate.flights.maneuvers.series import AXES, DEFAULT_AMPLITUDE, Maneuver, parse
 from swashplate.identification.design.information import best_powers, sensed
+from swashplate.models.catalogue import vehicle as find_vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
 from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
 from swashplate.validation.validate import observer_of
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.maneuver import DesignManeuver
 
 LIMITS = ("amplitude", "attitude", "rate", "place", "battery", "seconds")
 """What may be limited: deflection [1], attitude from trim [deg], body rates [deg/s], distance [m], a battery's flight
@@ -35,56 +43,24 @@ _VAGUE = 50.0
 _STEPS = (0.25, 0.5, 1.0, 2.0)
 
 
-def design_maneuver(
-    vehicle: Vehicle,
-    unknown: Sequence[str],
-    *,
-    limits: Mapping[str, float] | None = None,
-    band: tuple[float, float] = (0.3, 8.0),
-    axes: Sequence[str] | None = None,
-    criterion: str = "D",
-    robust: str = "average",
-    spread: float = 0.3,
-    draws: int = 5,
-    noise: Noise | None = None,
-    controller: Callable[[Vehicle, Trim], Controller] | None = None,
-    rate: float = 100.0,
-    seed: int = 0,
-    say: Say = silent,
-) -> DesignedManeuver:
-    """Design a maneuver from hover for what is unknown, beside a sweep and a 3-2-1-1 of the same length and limits.
+def design_for(asked: DesignManeuver, say: Say) -> DesignedManeuver:
+    """The maneuver that was asked for, beside a sweep and a 3-2-1-1 of the same length and limits.
 
     The powers of a multisine's lines are chosen for the information that they give in the closed loop, by the model's
     exact slopes and the noise that the likelihoods of flights have; its phases for a low peak. Each way to fly is then
     simulated with all nonlinearity and made smaller until it keeps the limits, for every draw of the prior.
-
-    Args:
-        vehicle: whose numbers are the prior's middle.
-        unknown: the parameters.
-        limits: some of `LIMITS`; by default 20 deg, 120 deg/s, 3 m, 30 s, and the usual deflections of each axis
-            (`DEFAULT_AMPLITUDE`). An amplitude above the largest of these enlarges all in proportion.
-        band: lowest and highest frequency [Hz].
-        axes: that may be moved; all that the vehicle has where None.
-        criterion: "D" (least volume of the error ellipsoid) or "A" (least sum of squared relative errors).
-        robust: "average" over draws of the prior, or for the "worst" of them.
-        spread: the unknowns are drawn within this share about the model's; 0 trusts the model.
-        draws: how many, the model itself among them.
-        noise: of air and sensors. Where None, what the model's own identification found; else (and where that estimated
-            a wind, beside which the gusts say too little) what fits of indoor flights begin with.
-        controller: of the closed loop; the hold of the vehicle's kind where None.
-        rate: of the series and of the log [Hz].
-        seed: of the draws.
-        say: told what is being done.
-
-    Raises:
-        ManeuverError: where nothing feasible tells all that is unknown, with what stands in the way.
-        IdentificationError: an unknown parameter, or a vehicle whose pose is not tracked.
     """
+    vehicle = find_vehicle(asked.vehicle) if isinstance(asked.vehicle, str | Path) else asked.vehicle
+    flies = from_file(asked.controller) if isinstance(asked.controller, str | Path) else asked.controller
+    unknown, band, spread, draws, rate = strings(asked.unknown), asked.band, asked.spread, asked.draws, asked.rate
     unknown = tuple(dict.fromkeys(unknown))
-    kept = _checked_limits(limits or {})
-    _checked(criterion, robust, spread, draws, band, rate)
-    moved = _axes_of(vehicle, axes)
-    seconds, (expected, source) = kept["seconds"], _expected_noise(vehicle, noise)
+    kept = _checked_limits(asked.limits or {})
+    if not 0.0 < band[0] < band[1] <= 0.4 * rate:
+        raise ManeuverError(
+            f"is {band[0]:g} to {band[1]:g} Hz, expected it to rise to at most {0.4 * rate:g} Hz.", channel="band"
+        )
+    moved = _axes_of(vehicle, None if asked.axes is None else strings(asked.axes))
+    seconds, (expected, source) = kept["seconds"], _expected_noise(vehicle, asked.noise)
     if "battery" in kept and seconds + 2.0 * LEAD > kept["battery"]:
         raise ManeuverError(
             f"{seconds:g} s and {2.0 * LEAD:g} s of hover are more than the battery's {kept['battery']:g} s.",
@@ -102,11 +78,11 @@ def design_maneuver(
         )
     peak = _deflections(moved, kept.get("amplitude"))
     say("linearising the draws of the prior")
-    models = _draws(vehicle, unknown, spread, draws, seed)
+    models = _draws(vehicle, unknown, spread, draws, asked.seed)
     values = np.array([abs(vehicle.numbers[n].value) or 1.0 for n in unknown])
     known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
     seen = [sensed(one, unknown) for one in models]
-    told = DesignDraws(models, seen, unknown, expected, rate, controller or usual_hold, values)
+    told = DesignDraws(models, seen, unknown, expected, rate, flies or usual_hold, values)
     say("probing the closed loop")
     numbers = np.concatenate(lines)
     owner = np.repeat(np.arange(len(moved)), [own.size for own in lines])
@@ -117,7 +93,7 @@ def design_maneuver(
     )
     allowed = np.array([(peak[axis] / _PEAK) ** 2 for axis in moved])
     say("choosing powers")
-    power = best_powers(per_power, owner, allowed, known, criterion=criterion, worst=robust == "worst")
+    power = best_powers(per_power, owner, allowed, known, criterion=asked.criterion, worst=asked.robust == "worst")
     powers = {a: dict(zip(lines[i].tolist(), power[owner == i], strict=True)) for i, a in enumerate(moved)}
     design = composed(powers, duration=seconds, peak=peak)
     table = {axis: (lines[i] / seconds, [r[owner == i] for r in responses]) for i, axis in enumerate(moved)}
@@ -152,8 +128,8 @@ def design_maneuver(
         tuple(offers),
         tuple(buys),
         kept,
-        criterion,
-        robust,
+        asked.criterion,
+        asked.robust,
         len(models),
         spread,
         rate,
@@ -200,22 +176,10 @@ def _deflections(moved: Sequence[str], largest: float | None) -> dict[str, float
     return {axis: min(largest, share * one) for axis, one in usual.items()}
 
 
-def _checked(criterion: str, robust: str, spread: float, draws: int, band: tuple[float, float], rate: float) -> None:
-    for channel, value, expected in (("criterion", criterion, ("D", "A")), ("robust", robust, ("average", "worst"))):
-        if value not in expected:
-            raise ManeuverError(f"is '{value}', expected {' or '.join(expected)}.", channel=channel)
-    if not 0.0 <= spread < 1.0 or draws < 1:
-        raise ManeuverError(f"a spread of {spread:g} with {draws} draws makes no sense.", channel="spread")
-    if not 0.0 < band[0] < band[1] <= 0.4 * rate:
-        raise ManeuverError(
-            f"is {band[0]:g} to {band[1]:g} Hz, expected it to rise to at most {0.4 * rate:g} Hz.", channel="band"
-        )
-
-
-def _expected_noise(vehicle: Vehicle, noise: Noise | None) -> tuple[Noise, str]:
+def _expected_noise(vehicle: Vehicle, noise: Mapping[str, float] | Noise | None) -> tuple[Noise, str]:
     """Noise to design for, and in words whose it is."""
     if noise is not None:
-        return noise, "as given"
+        return Noise(**noise) if isinstance(noise, Mapping) else noise, "as given"
     learnt = observer_of(vehicle)[0]
     if not vehicle.card.observer.get("noise") or learnt.wind > 0.0:
         return Noise(), "usual indoors"

@@ -1,97 +1,125 @@
-"""Models, controllers and flights in the formats of other programs, from what a user calls them."""
+"""Models and controllers in the formats of other programs, from what a user calls them."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from swashplate.api.asking import drawn, linear_model, strings
+from swashplate.api.saying import Say
 from swashplate.control.kinds import read_controller
-from swashplate.engine.c_expression import Precision, identifier
+from swashplate.documents import kind_of
+from swashplate.engine.c_expression import identifier
+from swashplate.errors import ExportError, SwashError
 from swashplate.export import formats
 from swashplate.export.control_json import read_linear
 from swashplate.export.controller_c import controller_code
 from swashplate.export.formats import Export, Model
+from swashplate.export.linear import Linear
 from swashplate.export.matlab import read_matlab
-from swashplate.flights.flight import Flight
-from swashplate.models.catalogue import vehicle
+from swashplate.flights.readers.options import is_log
+from swashplate.models.catalogue import vehicle as find
+from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim_curve import trim_curve
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.export import ExportModel
 
 
-def opened(model: str | os.PathLike[str]) -> Model:
-    """The model that a name or a file stands for: matrices of an export, or a vehicle of any kind.
-
-    Raises:
-        SwashError: where there is none, or its file is wrong.
-    """
-    place = os.fspath(model)
-    ending = Path(place).suffix.lower()
-    if ending == ".json":
-        return read_linear(place)
-    if ending == ".mat":
-        return read_matlab(place)
-    return vehicle(place)
-
-
-def export_model(
-    model: str | os.PathLike[str] | Model,
-    form: str,
-    *,
-    name: str | None = None,
-    trim: Trim | None = None,
-    precision: Precision = "double",
-    delays: bool | None = None,
-    controller: Controller | str | Path | None = None,
-    draws: Sequence[Vehicle] = (),
-    flight: Flight | None = None,
-) -> Export:
-    """A vehicle or a linear model in another program's format; `.save(folder)` writes it.
-
-    Args:
-        model: a vehicle or a linear model, or its name or file (also `.json` and `.mat` of an export).
-        form: "c", "fmu", "control", "matlab", "simulink", "web" (a page in which it flies), or another package's.
-        name: what files and C functions begin with; the model's own name where None.
-        trim: where a vehicle starts, and what its linear model is about; hover where None.
-        precision: of C ("double" or "single"); the other formats are double.
-        delays: take along a vehicle's identified input delays; where the card knows them if None.
-        controller: what flies it on the page of "web", or its file; the page's own pilot where None.
-        draws: models that a fit cannot tell from it (`fit.draw(5)`), which fly beside it on that page.
-        flight: that it was learnt from, as logged: it replays beside the model there.
-
-    Raises:
-        ExportError: where the format cannot hold the model, CasADi is missing, or the compiler refuses the sources.
-        TrimError: where a vehicle has no hover.
-    """
-    if isinstance(model, str | os.PathLike):
-        name, model = name or Path(model).stem, opened(model)
-    flown = read_controller(controller) if isinstance(controller, str | Path) else controller
+def export_asked(asked: ExportModel, say: Say) -> Export:
+    """The files that were asked for."""
+    if asked.form not in formats.FORMATS:
+        hint = f"There are {', '.join(formats.FORMATS)}."
+        raise ExportError(f"'{asked.form}' is no format.", channel="--format", hint=hint)
+    given, flown, name = asked.model, asked.controller, asked.name
+    if name is None and asked.one_file and asked.out is not None:
+        name = asked.out.stem
+    if is_log(given, matrices=asked.form != "web"):
+        return _page(asked, name, say)
+    if isinstance(given, str | Path):
+        if kind_of(given) == "controller":
+            return _controller(asked, given, name)
+        name = name or Path(given).stem
+    model, at = _model(asked)
     return formats.export_model(
         model,
-        form,
+        asked.form,
         name=name or model.name,
-        trim=trim,
-        precision=precision,
-        delays=delays,
-        controller=flown,
-        draws=draws,
-        flight=flight,
+        trim=at,
+        precision="single" if asked.precision == "float" else "double",
+        delays=asked.delays,
+        controller=read_controller(flown) if isinstance(flown, str | Path) else flown,
+        draws=_draws(asked, model),
+        flight=asked.logged(),
     )
 
 
-def export_controller(path: str | Path, *, name: str | None = None, precision: Precision = "double") -> Export:
-    """A controller's file as the C of its step.
+def _page(asked: ExportModel, name: str | None, say: Say) -> Export:
+    """The page of a log."""
+    from swashplate.api.web_log import export_log
 
-    Args:
-        path: what `swash control decouple` or `swash control design` wrote.
-        name: what the file begins with; the controller file's name where None.
-        precision: "double" or "single".
+    where, form = str(asked.model), f"--format {asked.form}"
+    if asked.form != "web":
+        raise SwashError("is a log: --format web writes its page.", where=where, channel=form)
+    given = {"--speed": asked.speed, "--set": asked.changes, "delays": asked.delays, "controller": asked.controller}
+    given |= {"posterior": asked.posterior, "flight": asked.flight}
+    refused = [one for one, value in given.items() if value is not None]
+    if refused:
+        raise SwashError("is for vehicles, and this is a log.", where=where, channel=", ".join(refused))
+    stamps = "drop" if asked.drop_bad_stamps else "error"
+    return export_log(
+        where,
+        name=name,
+        keep=strings(asked.keep),
+        units=asked.units,
+        mapping=asked.mapping,
+        bad_stamps=stamps,
+        say=say,
+    )
 
-    Raises:
-        SwashError: where the file is wrong, or the controller has no C yet.
-    """
-    read = read_controller(path)
-    code = controller_code(read, precision="float" if precision == "single" else "double")
+
+def _controller(asked: ExportModel, path: str | Path, name: str | None) -> Export:
+    """A controller's file as the C of its step."""
+    if asked.form != "c":
+        raise SwashError("is a controller: --format c writes its step.", where=path, channel=f"--format {asked.form}")
+    only_vehicles = {"--speed": asked.speed, "--set": asked.changes, "delays": asked.delays}
+    if refused := [option for option, value in only_vehicles.items() if value is not None]:
+        raise SwashError("is for vehicles, and this is a controller.", where=path, channel=", ".join(refused))
+    code = controller_code(read_controller(path), precision=asked.precision)  # pyrefly: ignore[bad-argument-type]
     told = f"One step: {code.operations} operations, {code.work_bytes} bytes of temporaries."
     return Export({f"{identifier(name or Path(path).stem)}.c": code.source.encode()}, (told,))
+
+
+def _model(asked: ExportModel) -> tuple[Model, Trim | None]:
+    """What is exported, and the trim where it starts (None: a linear model has no other)."""
+    given = asked.model
+    ending = Path(given).suffix.lower() if isinstance(given, str | Path) else ""
+    model: Model
+    if ending in _MATRICES:
+        model = _MATRICES[ending](given)
+    elif isinstance(given, Linear | StateSpaceModel):
+        model = given
+    elif (isinstance(given, Vehicle) and given.structure is not None) or linear_model(given) is not None:
+        model = find(given) if isinstance(given, str | Path) else given
+    else:
+        vehicle = asked.flying(given)
+        return vehicle, trim_curve(vehicle, (asked.speed or 0.0,)).trims[0]
+    if asked.speed is not None or asked.changes:
+        hint = "Export it as it is."
+        raise SwashError("is a linear model: it has no speed, card or options to change.", where=str(given), hint=hint)
+    return model, None
+
+
+def _draws(asked: ExportModel, model: Model) -> Sequence[Vehicle]:
+    if not isinstance(asked.draws, int):
+        return asked.draws
+    if asked.posterior is None or not isinstance(model, Vehicle):
+        return ()
+    return drawn(model, asked.posterior, count=asked.draws)
+
+
+_MATRICES: Mapping[str, Callable[[str | Path], Linear]] = {".json": read_linear, ".mat": read_matlab}
+"""What an export wrote, by its ending."""

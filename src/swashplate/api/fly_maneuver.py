@@ -1,18 +1,17 @@
-"""The verb `fly_maneuver`: a maneuver flown by a vehicle, as a flight like any other."""
+"""A maneuver flown by a vehicle, as a flight like any other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from swashplate.api.controllers import flown_by
 from swashplate.control.laws.hold import hover_hold
 from swashplate.control.laws.state_hold import state_hold
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
-from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.flights.tabular import write_csv
 from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
@@ -24,7 +23,9 @@ from swashplate.simulation.controller import Controller
 from swashplate.simulation.sensors import QUIET, Sensors, observe
 from swashplate.simulation.trim import Trim
 
-SensorSet = Literal["none", "clean", "real"]
+if TYPE_CHECKING:
+    from swashplate.api.verbs.simulate import Simulate
+
 _HELD = 0.02  # share of a flight that an input may stand at a limit before that is said
 _WIND = ("wind_north", "wind_east", "wind_down")
 
@@ -95,61 +96,32 @@ def save_flight(flight: Flight, path: str | Path) -> tuple[Path, ...]:
     raise SwashError(f"ends in '{Path(path).suffix}', expected .nc or .csv.", where=path)
 
 
-def fly_maneuver(
-    vehicle: Vehicle,
-    maneuver: Maneuver | str,
-    *,
-    controller: Controller | str | Path | None = None,
-    pilot: bool = False,
-    sensors: SensorSet = "none",
-    voltage: float | None = None,
-    sag: float = 0.0,
-    speed: float = 0.0,
-    rate: float = 100.0,
-    wind: Mapping[str, float] | None = None,
-    seed: int = 0,
-) -> SimulatedFlight:
-    """Fly a maneuver from hover or steady flight under a controller.
-
-    Args:
-        vehicle: what flies.
-        maneuver: one, or its description, e.g. "sweep:pitch,0.5-8Hz,60s".
-        controller: one, or its file; the hold of the vehicle's kind where not given.
-        pilot: roll and pitch are a pilot's commands to the controller.
-        sensors: "none" for the true states, motion capture with noise only ("clean"), or with gaps and outliers.
-        voltage: the battery's at the start [V]; the card's nominal one where not given.
-        sag: its fall [V/s].
-        speed: ahead, that the maneuver begins at [m/s].
-        rate: samples per second [Hz].
-        wind: "wind_north", "wind_east", "wind_down" [m/s].
-        seed: of all that is random.
+def fly(asked: Simulate, vehicle: Vehicle) -> SimulatedFlight:
+    """The flight that was asked for, of a vehicle with its changes.
 
     Raises:
         ControllerError: where the controller is for another vehicle.
         DivergenceError: where the flight was lost, with the flight up to there.
     """
-    if pilot and controller is None:
-        raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
     remarks = []
-    if controller is None and vehicle.traits.coaxial and any(input_delays(vehicle).values()):
+    if asked.controller is None and vehicle.traits.coaxial and any(input_delays(vehicle).values()):
         remarks.append("The hover hold acts at once; identified delays are left out.")
-
     truth = simulate_maneuver(
         vehicle,
-        maneuver,
-        controller=holding(controller, seed=seed),
-        pilot=pilot,
-        speed=speed,
-        voltage=voltage,
-        sag=sag,
-        rate=rate,
-        wind=wind,
+        asked.maneuver,
+        controller=holding(asked.controller, seed=asked.seed),
+        pilot=asked.pilot,
+        speed=asked.speed,
+        voltage=asked.voltage,
+        sag=asked.sag,
+        rate=asked.rate,
+        wind=dict(zip(_WIND, asked.wind, strict=True)),
     )
     remarks += [f"{words}." for words in truth.provenance.notes] + _at_limits(vehicle, truth)
     seen = truth
-    if sensors != "none":
-        seen = observe(truth, vehicle, sensors=QUIET if sensors == "clean" else Sensors(), seed=seed)
-    return SimulatedFlight(vehicle, str(maneuver), truth, seen, tuple(remarks))
+    if asked.sensors != "none":
+        seen = observe(truth, vehicle, sensors=QUIET if asked.sensors == "clean" else Sensors(), seed=asked.seed)
+    return SimulatedFlight(vehicle, str(asked.maneuver), truth, seen, tuple(remarks))
 
 
 def holding(

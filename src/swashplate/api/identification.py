@@ -1,17 +1,17 @@
-"""The verb `identify_and_validate`: a vehicle from flights, judged on others."""
+"""A vehicle from flights, judged on others."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from swashplate.api.asking import called, strings
 from swashplate.api.report_folder import ReportFolder
-from swashplate.api.saying import Say, silent
+from swashplate.api.saying import Say
+from swashplate.engine.roots import require_casadi
 from swashplate.errors import IdentificationError
 from swashplate.flights.checked import check_disjoint
-from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core import stopping
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
@@ -21,15 +21,18 @@ from swashplate.identification.identify import identify
 from swashplate.identification.posterior import check_posterior
 from swashplate.identification.posterior import posterior as draw_posterior
 from swashplate.identification.time.feedback import FlightDetails
-from swashplate.models.card import Card
-from swashplate.models.traits import Free
+from swashplate.models.catalogue import vehicle as find
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.structure import Report
 from swashplate.reporting.summary import banners, summary
+from swashplate.reporting.terminal_tables import fit_table
 from swashplate.validation.controller_law import check_closed
 from swashplate.validation.validation import Validation
 from swashplate.validation.verb import validate
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.identify import FitVehicle
 
 TRACKED = ("filter-error", "output-error")
 """Methods that are checked for a tracked pose before anything is computed."""
@@ -58,7 +61,7 @@ class Identification(ReportFolder):
 
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON, without time histories."""
-        validation = self.validation and self.validation.as_dict()
+        validation = self.validation and self.validation.to_document()
         return {"fit": self.fit.to_document(comparisons=False), "validation": validation}
 
     def page(self, *, title: str | None = None) -> Report:
@@ -75,6 +78,25 @@ class Identification(ReportFolder):
         if self.fit.posterior is not None:
             self.fit.posterior.save(folder / "posterior.nc")
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the user must know beside the report."""
+        return ()
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why the fit, or its posterior, may not be used; empty where all is well."""
+        if self.fit.failed:
+            return (f"The fit failed: {' '.join(self.fit.problems) or 'see the report.'}",)
+        return (f"The fit is written, its posterior is not: {self.refused}",) if self.refused else ()
+
+    def parts(self) -> list[Any]:
+        """What a terminal shows: tables and texts."""
+        fit = self.fit
+        shown: list[Any] = [fit_table(fit) if isinstance(fit.solution, Vehicle) else repr(fit)]
+        shown += [f"\n{fit.posterior!r}"] if fit.posterior is not None else []
+        return [*shown, "\n" + "\n".join(self.lines())]
+
     def lines(self) -> list[str]:
         """The report's own warnings and five lines, in words."""
         if not isinstance(self.fit.solution, Vehicle):
@@ -87,55 +109,30 @@ class Identification(ReportFolder):
         return "\n".join([repr(self.fit), *told, "", *self.lines()])
 
 
-def identify_and_validate(
-    vehicle: Vehicle,
-    flights: Flight | Iterable[Flight],
-    *,
-    hold_out: Flight | Iterable[Flight] = (),
-    free: str | Sequence[str | Free] = "full",
-    method: str = "filter-error",
-    outputs: Sequence[str] | None = None,
-    ties: Sequence[str] = (),
-    fixed: Mapping[str, float] | None = None,
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    prior_card: Card | None = None,
-    iterations: int = 60,
-    keep_unexcited: bool = False,
-    wind: bool = False,
-    leave_out: Sequence[tuple[float, float]] = (),
-    horizon: Sequence[float] | None = None,
-    residual: bool = False,
-    close_loop: Sequence[str] = (),
-    posterior: str | None = None,
-    names: Sequence[str] | None = None,
-    say: Say = silent,
-) -> Identification:
-    """Identify a vehicle from conditioned flights and, where it has not failed, predict others with it.
-
-    Args:
-        vehicle: the equations and the numbers to start from.
-        flights: conditioned, with their pose tracked.
-        hold_out: conditioned flights that the fit never sees.
-        free, method, outputs, ties, fixed, priors, prior_card: as of `identify`.
-        iterations, keep_unexcited, wind, leave_out, horizon, residual: as of `identify`.
-        close_loop: as of `validate`.
-        posterior: "laplace" or "nuts" for draws of what the fit does not know (`swashplate.posterior`).
-            One that did not converge is left out, and `refused` says why.
-        names: what the user calls the flights and the hold-outs, for messages.
-        say: told what is being done.
-
-    Raises:
-        FlightError: where a hold-out is a stretch that the fit sees, or a flight lacks a channel.
-        IdentificationError: where no fit can be started.
-    """
-    seen = as_flights(flights)
-    unseen = as_flights(hold_out)
-    check_disjoint([*seen, *unseen], names)
+def identify_vehicle(asked: FitVehicle, say: Say) -> Identification:
+    """The vehicle that was asked for, and how it predicts what its fit has not seen."""
+    method, posterior, iterations = asked.method or "filter-error", asked.posterior, asked.iterations or 60
+    card = (asked.prior or {}).get("")
+    prior_card = None if card is None else find(card).card  # pyrefly: ignore[bad-argument-type]
+    vehicle = asked.vehicle if isinstance(asked.vehicle, Vehicle) else find(asked.vehicle or "")
+    require_casadi()
+    say("reading flights")
+    seen, unseen = asked.conditioned(asked.flight), asked.conditioned(asked.hold_out)
+    named, free = (called(asked.flight), called(asked.hold_out)), strings(asked.free)
+    check_disjoint([*seen, *unseen], None if None in named else [*(named[0] or ()), *(named[1] or ())])
+    question: dict[str, Any] = {
+        "free": free[0] if len(free) == 1 else free,
+        "ties": strings(asked.tie),
+        "fixed": asked.fix,
+        "priors": {name: value for name, value in (asked.prior or {}).items() if name} or None,
+        "prior_card": prior_card,
+    }
+    outputs, close_loop = None if asked.outputs is None else strings(asked.outputs), strings(asked.close_loop)
     # What can be said without computing is said at once, before the seconds that loading and compiling take.
     check_method(method)
     if posterior is not None:
         check_posterior(posterior)
-        if posterior != "laplace" and horizon is not None:
+        if posterior != "laplace" and asked.horizon is not None:
             raise IdentificationError(
                 f"errors ahead are no likelihood, and {posterior} draws from one.",
                 channel="posterior",
@@ -144,7 +141,7 @@ def identify_and_validate(
     if close_loop:
         check_closed(vehicle, close_loop)
     if vehicle.structure is None or method in TRACKED:
-        parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
+        parameterize(vehicle, **question)
     if method in TRACKED:
         records([*seen, *unseen], vehicle, outputs=outputs)
     say("preparing the fit (compiling takes longest the first time)")
@@ -152,20 +149,16 @@ def identify_and_validate(
         fit = identify(
             vehicle,
             seen,
-            free=free,
             method=method,
             outputs=outputs,
-            ties=ties,
-            fixed=fixed,
-            priors=priors,
-            prior_card=prior_card,
             iterations=iterations,
-            keep_unexcited=keep_unexcited,
-            wind=wind,
-            leave_out=leave_out,
-            horizon=horizon,
-            residual=residual,
+            keep_unexcited=asked.keep_unexcited,
+            wind=asked.wind,
+            leave_out=asked.leave_out,
+            horizon=asked.horizon,
+            residual=asked.residual,
             progress=lambda i, cost: say("fitting", done=i, total=iterations, note=f"iteration {i}, cost {cost:.6g}"),
+            **question,
         )
     fit, refused = stopping.told(fit), ""
     if posterior is not None and not fit.failed:

@@ -35,6 +35,18 @@ Logs: TypeAlias = Any
 """A flight, its file or a data set's name, or several."""
 FlightLimits: TypeAlias = Any
 Gusts: TypeAlias = Any
+Pilot: TypeAlias = Any
+"""A controller, or its file."""
+Fitted: TypeAlias = Any
+"""What an identification found, or its file."""
+Judged: TypeAlias = Any
+"""A validation, or its file."""
+Drawn: TypeAlias = int | Sequence[Any]
+"""How many models are drawn from a fit, or the models."""
+Rule: TypeAlias = str | float
+Motion: TypeAlias = Any
+"""A maneuver, or its description."""
+GainsFile: TypeAlias = Mapping[str, float] | Path
 Battery: TypeAlias = tuple[float, float]
 Log: TypeAlias = Any
 """One of them."""
@@ -53,16 +65,21 @@ class Language:
         repeated: whether the option may be given several times.
         metavar: of its option.
         kind: "bool", "int", "float", "path" or "text": what a shell is told.
-        one: whether a text in a settings file is one element of a repeated one.
+        judge: what no value may be, however it was given; called as `read`.
     """
 
     read: Callable[[Any, str], Any]
     repeated: bool = False
     metavar: str = ""
     kind: str = "text"
+    judge: Callable[[Any, str], Any] | None = None
 
     def taken(self, value: Any, *, called: str) -> Any:
         """A value of Python, of a settings file or of a line as what the field holds."""
+        made = self._taken(value, called)
+        return made if self.judge is None or made is None else self.judge(made, called)
+
+    def _taken(self, value: Any, called: str) -> Any:
         if value is None or isinstance(value, bool):
             return value
         if isinstance(value, str | Path):
@@ -183,6 +200,8 @@ def _renamed(text: str, called: str) -> dict[str, str]:
 
 
 _RANGE_POINTS = 11
+_SHORTEST_DELAY = 0.5
+"""ms: a number below it was meant in seconds."""
 
 
 def speeds(text: str, called: str = "--speed") -> tuple[float, ...]:
@@ -202,14 +221,28 @@ def _stretches(texts: Sequence[str], called: str) -> tuple[tuple[float, float], 
 
 
 def _delays(texts: Sequence[str], called: str) -> dict[str, float] | float:
-    """`20` for all inputs (ms), or `NAME=20` each; in seconds."""
+    """`20` for all inputs, or `NAME=20` each [ms]."""
     plain = len(texts) == 1 and "=" not in texts[0]
-    told = {"": numbers(texts[0], called, count=1)[0]} if plain else numbers_by_name(texts, called)
-    for name, value in told.items():
-        if not 0.0 <= value <= 1000.0:
-            shown = f"{name}={value:g}" if name else f"{value:g}"
+    return numbers(texts[0], called, count=1)[0] if plain else numbers_by_name(texts, called)
+
+
+def _judged_delays(value: Mapping[str, float] | float, called: str) -> Mapping[str, float] | float:
+    """Delays in ms; what can only be seconds is refused."""
+    for name, one in (value if isinstance(value, Mapping) else {"": value}).items():
+        shown = f"{name}={one:g}" if name else f"{one:g}"
+        if not 0.0 <= one <= 1000.0:
             raise SwashError(f"is {shown} ms, expected 0 to 1000.", channel=called)
-    return told[""] / 1e3 if plain else {name: value / 1e3 for name, value in told.items()}
+        if 0.0 < one < _SHORTEST_DELAY:
+            hint = f"{1e3 * one:g} for {one:g} s."
+            raise SwashError(f"is {shown} ms, expected 0, or {_SHORTEST_DELAY:g} or more.", channel=called, hint=hint)
+    return value
+
+
+def in_seconds(milliseconds: Any) -> Any:
+    """One number, or several by name; None where there is none."""
+    if isinstance(milliseconds, Mapping):
+        return {name: value / 1e3 for name, value in milliseconds.items()}
+    return None if milliseconds is None else milliseconds / 1e3
 
 
 def _priors(texts: Sequence[str], called: str) -> dict[str, Any]:
@@ -258,6 +291,13 @@ _LANGUAGES: Mapping[str, Language] = {
     "int": Language(_whole, kind="int", metavar="N"),
     "float": Language(_number, kind="float", metavar="NUMBER"),
     "Path": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
+    "Judged": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
+    "Drawn": Language(_whole, kind="int", metavar="N"),
+    "Rule": Language(_same),
+    "Fitted": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
+    "Motion": Language(_same, metavar="SPEC"),
+    "Pilot": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
+    "GainsFile": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
     "Paths": Language(lambda texts, _: tuple(map(Path, texts)), repeated=True, kind="path", metavar="FILE"),
     "Names": Language(names, metavar="NAME,..."),
     "Texts": Language(lambda texts, _: tuple(texts), repeated=True, metavar="TEXT"),
@@ -272,7 +312,7 @@ _LANGUAGES: Mapping[str, Language] = {
     "Switches": Language(_switches, repeated=True, metavar="NAME=VALUE"),
     "Words": Language(assignments, repeated=True, metavar="NAME=VALUE"),
     "Renamed": Language(_renamed, metavar="NAME[=CHANNEL],..."),
-    "Delays": Language(_delays, repeated=True, metavar="MS"),
+    "Delays": Language(_delays, repeated=True, metavar="MS", judge=_judged_delays),
     "Priors": Language(_priors, repeated=True, metavar="CARD|NAME=MEAN,SIGMA"),
     "Logs": Language(lambda texts, _: tuple(texts), repeated=True, metavar="LOG"),
     "FlightLimits": Language(assignments, repeated=True, metavar="NAME=VALUE"),

@@ -68,17 +68,21 @@ class LinearStudy(ReportFolder):
 
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON."""
-        verification = self.verification and self.verification.as_dict()
+        verification = self.verification and self.verification.to_document()
         if self.fit is None:
             return dict(verification or {})
         document = {"fit": self.fit.to_document(comparisons=False), "verification": verification}
         if self.material.time_fit is not None:
             return document
         tried = [{"form": t.form.text, "J": t.cost, "unsound": t.unsound} for t in self.material.trials]
-        gains = [suggestion.as_dict() for suggestion in self.material.gains]
+        gains = [suggestion.to_document() for suggestion in self.material.gains]
         if self.material.search is not None:
-            document["search"] = self.material.search.as_dict()
-        return document | {"margins": [line.as_dict() for line in self.margins], "gains": gains, "tried": tried}
+            document["search"] = self.material.search.to_document()
+        return document | {"margins": [line.to_document() for line in self.margins], "gains": gains, "tried": tried}
+
+    def parts(self) -> list[Any]:
+        """What a terminal shows."""
+        return [repr(self)]
 
     def page(self, *, title: str | None = None) -> Report:
         """What `sp.report` writes."""

@@ -1,4 +1,4 @@
-"""The verb `monte_carlo`: one controller on many aircraft in many gusts, and the worst flight kept."""
+"""One controller on many aircraft in many gusts, and the worst flight kept."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swashplate.api.asking import flight_limits, turbulence
 from swashplate.api.controllers import flown_by
 from swashplate.api.fly_maneuver import save_flight
 from swashplate.arrays import Array
-from swashplate.control.draws.spread import Limits, Spread, spread
+from swashplate.control.draws.spread import Spread, spread
 from swashplate.control.draws.variations import (
     SENSOR_NOISE,
     bounds_of,
@@ -30,18 +31,18 @@ from swashplate.control.lateness import lateness
 from swashplate.engine.law import REFERENCES
 from swashplate.errors import DivergenceError, SwashError
 from swashplate.flights.flight import Flight
-from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
-from swashplate.identification.core.result import Result
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.monte_carlo import compose_monte_carlo
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
 from swashplate.simulation.closed_loop_batch import Batch, simulate_closed_loops
-from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim, trim
-from swashplate.simulation.wind import Gusts, dryden
+from swashplate.simulation.wind import dryden
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.simulate import FlyMany
 
 _LEAD, _TAIL = 3.0, 3.0  # s of hover before and after, as `simulate_maneuver` has them
 _PHYSICS = 500.0  # Hz at least
@@ -116,63 +117,24 @@ class MonteCarlo(Shown):
         return "\n".join((f"late: {self.late}", *careful, repr(self.spread)))
 
 
-def monte_carlo(
-    vehicle: Vehicle,
-    controller: Controller | str | Path,
-    *,
-    maneuver: Maneuver | str,
-    count: int = 100,
-    fit: Result[Any, Any] | str | Path | None = None,
-    gusts: Gusts | None = None,
-    voltage: float | None = None,
-    sag: float = 0.0,
-    battery: tuple[float, float] | None = None,
-    tolerances: bool = False,
-    vary: Mapping[str, float | str] | None = None,
-    payload: float = 0.0,
-    delay: float = 0.0,
-    bits: int | None = None,
-    limits: Limits | None = None,
-    seed: int = 0,
-) -> MonteCarlo:
-    """Fly one controller on many aircraft.
-
-    Args:
-        vehicle: the model; of a linear one the parameters of its structure are drawn.
-        controller: one, or its file.
-        maneuver: a pilot's commands, only roll and pitch; of a controller that takes none, added to its inputs. An axis
-            x, y, z, psi, ahead or right is asked of every controller. "hover:20s" moves nothing.
-        count: how many flights.
-        fit: what an identification found, or its file; aircraft are drawn from its covariance.
-        gusts: turbulence, `swashplate.simulation.wind.INDOOR` or `outdoor(...)`; None for still air.
-        voltage, sag: the battery's at the start [V], the card's nominal one where not given, and its fall [V/s].
-        battery: instead of both, its voltage at the start and at the end [V].
-        tolerances: draw the card's numbers from their sigmas too.
-        vary: standard deviations of the card's numbers by name, in their units or as "5%".
-        payload: the most that an aircraft carries [kg].
-        delay: the longest further delay of the commands to the actuators [s]; identified ones are flown anyhow.
-        bits: in which a command is told over its input's range; None for exact commands.
-        limits: beyond which a flight is lost; a place is not judged where a speed is asked for.
-        seed: of draws, gusts and sensor noise; every source has its own from it.
-
-    Raises:
-        SwashError: what the model has no equation for, a maneuver that the controller cannot be told.
-        ControllerError: a controller for another vehicle, a file that is none, a number that the card does not have.
-    """
+def fly_many(asked: FlyMany, vehicle: Vehicle) -> MonteCarlo:
+    """The flights that were asked for, of a vehicle with its changes."""
+    maneuver, count, seed, battery = asked.maneuver, asked.count, asked.seed, asked.battery
     excitation = parse_maneuver(maneuver) if isinstance(maneuver, str) else maneuver
     if battery is not None and not 0.0 < battery[1] <= battery[0]:
         raise SwashError(f"'{battery[0]:g}-{battery[1]:g}' does not fall.", channel="battery")
+    gusts, sag, delay, bits = turbulence(asked.gusts), asked.sag, asked.delay, asked.command_bits
     model = vehicle.structure
     if model is not None:
-        _only_what_is_linear(model, gusts=gusts is not None, payload=payload > 0.0, battery=bool(battery or sag))
+        _only_what_is_linear(model, gusts=gusts is not None, payload=asked.payload > 0.0, battery=bool(battery or sag))
     draws = _linear_draws if model is not None else _draws
-    drawn = draws(model or vehicle, fit, count=count, seed=seed, tolerances=tolerances, vary=vary, payload=payload)
-    nominal = vehicle.card.values().get("voltage_nominal") if voltage is None else voltage
+    drawn = draws(model or vehicle, asked)
+    nominal = vehicle.card.values().get("voltage_nominal") if asked.voltage is None else asked.voltage
     hover = trim(vehicle, voltage=nominal if battery is None else battery[0])
-    pilot, name = flown_by(controller, vehicle, hover, seed=seed)
+    pilot, name = flown_by(asked.controller, vehicle, hover, seed=seed)
     kind = kind_of(pilot)
-    asked = [axis for axis in excitation.axes if axis in _ASKED]
-    strange = [axis for axis in excitation.axes if kind.takes_stick and axis not in ("roll", "pitch", *asked)]
+    followed = [axis for axis in excitation.axes if axis in _ASKED]
+    strange = [axis for axis in excitation.axes if kind.takes_stick and axis not in ("roll", "pitch", *followed)]
     if strange:
         raise SwashError(
             f"moves {', '.join(strange)}; with many flights a maneuver is a pilot's roll or pitch, or asks for "
@@ -194,11 +156,11 @@ def monte_carlo(
         size=count,
         parameters=drawn or None,
         reference={n: at_start.get(n, 0.0) * (n not in _SPEEDS) + s for n, s in signals.items() if n in REFERENCES}
-        if kind.takes_stick or asked
+        if kind.takes_stick or followed
         else None,
         excitation=None
         if kind.takes_stick
-        else excitation.offsets(time - _LEAD, inputs=vehicle.input_names, axes=vehicle.stick_axes, without=asked),
+        else excitation.offsets(time - _LEAD, inputs=vehicle.input_names, axes=vehicle.stick_axes, without=followed),
         wind=blowing,
         voltage=float(hover.environment.voltage) - fall * time,
         noise=None if kind.own_sensors else SENSOR_NOISE,
@@ -209,16 +171,23 @@ def monte_carlo(
         rate=pilot.rate * max(1, round(_PHYSICS / pilot.rate)),
         keep=max(1, round(pilot.rate / _KEPT)),
     )
-    moves_on = any(axis in _SPEEDS for axis in asked)
-    judged = limits or Limits()
+    moves_on = any(axis in _SPEEDS for axis in followed)
+    judged = flight_limits(asked.limit)
     outcome = spread(flown, hover, limits=replace(judged, place=math.inf) if moves_on else judged)
     worst = _up_to_divergence(flown, outcome.worst)
     own = {name: float(values[outcome.worst]) for name, values in drawn.items()}
-    remarks: tuple[str, ...] = (_NO_STICK,) if not kind.takes_stick and set(excitation.axes) - set(asked) else ()
+    remarks: tuple[str, ...] = (_NO_STICK,) if not kind.takes_stick and set(excitation.axes) - set(followed) else ()
     remarks += (_MOVES_ON,) if moves_on else ()
-    remarks += not_followed(flown, hover, {n: signals[n] for n in asked}, time - _LEAD)
+    remarks += not_followed(flown, hover, {n: signals[n] for n in followed}, time - _LEAD)
     worst = worst.done("drawn", seed=seed, number=outcome.worst, delay=float(late[outcome.worst]), parameters=own)
-    settings = {"count": count, "seed": seed, "payload": payload, "delay": delay, "voltage_fall": fall, "bits": bits}
+    settings = {
+        "count": count,
+        "seed": seed,
+        "payload": asked.payload,
+        "delay": delay,
+        "voltage_fall": fall,
+        "bits": bits,
+    }
     told = lateness(vehicle, pilot, given=None) + further
     return MonteCarlo(vehicle, name, outcome, worst, flown, drawn, told, remarks, settings)
 
@@ -261,44 +230,27 @@ _MOVES_ON = "a speed is asked for: the place is not judged."
 _NO_STICK = "this controller takes no pilot's command; the maneuver moves its inputs."
 
 
-def _draws(
-    vehicle: Any,
-    fit: Result[Any, Any] | str | Path | None,
-    *,
-    count: int,
-    seed: int,
-    tolerances: bool,
-    vary: Mapping[str, float | str] | None,
-    payload: float,
-) -> dict[str, Array]:
+def _draws(vehicle: Any, asked: FlyMany) -> dict[str, Array]:
     """Numbers of the card of every aircraft, those that differ. Every source of randomness has its own seed, so that
     adding one leaves the others as they were."""
-    drawn = {} if fit is None else draw_models(vehicle, fit, count=count, seed=seed)
-    known = tolerances_of(vehicle) if tolerances else {}
+    count, seed = asked.count, asked.seed
+    drawn = {} if asked.fit is None else draw_models(vehicle, asked.fit, count=count, seed=seed)
+    known = tolerances_of(vehicle) if asked.tolerances else {}
     sigmas = {name: value for name, value in known.items() if name not in drawn}
-    sigmas |= _varied({name: p.value for name, p in vehicle.card.parameters.items()}, vary)
+    sigmas |= _varied({name: p.value for name, p in vehicle.card.parameters.items()}, asked.vary)
     drawn = draw_numbers(vehicle, sigmas, count=count, seed=seed + 1_000_003, about=drawn)
-    if payload:
-        drawn = load_them(vehicle, drawn, most=payload, count=count, seed=seed + 2_000_003)
+    if asked.payload:
+        drawn = load_them(vehicle, drawn, most=asked.payload, count=count, seed=seed + 2_000_003)
     return drawn
 
 
-def _linear_draws(
-    model: Any,
-    fit: Result[Any, Any] | str | Path | None,
-    *,
-    count: int,
-    seed: int,
-    tolerances: bool,
-    vary: Mapping[str, float | str] | None,
-    payload: float,
-) -> dict[str, Array]:
+def _linear_draws(model: Any, asked: FlyMany) -> dict[str, Array]:
     """Entries of A and B of every aircraft."""
-    del payload
-    drawn = {} if fit is None else draw_models(model, fit, count=count, seed=seed)
-    known = bounds_of(model) if tolerances else {}
+    count, seed = asked.count, asked.seed
+    drawn = {} if asked.fit is None else draw_models(model, asked.fit, count=count, seed=seed)
+    known = bounds_of(model) if asked.tolerances else {}
     sigmas = {name: value for name, value in known.items() if name not in drawn}
-    sigmas |= _varied({name: p.value for name, p in model.parameters.items()}, vary)
+    sigmas |= _varied({name: p.value for name, p in model.parameters.items()}, asked.vary)
     drawn = vary_parameters(model, sigmas, count=count, seed=seed + 1_000_003, about=drawn)
     return entries_of(model, drawn, count=count) if drawn else {}
 

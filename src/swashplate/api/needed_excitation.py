@@ -1,4 +1,4 @@
-"""The verb `needed_excitation`: what the next flight must have, from how the last ones were predicted.
+"""What the next flight must have, from how the last ones were predicted.
 
 A model's error some time ahead is nearly the same on every flight of an aircraft; fit % is one minus that error over
 how far the flight moved. So a flight that moves little shows nothing, however good the model is.
@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from swashplate.documents import read
 from swashplate.errors import SwashError
@@ -17,6 +16,9 @@ from swashplate.flights.schema import channel as known
 from swashplate.shown import Saved
 from swashplate.text_table import text_table
 from swashplate.validation.validation import Validation
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.maneuver import NeedManeuver
 
 _HINT = "Give the validation.json that `swash identify --hold-out` or `swash validate` writes."
 _UNJUDGED = "cannot be judged"
@@ -94,18 +96,9 @@ class _Document:
     not_logged: tuple[str, ...] = ()
 
 
-def needed_excitation(
-    validation: Validation | str | Path, *, fit: float = 70.0, horizon: float = 1.0
-) -> NeededExcitation:
-    """How far the next flight must move for its predictions to show a wanted fit, and what else it must have.
-
-    Args:
-        validation: of a vehicle on flights that its fit had not seen, or the file that it was saved to.
-        fit: wanted [%]. horizon: seconds ahead, one of those that were validated.
-
-    Raises:
-        SwashError: where the file is no such document, the fit is not between 0 and 100, or the horizon is not there.
-    """
+def needed_for(asked: NeedManeuver) -> NeededExcitation:
+    """What was asked of a validation."""
+    validation, fit, horizon = asked.validation, asked.fit, asked.ahead
     if not 0.0 < fit < 100.0:
         raise SwashError(f"is {fit:g} %, expected more than 0 and less than 100.", channel="fit")
     told: Validation | _Document = (
@@ -116,7 +109,7 @@ def needed_excitation(
     there = sorted({floor.horizon for floor in told.floors if math.isfinite(floor.horizon)})
     if not any(abs(horizon - one) < 1e-9 for one in there):
         has = ", ".join(f"{one:g}" for one in there) or "no horizon"
-        raise SwashError(f"is {horizon:g} s, and the validation has {has}.", channel="horizon", hint=_HINT)
+        raise SwashError(f"is {horizon:g} s, and the validation has {has}.", channel="ahead", hint=_HINT)
     left = 1.0 - fit / 100.0
     movements = tuple(
         Movement(floor.channel, floor.rms, floor.moved, floor.rms / left)

@@ -1,24 +1,23 @@
-"""One local page for any log: `sp.open_logs`, `swash open`."""
+"""One local page for any log."""
 
 from __future__ import annotations
 
 import os
 import socket
 import threading
-from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from swashplate.api.saying import announce
+from swashplate.api.saying import Say, announce, ready
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights import datasets
 
+if TYPE_CHECKING:
+    from swashplate.api.verbs.look import Open
+
 USUAL = 8019
 """The port of the page, where it is free."""
-
-
-def _silent(_: str) -> None:
-    """Says nothing."""
 
 
 def _listening(host: str, port: int | None, *, allow_remote: bool) -> socket.socket:
@@ -33,35 +32,8 @@ def _listening(host: str, port: int | None, *, allow_remote: bool) -> socket.soc
         return serving.listen(host, 0, allow_remote=allow_remote)
 
 
-def open_logs(
-    logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
-    *,
-    units: Mapping[str, str] | None = None,
-    mapping: str | os.PathLike[str] | None = None,
-    bad_stamps: str = "error",
-    host: str = "127.0.0.1",
-    port: int | None = None,
-    allow_remote: bool = False,
-    open_page: bool = False,
-    say: Callable[[str], None] = _silent,
-    ready: Callable[[str], None] = print,
-) -> None:
-    """Look at logs in the browser until it is interrupted: plots, findings, spectra, track, and sweeps to gains.
-
-    More logs may be dropped onto the page. Nothing leaves this machine.
-
-    Args:
-        logs: files, files of public data sets, or "examples/NAME"; none for a page with examples, to drop logs onto.
-        units, mapping, bad_stamps: as of `sp.read`, for every log given.
-        host, port: where the page is; port 0 takes any free one, None 8019 or, where that is taken, any free one.
-        allow_remote: let other machines open the page.
-        open_page: open it in the browser.
-        say: told what is being done.
-        ready: told the page's address when it can be opened.
-
-    Raises:
-        SwashError: where a file is not there, or the address is taken.
-    """
+def serve_logs(asked: Open, say: Say) -> None:
+    """The page of logs until it is interrupted. Nothing leaves this machine."""
     from swashplate.links.logs.app import logs_app
     from swashplate.links.logs.code_lines import Read
     from swashplate.links.logs.desk import Desk
@@ -69,20 +41,20 @@ def open_logs(
     from swashplate.links.web import serving
     from swashplate.links.web.libraries import check_page
 
-    options = Remedy(dict(units or {}), bad_stamps == "drop")
+    options = Remedy(dict(asked.units or {}), asked.drop_bad_stamps)
     given = []
-    for name in (logs,) if isinstance(logs, str | os.PathLike) else tuple(logs):
+    for name in asked.logs or ():
         path = Path(datasets.locate(os.fspath(name)))
         if not path.exists():
             raise FlightError("there is no such file.", where=path, hint="Check the name, or drop it onto the page.")
-        given.append((path, Read(os.fspath(name), options, "" if mapping is None else os.fspath(mapping))))
+        given.append((path, Read(os.fspath(name), options, "" if asked.mapping is None else os.fspath(asked.mapping))))
     check_page()
-    with _listening(host, port, allow_remote=allow_remote) as listening:
+    with _listening(asked.host, asked.port, allow_remote=asked.allow_remote) as listening:
         desk = Desk(given)
         threading.Thread(target=desk.read_given, daemon=True).start()
         try:
             with suppress(KeyboardInterrupt):  # from when the address is told, an interrupt is the ordinary end
-                announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
-                serving.serve(logs_app(desk, remote=allow_remote), listening)
+                announce(serving.address_of(listening), open_page=asked.open_page, ready=ready, say=say)
+                serving.serve(logs_app(desk, remote=asked.allow_remote), listening)
         finally:
             desk.close()

@@ -9,16 +9,18 @@ The type that a field is annotated with says how its text is read
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Literal, TypeVar
+from typing import Any, ClassVar, Generic, Literal, ParamSpec, TypeVar, cast
 
 from swashplate.api.languages import Language, language_of
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 Answer = TypeVar("Answer")
+Fields = ParamSpec("Fields")
 Place = Literal["argument", "option", "setting"]
 
 
@@ -100,6 +102,9 @@ class VerbQuestion(Generic[Answer]):
         """Do what is asked."""
         raise NotImplementedError
 
+    def finish(self, answer: Any) -> None:
+        """What the command line does with the answer, also without `--out`."""
+
     def ours(self, out: Path) -> tuple[str, ...]:
         """What of a folder was written by an earlier run, and goes."""
         return self.files
@@ -110,7 +115,9 @@ class VerbQuestion(Generic[Answer]):
 
     def write(self, answer: Any, folder: Path, names: tuple[str, ...]) -> None:
         """Write the named files into a folder that is there; by default as the result does."""
-        if hasattr(answer, "write"):
+        from swashplate.api.report_folder import ReportFolder
+
+        if isinstance(answer, ReportFolder):
             answer.write(folder)
             return
         for name in names:
@@ -118,27 +125,56 @@ class VerbQuestion(Generic[Answer]):
                 from swashplate.reporting.report import report
 
                 report(answer, path=folder / name)
-            elif name.endswith(".c"):
-                answer.code().save(folder / name)
             else:
                 answer.save(folder / name)
 
     def document(self, answer: Any) -> Any:
         """What `--json` prints."""
-        told = getattr(answer, "to_document", None) or answer.as_dict
-        return told()
+        return answer.to_document()
 
     def text(self, answer: Any, width: int) -> list[Any]:
         """What is printed: texts and tables."""
         return [repr(answer)]
 
-    def remarks(self, answer: Any) -> list[str]:
+    def remarks(self, answer: Any) -> Sequence[str]:
         """What is said on standard error, whatever is printed."""
-        return [f"Careful: {words}" for words in getattr(answer, "remarks", ())]
+        return ()
 
-    def problems(self, answer: Any) -> list[str]:
+    def problems(self, answer: Any) -> Sequence[str]:
         """What could not be computed, or may not be used: exit code 2."""
-        return list(getattr(answer, "problems", ()))
+        return ()
+
+
+def verb(name: str, question: Callable[Fields, VerbQuestion[Answer]]) -> Callable[Fields, Answer]:
+    """A question as a function of `swashplate`: signature, help and checks are the question's.
+
+    Args:
+        name: of the function.
+        question: its class; `question(...).answer(say)` does the same, and tells how far it is.
+    """
+    kind = cast(type[VerbQuestion[Any]], question)
+
+    def asked(*args: Any, **fields: Any) -> Any:
+        return kind(*args, **fields).answer()
+
+    asked.__name__ = asked.__qualname__ = name
+    asked.__module__ = "swashplate"
+    fields = inspect.signature(kind)
+    asked.__signature__ = fields.replace(return_annotation=kind.answer.__annotations__["return"])  # type: ignore[attr-defined]
+    told, parts = entries(kind), (inspect.getdoc(kind) or "").partition("\nRaises:")
+    lines = [parts[0].rstrip(), "", "Args:"]
+    for field, (_, entry) in told.items():
+        choices = f" ({', '.join(entry.choices)})" if entry.choices else ""
+        lines.append(f"    {field}: {help_of(entry)}{choices}")
+    asked.__doc__ = "\n".join([*lines, *(["", f"Raises:{parts[2]}"] if parts[2] else [])])
+    return asked
+
+
+def help_of(entry: FieldText) -> str:
+    """What a field is for, with its unit."""
+    if not entry.unit or f"[{entry.unit}]" in entry.help:
+        return entry.help
+    return f"{entry.help.rstrip('.')} [{entry.unit}]."
 
 
 def entries(question: type[VerbQuestion[Any]]) -> Mapping[str, tuple[Language, FieldText]]:

@@ -1,11 +1,11 @@
-"""The verb `stitch`: linear models at several speeds become one model from hover to forward flight."""
+"""Linear models at several speeds become one model from hover to forward flight."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -16,11 +16,14 @@ from swashplate.models.catalogue import from_card
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure
-from swashplate.models.linear.stitching import Gradients, stitch_points
+from swashplate.models.linear.stitching import stitch_points
 from swashplate.models.linear.trimmed_matrices import TRIMMED
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim import Trim
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.vehicle import StitchModels
 
 Point: TypeAlias = LinearModel | StateSpaceModel | Vehicle | Result[Any, Any] | str | Path
 """A linear model at one speed, or its file."""
@@ -28,41 +31,28 @@ PointTrim: TypeAlias = Trim | Flight | Mapping[str, float]
 """Where a point stands: a trim, a flight whose means it is, or values by name."""
 
 
-def stitch(
-    points: Sequence[Point],
-    *,
-    trims: Sequence[PointTrim | None] | None = None,
-    gradients: Gradients | None = None,
-    title: str = "",
-) -> Vehicle:
-    """One model from linear models about steady flights at several speeds (Tobias and Tischler 2016).
-
-    Trims and derivatives are interpolated over the air speed ahead, gravity and kinematics are nonlinear. It trims,
-    linearises, flies, exports and is saved as any vehicle; `swashplate.models.linear.stitched` has the equations.
-    Between the points it is near what they were made of; beyond them trims and derivatives are held.
-
-    Args:
-        points: with equal states and inputs, each about a straight level flight: models of `linearize`, identified
-            models, fits, or files of them.
-        trims: of the points, in their order, before what a point says itself; None, or None for one, where its [trim]
-            says all.
-        gradients: how trims change with speed at the points: "derivatives", as the points' own derivatives say, which
-            keeps them; "trims", by differences of the trims, which then stand for the derivatives by speed. None takes
-            the first for linearised models and the second where a point was identified.
-        title: of the model; made of the speeds where "".
-
-    Raises:
-        CardError: fewer than two points, two at one speed, other states, inputs or units, no trim, no level flight,
-            kinematics or gravity that do not belong to the trim.
-        SwashError: trims that are not as many as the points, or a flight without what its means shall tell.
-    """
-    if trims is not None and len(trims) != len(points):
-        raise SwashError(f"{len(trims)} given for {len(points)} points, expected one each.", channel="trims")
+def stitch_asked(asked: StitchModels) -> Vehicle:
+    """The model that was asked for (Tobias and Tischler 2016)."""
+    listed = asked.points if isinstance(asked.points, list | tuple) else (asked.points,)
+    points = [one for point in listed for one in (_files(Path(point)) if isinstance(point, str | Path) else [point])]
+    if asked.trim is not None and len(asked.trim) != len(points):
+        raise SwashError(f"{len(asked.trim)} given for {len(points)} points, expected one each.", channel="--trim")
+    trims = [asked.read(one)[0] if isinstance(one, str | Path) else one for one in asked.trim or ()]
     names = [_name(point, k) for k, point in enumerate(points)]
     models = [_model(point) for point in points]
     told = trims or [None] * len(points)
     known = [_with_trim(m, t, n) for m, t, n in zip(models, told, names, strict=True)]
-    return from_card(stitch_points(known, names=names, gradients=gradients, title=title))
+    return from_card(stitch_points(known, names=names, gradients=asked.gradients, title=asked.title))  # pyrefly: ignore[bad-argument-type]
+
+
+def _files(place: Path) -> list[Path]:
+    """A point's file, or those of a folder."""
+    if not place.is_dir():
+        return [place]
+    files = sorted(place.glob("*.toml"))
+    if not files:
+        raise SwashError("has no .toml file in it.", where=place, channel="POINT")
+    return files
 
 
 def _name(point: Point, k: int) -> str:

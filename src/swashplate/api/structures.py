@@ -28,7 +28,7 @@ class Structures(Saved):
     ready: dict[str, str]
     parts: dict[str, str]
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         return {"ready": self.ready, "parts": self.parts}
 
     def __repr__(self) -> str:

@@ -1,17 +1,18 @@
-"""The verb `track`: a log replayed as a stream through recursive estimators, and their C."""
+"""A log replayed as a stream through recursive estimators, and their C."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from swashplate.api.fit_ss import linear
+from swashplate.api.asking import strings
+from swashplate.api.fit_linear import linear
 from swashplate.api.report_folder import ReportFolder
-from swashplate.api.saying import Say, silent
+from swashplate.api.saying import Say
 from swashplate.arrays import Array
 from swashplate.atomic import write_text
 from swashplate.engine.c_expression import Precision
@@ -26,10 +27,14 @@ from swashplate.identification.recursive.fourier_regression import RecursiveRegr
 from swashplate.identification.recursive.slow_parameters import slow_plan
 from swashplate.identification.recursive.tracked import Tracked, stream_of, tracked, tracked_parameters
 from swashplate.json_text import as_json
+from swashplate.models.catalogue import vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.structure import Report
 from swashplate.reporting.tracking import compose_tracking
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.track import TrackLog
 
 _MEGAHERTZ = 216.0
 """Clock of the slowest Cortex-M7 in flight controllers."""
@@ -182,77 +187,31 @@ def recursive_estimator(
         IdentificationError: an equation that is none, or settings that cannot work.
     """
     e = regression_equation(equation, delays=delays) if isinstance(equation, str) else equation
-    return RecursiveRegression(_plan(e, rate, band, spacing, memory, held, instruments))
+    return RecursiveRegression(
+        regression_plan(e, rate=rate, band=band, spacing=spacing, memory=memory, held=held, instruments=instruments)
+    )
 
 
-def _plan(
-    e: RegressionEquation,
-    rate: float,
-    band: tuple[float, float] | None,
-    spacing: float | None,
-    memory: float | None,
-    held: Sequence[str],
-    instruments: Sequence[str],
-) -> RegressionPlan:
-    return regression_plan(e, rate=rate, band=band, spacing=spacing, memory=memory, held=held, instruments=instruments)
+def follow_log(asked: TrackLog, say: Say) -> Tracking:
+    """What was asked for: equations by recursive Fourier regression (Morelli 2000), a vehicle's by a Kalman filter.
 
-
-def track(
-    flight: Flight,
-    equations: str | Sequence[str] | StateSpaceModel | Vehicle,
-    *,
-    rate: float | None = None,
-    band: tuple[float, float] | None = None,
-    spacing: float | None = None,
-    memory: float | None = None,
-    held: Sequence[str] = (),
-    instruments: Sequence[str] = (),
-    delays: Mapping[str, float] | None = None,
-    unknown: Sequence[str] = (),
-    spread: float = 0.2,
-    wander: float = 0.02,
-    every: float = 0.2,
-    names: Mapping[str, str] | None = None,
-    say: Say = silent,
-) -> Tracking:
-    """Replay a log as a stream through recursive estimators: what would have been known on board, and how well.
-
-    Equations go through recursive Fourier regressions (Morelli 2000), the `unknown` parameters of a vehicle through the
-    extended Kalman filter that flies in controllers. Nothing is conditioned: what was on board is what was logged. A
-    gap, a value that is no number and a clock that jumps freeze the estimate, and are told.
-
-    Args:
-        flight: as logged.
-        equations: texts such as "p_dot = Lp*p + La*aileron + bias", or a linear model, whose rows are taken and whose
-            inputs are held; with `unknown` a vehicle.
-        rate: samples per second [Hz]; the left side's usual rate where None.
-        band, spacing, memory, held: as of `recursive_estimator`.
-        instruments: as of it; each goes to the equations that have the channel on the right.
-        delays: seconds by channel; each goes to the equations that have the channel.
-        unknown: parameters of the vehicle.
-        spread: standard deviation of each at the start, as a share of the card's value.
-        wander: by how much of it each may wander in a second (standard deviation, growing with the root of time).
-        every: between looks at the estimate [s].
-        names: the log's channel by the name in the equations, where the log calls it otherwise.
-        say: told what is being done.
-
-    Raises:
-        IdentificationError: an equation that is none, none at all, or settings that cannot work.
-        FlightError: a channel that the flight lacks, or a stream of fewer than three samples.
+    Nothing is conditioned: what was on board is what was logged.
     """
-    renamed = with_names(flight, names or {})
+    flight = asked.read(asked.log)[0]
+    instruments, delays = strings(asked.instrument), dict(asked.delay or {})
+    renamed = with_names(flight, asked.rename or {})  # pyrefly: ignore[bad-argument-type]
     source, simulated = flight.provenance.source or "flight", flight.provenance.simulated
-    if unknown:
-        if not isinstance(equations, Vehicle):
-            raise IdentificationError("are a vehicle's: give the vehicle.", channel="unknown")
+    if unknown := strings(asked.unknown):
         say("estimating", note=", ".join(unknown))
-        one = _parameters(equations, renamed, tuple(unknown), rate, delays, spread, wander, every)
+        model = asked.vehicle if isinstance(asked.vehicle, Vehicle) else vehicle(asked.vehicle or "")
+        one = _parameters(model, renamed, unknown, asked.rate, delays, asked.spread, asked.wander, asked.every)
         return Tracking(source, simulated, (one,))
-    given = linear(equations) if isinstance(equations, Vehicle) else equations
-    texts, notes = _equations(given, renamed, dict(delays or {}))
+    given = strings(asked.equation) if asked.vehicle is None else linear(asked.vehicle)
+    texts, notes = _equations(given, renamed, delays)
     own = given.inputs if isinstance(given, StateSpaceModel) else ()
-    for what, names_given in (("held", held), ("instrument", instruments)):
-        strange = [name for name in names_given if not any(name in e.channels for e in texts)]
+    held = strings(asked.held)
+    for what, named in (("held", held), ("instrument", instruments)):
+        strange = [name for name in named if not any(name in e.channels for e in texts)]
         if strange:
             raise IdentificationError("stands in no equation.", channel=f"{what} {strange[0]}")
     if useless := [name for name in instruments if all(name == e.left for e in texts if name in e.channels)]:
@@ -265,12 +224,17 @@ def track(
     for e in texts:
         say("estimating", note=e.text)
         time, samples = stream_of(renamed, e.channels)
-        usual = _rate(time, source)
-        wanted = [name for name in dict.fromkeys((*held, *own)) if name in e.channels]
-        told = [name for name in instruments if name in e.channels and name != e.left]
-        plan = _plan(e, rate or usual, band, spacing, memory, wanted, told)
+        plan = regression_plan(
+            e,
+            rate=asked.rate or _rate(time, source),
+            band=asked.band,
+            spacing=asked.spacing,
+            memory=asked.memory,
+            held=[name for name in dict.fromkeys((*held, *own)) if name in e.channels],
+            instruments=[name for name in instruments if name in e.channels and name != e.left],
+        )
         units = {name: str(renamed[name].attrs.get("units", "")) for name in e.channels}
-        tracks.append(tracked(plan, time, samples, every=every, units=units))
+        tracks.append(tracked(plan, time, samples, every=asked.every, units=units))
     return Tracking(source, simulated, tuple(tracks), notes)
 
 
@@ -281,7 +245,7 @@ def _rate(time: Array, source: str) -> float:
 
 
 def _parameters(
-    vehicle: Vehicle,
+    model: Vehicle,
     flight: Flight,
     unknown: tuple[str, ...],
     rate: float | None,
@@ -298,14 +262,14 @@ def _parameters(
         wanted = "; ".join(f"{kind}: {', '.join(KINDS[kind].channels)}" for kind in ("imu", "gyro", "mocap"))
         raise FlightError(f"has the channels of no sensor ({wanted}).", where=source)
     channels = [name for kind in kinds for name in KINDS[kind].channels]
-    lacking = [name for name in vehicle.input_names if name not in flight]
+    lacking = [name for name in model.input_names if name not in flight]
     if lacking:
         raise FlightError("lacks inputs of the vehicle.", where=source, channel=", ".join(lacking))
     volts = ["voltage"] if "voltage" in flight else []
-    time, table = stream_of(flight, [*channels, *vehicle.input_names, *volts])
+    time, table = stream_of(flight, [*channels, *model.input_names, *volts])
     steps = round(rate or _rate(time, source), 6)
     plan = slow_plan(
-        vehicle,
+        model,
         unknown,
         sensors=suite(",".join(f"{kind}@{steps}+0ms" for kind in kinds)),
         rate=steps,
@@ -322,7 +286,7 @@ def _parameters(
 
 
 def _equations(
-    given: str | Sequence[str] | StateSpaceModel, flight: Flight, delays: dict[str, float]
+    given: Sequence[str] | StateSpaceModel, flight: Flight, delays: dict[str, float]
 ) -> tuple[tuple[RegressionEquation, ...], tuple[str, ...]]:
     if isinstance(given, StateSpaceModel):
         read, left_out = model_equations(given, flight.channels)
@@ -330,7 +294,7 @@ def _equations(
             raise IdentificationError(f"no equation can be estimated. {' '.join(left_out)}", where=given.name)
         notes = tuple(f"Left out: {words}" for words in left_out)
     else:
-        read = tuple(regression_equation(text) for text in ([given] if isinstance(given, str) else given))
+        read = tuple(regression_equation(text) for text in given)
         notes = ()
     if not read:
         raise IdentificationError("none is given.", channel="equation")

@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.api.fit_ss import fit_ss
-from swashplate.api.fit_tf import fit_tf
 from swashplate.api.linear_study import LinearStudy
+from swashplate.api.verbs.identify import fit_ss, fit_tf
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.conditioning.uniform_records import uniform_records
@@ -260,7 +259,7 @@ def following_structure(exact: FrequencyResponse, axes: Sequence[str]) -> Follow
 
 def _study(name: str, responses: FrequencyResponse, axes: Sequence[str]) -> LinearStudy:
     composed = {ours: MIXER_AXES[axis].input for ours, axis in _COMPOSED.items() if axis in axes}
-    return fit_ss(name, responses, names=composed if is_composed(name) else None)
+    return fit_ss(name, responses, rename=composed if is_composed(name) else None)
 
 
 def _answer(structure: StateSpaceModel, axis: str, omega: Array) -> Complex:

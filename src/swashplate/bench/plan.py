@@ -56,7 +56,7 @@ class MeasurementPlan(Saved):
         """Seconds of one pass."""
         return sum(record.duration for record in self.records)
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """Records and aims as JSON types."""
         records = [
             {"record": r.name, "procedures": r.procedures, "seconds": r.duration, "points": r.words}

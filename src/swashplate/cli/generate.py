@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from swashplate.api.languages import Language
-from swashplate.api.question import FieldText, VerbQuestion, check, default_of, entries, settings_of
+from swashplate.api.question import FieldText, VerbQuestion, check, default_of, entries, help_of, settings_of
 from swashplate.errors import SwashError
 
 _SHELL = {"bool": bool, "path": Path}
@@ -133,9 +133,7 @@ def _parameter(question: type[VerbQuestion[Any]], name: str, language: Language,
 
 def _told(entry: FieldText, default: Any) -> str:
     """The help of an option, with unit and default."""
-    parts = [entry.help]
-    if entry.unit and f"[{entry.unit}]" not in entry.help:
-        parts[0] = f"{entry.help.rstrip('.')} [{entry.unit}]."
+    parts = [help_of(entry)]
     if default is not dataclasses.MISSING and default not in (None, False, (), ""):
         shown = ",".join(map(str, default)) if isinstance(default, tuple) else default
         shown = f"{shown:g}" if isinstance(shown, float) else shown
@@ -154,7 +152,7 @@ def _out(question: type[VerbQuestion[Any]]) -> inspect.Parameter:
 
 
 def _help(question: type[VerbQuestion[Any]]) -> str:
-    return inspect.getdoc(question) or ""
+    return (inspect.getdoc(question) or "").partition("\nRaises:")[0].rstrip()
 
 
 def _settings_help(known: Mapping[str, tuple[Language, FieldText]]) -> str | None:

@@ -36,6 +36,7 @@ def carry_out(question: VerbQuestion[Any], outs: tuple[Path, ...]) -> None:
     with stoppable() as stop, progress(quiet=quiet or json, every=question.told_every) as line, ExitStack() as stack:
         places = [stack.enter_context(written(question, out, made)) for out in outs]
         answer = question.answer(line.say)
+        question.finish(answer)
         for place, names in places:
             line.say("writing")
             question.write(answer, place, names)

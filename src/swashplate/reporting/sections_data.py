@@ -140,7 +140,7 @@ def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> tu
     cards = {label: vehicle.card for label, vehicle in vehicles(fit, validation).items()}
     hashes += [(f"{label} card", card_hash(card)) for label, card in cards.items()]
     results: list[tuple[str, dict[str, Any]]] = [("fit", _numbers(fit))] if fit else []
-    results += [("validation", validation.as_dict())] if validation else []
+    results += [("validation", validation.to_document())] if validation else []
     hashes += [(f"numbers of the {label}", result_hash(result)) for label, result in results]
     return (
         Text(f"Written on {date()}."),

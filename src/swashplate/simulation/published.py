@@ -108,7 +108,7 @@ class PublishedComparison(Saved):
         ]
         return ["with, one after another", "mean", "within 10 %"], steps
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """Numbers and words as JSON types."""
         off = [self.differences(step.table) for step in self.steps]
         values = {

@@ -219,7 +219,7 @@ class OmissionStudy(Saved):
         ]
         return ("left out", "value", "modes", "responses"), cells
 
-    def as_dict(self) -> list[dict[str, Any]]:
+    def to_document(self) -> list[dict[str, Any]]:
         """Numbers as JSON types."""
         return [
             {"speed": speed, "left_out": [vars(each) for each in study]}

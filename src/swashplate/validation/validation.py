@@ -158,7 +158,7 @@ class Validation(Shown):
         texts = [in_brief(self.bands, horizon, drawn=drawn) for horizon in horizons] + [widened_words(self.bands)]
         return [text for text in texts if text]
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """Numbers and words as JSON types (no time histories)."""
         return {
             "kind": "validation",
@@ -187,7 +187,7 @@ class Validation(Shown):
         """Write it as a JSON file, whole: `swashplate.load` reads it back."""
         from swashplate.validation import saved
 
-        return saved.save(self, self.as_dict(), path)
+        return saved.save(self, self.to_document(), path)
 
     def __repr__(self) -> str:
         fits = {(s.channel, s.horizon, s.predictor): s.fit for s in self.scores}

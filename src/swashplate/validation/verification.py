@@ -118,7 +118,7 @@ class Verification(Shown):
     def __getitem__(self, output: str) -> OutputVerification:
         return next(o for o in self.outputs if o.output == output)
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """Numbers and words as JSON types (no time histories)."""
         return {
             "kind": "verification",
@@ -140,14 +140,14 @@ class Verification(Shown):
             "warnings": list(self.warnings),
             "flights": [vars(one) | {"history": [vars(step) for step in one.history]} for one in self.data],
             "band_hz": self.settings.get("band_hz"),
-            "inside_band": None if self.inside is None else self.inside.as_dict() | {"flights": []},
+            "inside_band": None if self.inside is None else self.inside.to_document() | {"flights": []},
         }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write it as a JSON file, whole: `swashplate.load` reads it back."""
         from swashplate.validation import saved
 
-        return saved.save(self, self.as_dict(), path)
+        return saved.save(self, self.to_document(), path)
 
     def __repr__(self) -> str:
         band = self.settings.get("band_hz")

@@ -84,8 +84,8 @@ def accept(out: Path, *, faults: str = "", axes: tuple[str, ...] = ("yaw",), **m
     try:
         gains = out.parent / "gains.parm"
         gains.write_text("".join(f"{name},{value}\n" for name, value in GAINS.items()))
-        given = {**QUICK, "name": "raptor50", "axes": axes, "instance": instance(), "defaults": [gains], **more}
-        return sp.accept_autopilot(RAPTOR, BINARY, out=out, **given)
+        given = {**QUICK, "axes": axes, "instance": instance(), "defaults": [gains], **more}
+        return sp.accept_autopilot("raptor50", BINARY, folder=out, **given)
     finally:
         del os.environ["SWASH_STANDIN"]
 
@@ -276,9 +276,7 @@ def test_binaries_that_are_none(tmp_path: Path) -> None:
     }
     for k, (binary, words) in enumerate(cases.items()):
         with pytest.raises(sp.SwashError, match=words):
-            sp.accept_autopilot(
-                RAPTOR, binary, out=tmp_path / f"out-{k}", name="raptor50", instance=instance(), timeout=1.0
-            )
+            sp.accept_autopilot("raptor50", binary, folder=tmp_path / f"out-{k}", instance=instance(), timeout=1.0)
 
 
 def test_ports_and_folders_that_are_taken(tmp_path: Path) -> None:
@@ -431,7 +429,7 @@ def coaxial(out: Path, *, axes: tuple[str, ...], seconds: float = 40.0, faults: 
     os.environ["SWASH_STANDIN"] = f"copter,{faults}"
     try:
         return sp.accept_autopilot(
-            COAX, BINARY, out=out, name="coax", axes=axes, instance=instance(), defaults=[gains],
+            "coax", BINARY, folder=out, axes=axes, instance=instance(), defaults=[gains],
             seconds=seconds, hover=3.0, height=3.0, timeout=60.0, speedup=100.0,
         )  # fmt: skip
     finally:

@@ -1,4 +1,4 @@
-"""`accept_betaflight`: what is no SITL of Betaflight, or never flies, is said in words and leaves nothing behind.
+"""A trial of Betaflight: what is no SITL of it, or never flies, is said in words and leaves nothing behind.
 
 A flight itself needs the firmware: what one gave is in `tests/unit/links/test_betaflight.py`.
 """
@@ -15,8 +15,11 @@ from typing import Any
 import pytest
 
 import swashplate as sp
-from swashplate.api.accept_betaflight import accept_betaflight
-from swashplate.api.link_betaflight import link_betaflight, write_betaflight_configuration
+from swashplate.api import accept_betaflight
+from swashplate.api.accept_betaflight import accept_multirotor
+from swashplate.api.link_betaflight import write_betaflight_configuration
+from swashplate.api.saying import silent
+from swashplate.api.verbs.link import Accept, LinkBetaflight
 from swashplate.links.betaflight import trial
 
 BINARY = Path(__file__).parents[2] / "betaflight_standin.py"
@@ -27,13 +30,15 @@ pytestmark = pytest.mark.xdist_group("betaflight")
 
 
 def accept(out: Path, *, binary: Path = BINARY, vehicle: Any = CRAZYFLIE, **more: Any) -> Any:
-    given = {"gains": GAINS, "pace": 1.0, "timeout": 20.0, **more}
-    return accept_betaflight(vehicle, binary, out=out, **given)
+    say = more.pop("say", silent)
+    asked = Accept(vehicle, binary, folder=out, **{"timeout": 20.0, **more})
+    return accept_multirotor(asked, asked.flying(vehicle), say, gains=GAINS)
 
 
 @pytest.fixture(autouse=True)
 def found_by_the_binary(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+    monkeypatch.setattr(accept_betaflight, "_PACE", 1.0)
     monkeypatch.setattr(trial, "_READY", 2.5)
     monkeypatch.setattr(trial, "_MEASURED", 1.5)
     monkeypatch.setattr(trial, "_STALLED", 2.0)
@@ -116,12 +121,12 @@ def test_ports_folders_and_vehicles_that_are_wrong(tmp_path: Path) -> None:
         accept(tmp_path / "axis", axes=("heave",))
     with pytest.raises(sp.SwashError, match="is no multirotor"):
         accept(tmp_path / "heli", vehicle=sp.vehicle("raptor50"))
-    with pytest.raises(sp.SwashError, match=r"expected 0\.02 to 1"):
-        accept(tmp_path / "fast", pace=2.0)
+    with pytest.raises(sp.SwashError, match=r"speedup: is 0\.01, expected 0\.1 to 100"):
+        accept(tmp_path / "slow", speedup=0.01)
 
 
 def test_a_link_that_nobody_comes_to(tmp_path: Path) -> None:
     with pytest.raises(sp.SwashError, match="no SITL of Betaflight runs here"):
-        link_betaflight(CRAZYFLIE, wait=0.3)
+        LinkBetaflight("crazyflie", wait=0.3).answer()
     with pytest.raises(sp.SwashError, match="the folder does not exist"):
         write_betaflight_configuration(CRAZYFLIE, tmp_path / "no" / "cli.txt")

@@ -171,11 +171,13 @@ def test_what_is_refused() -> None:
     with pytest.raises(LinkError, match="cannot be read"):
         read_parameter_file("nowhere.parm")
     with pytest.raises(SwashError, match="no servo mapping"):
-        sp.autopilot_gains(sp.vehicle("crazyflie"), name="crazyflie")
+        sp.autopilot_gains("crazyflie")
     with pytest.raises(ControllerError, match="ArduPilot's parameters only"):
         sp.autopilot_gains(sp.vehicle("coax"), autopilot="px4", notch=(26.0, 10.0))
-    with pytest.raises(ControllerError, match="expected ardupilot, px4"):
-        sp.autopilot_gains(sp.vehicle("coax"), autopilot="betaflight")  # type: ignore[arg-type]
+    with pytest.raises(SwashError, match="expected one of ardupilot, px4"):
+        sp.autopilot_gains(sp.vehicle("coax"), autopilot="betaflight")
+    with pytest.raises(SwashError, match=r"delay: is 0\.02 ms, expected 0, or 0\.5 or more\. 20 for 0\.02 s"):
+        sp.autopilot_gains("coax", delay=0.02)
 
 
 @pytest.mark.proof
@@ -185,7 +187,7 @@ def test_every_packaged_helicopter(name: str, autopilot: str, tmp_path: Path) ->
     """What is packaged is generated this way: margins, a stable sampled law, three modes flown nonlinearly."""
     if (name, autopilot) in (("helion", "px4"), ("xcell60", "px4")):
         pytest.skip("no packaged servo mapping for PX4")
-    made = sp.autopilot_gains(sp.vehicle(name), autopilot=autopilot, name=name)  # type: ignore[arg-type]
+    made = sp.autopilot_gains(name, autopilot=autopilot)  # type: ignore[arg-type]
     assert made.problems == ()
     vehicle = sp.vehicle(name)
     hover = sp.trim(vehicle, voltage=vehicle.card.values().get("voltage_nominal"))
@@ -203,25 +205,21 @@ def test_every_packaged_helicopter(name: str, autopilot: str, tmp_path: Path) ->
 @pytest.mark.proof
 def test_more_delay_gives_lower_gains_and_at_last_none() -> None:
     """Mutation of the model: the same helicopter with later commands gets softer loops; a late coaxial none."""
-    prompt, late = (
-        sp.autopilot_gains(sp.vehicle("raptor50"), delays=d, fly=False, name="raptor50") for d in (0.0, 0.03)
-    )
+    prompt, late = (sp.autopilot_gains("raptor50", delay=d, fly=False) for d in (0.0, 30.0))
     for name in ("ATC_RAT_RLL_P", "ATC_RAT_PIT_P", "PSC_VELXY_P"):
         assert late.parameters[name] < prompt.parameters[name]
     assert not late.problems
     with pytest.raises(ControllerError, match=r"no gains of the .* loop hold"):
-        sp.autopilot_gains(sp.vehicle("coax"), delays=0.04, fly=False)
+        sp.autopilot_gains(sp.vehicle("coax"), delay=40.0, fly=False)
 
 
 @pytest.mark.proof
 def test_a_notch_takes_its_phase_and_gains_with_it_in_the_loop_hold() -> None:
-    plain, notched = (
-        sp.autopilot_gains(sp.vehicle("raptor50"), notch=n, fly=False, name="raptor50") for n in (None, (12.0, 8.0))
-    )
+    plain, notched = (sp.autopilot_gains("raptor50", notch=n, fly=False) for n in (None, (12.0, 8.0)))
     assert notched.parameters["INS_HNTCH_FREQ"] == 12.0
     assert not notched.problems
     same = {**plain.parameters, "INS_HNTCH_ENABLE": 1.0, "INS_HNTCH_FREQ": 12.0, "INS_HNTCH_BW": 8.0}
-    kept = sp.autopilot_gains(sp.vehicle("raptor50"), parameters=same, fly=False, name="raptor50")
+    kept = sp.autopilot_gains("raptor50", parameters=same, fly=False)
     assert kept.found.loops[0].phase < plain.found.loops[0].phase - 5.0
 
 

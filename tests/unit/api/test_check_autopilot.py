@@ -107,7 +107,7 @@ def test_the_build_for_other_frames_is_named_by_its_type(right: dict[str, float]
     found = check(StandIn({k: v for k, v in right.items() if k.startswith("OTHER_")}, type=2))
     assert not any("MAVLink" in text for text in found.problems)
     with StandIn({"OTHER": 1.0}, type=common.MAV_TYPE_QUADROTOR) as there:
-        found = sp.check_autopilot(RAPTOR, "ardupilot", name="raptor50", mavlink=there.address, listen=0.3)
+        found = sp.check_autopilot("raptor50", "ardupilot", mavlink=there.address, listen=0.3)
     assert found.problems[0] == (
         "MAVLink's type 2: this is the build for multicopters and coaxials with two motors (arducopter), expected the "
         "one for helicopters (arducopter-heli)."
@@ -119,7 +119,7 @@ def test_the_build_for_other_frames_is_named_by_its_type(right: dict[str, float]
 def test_a_helicopter() -> None:
     right = as_written(parameters(servo_mapping("raptor50", RAPTOR), RAPTOR, sp.trim(RAPTOR)))
     with StandIn(right | {"ATC_HOVR_ROL_TRM": 300.0}) as there:
-        found = sp.check_autopilot(RAPTOR, "ardupilot", name="raptor50", mavlink=there.address, listen=0.3)
+        found = sp.check_autopilot("raptor50", "ardupilot", mavlink=there.address, listen=0.3)
     assert found.passed
     assert [p.name for p in found.parameters if p.verdict == "yours"] == ["ATC_HOVR_ROL_TRM"]
 

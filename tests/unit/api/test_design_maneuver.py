@@ -15,7 +15,7 @@ import pytest
 import swashplate as sp
 from swashplate.api.designed_maneuver import DesignedManeuver
 from swashplate.api.maneuver_script import maneuver_script
-from swashplate.errors import IdentificationError, ManeuverError
+from swashplate.errors import IdentificationError, ManeuverError, SwashError
 from swashplate.filtering.disturbances import Noise
 from swashplate.flights.maneuvers.composed import ComposedMultisine, composed
 
@@ -137,12 +137,12 @@ def test_its_files_are_the_series_and_the_card(tmp_path: Path) -> None:
         (UNKNOWN, {"limits": {"seconds": 40.0, "battery": 30.0}}, "battery: 40 s and 6 s of hover are more"),
         (UNKNOWN, {"limits": {"seconds": 2.0}}, r"seconds: 2 s hold 0.6 periods .* Fly at least 6\.67 s"),
         (UNKNOWN, {"axes": ("roll", "loop")}, "loop: is no axis of 'coax'"),
-        (UNKNOWN, {"criterion": "E"}, "is 'E', expected D or A"),
+        (UNKNOWN, {"criterion": "E"}, "'E' is unknown, expected one of D, A"),
         (UNKNOWN, {"band": (8.0, 0.5)}, "expected it to rise"),
     ],
 )
 def test_what_makes_no_sense_is_refused(unknown: Any, asked: dict[str, Any], words: str) -> None:
-    with pytest.raises(ManeuverError, match=words):
+    with pytest.raises(SwashError, match=words):
         sp.design_maneuver(sp.vehicle("coax"), unknown, **asked)
 
 

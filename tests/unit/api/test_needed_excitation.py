@@ -27,7 +27,7 @@ def _saved(folder: Path, **changed: Any) -> Path:
 
 def test_a_channel_must_move_by_its_error_over_what_may_be_missed(tmp_path: Path) -> None:
     """The CoaX: 0.065 rad of roll and 0.4 rad/s of roll rate for 70 %."""
-    found = sp.needed_excitation(_saved(tmp_path), fit=70.0, horizon=1.0)
+    found = sp.needed_excitation(_saved(tmp_path), fit=70.0, ahead=1.0)
     phi, p = found.movements
     assert (phi.channel, phi.needed) == ("phi", pytest.approx(0.065))
     assert (p.channel, p.needed) == ("p", pytest.approx(0.4))
@@ -47,6 +47,6 @@ def test_questions_without_an_answer_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SwashError, match=r"is 100 %, expected more than 0 and less than 100"):
         sp.needed_excitation(file, fit=100.0)
     with pytest.raises(SwashError, match=r"is 2 s, and the validation has 0\.5, 1"):
-        sp.needed_excitation(file, horizon=2.0)
+        sp.needed_excitation(file, ahead=2.0)
     with pytest.raises(SwashError, match=r"kind is 'fit', expected 'validation'"):
         sp.needed_excitation(_saved(tmp_path, kind="fit"))

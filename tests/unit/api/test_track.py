@@ -11,7 +11,7 @@ import pytest
 import swashplate as sp
 from short_period import TRUTH, short_period
 from swashplate.api.track import recursive_estimator
-from swashplate.errors import ExportError, FlightError, IdentificationError
+from swashplate.errors import ExportError, FlightError, IdentificationError, SwashError
 from swashplate.flights.flight import Flight, stream
 from swashplate.identification.recursive.fourier_regression import RegressionPlan
 from swashplate.identification.recursive.tracked import stream_of
@@ -64,7 +64,7 @@ def test_gusts_that_bias_are_told() -> None:
     assert calm.followed[0].notes == ()
     assert "bias the coefficients" in rough.followed[0].notes[0]
     assert "bias the coefficients" in repr(rough)
-    told = sp.track(flight_of(short_period(900, gust=0.8)), EQUATION, held=["servo_pitch"], instruments=["servo_pitch"])
+    told = sp.track(flight_of(short_period(900, gust=0.8)), EQUATION, held=["servo_pitch"], instrument=["servo_pitch"])
     assert told.followed[0].notes == ()
     assert told.to_document()["followed"][0]["instruments"] == ("servo_pitch",)
     with pytest.raises(ExportError, match="instruments: are for Python only"):
@@ -85,9 +85,9 @@ def test_slower_streams_keep_their_last_value_and_grow_stale() -> None:
 def test_models_give_their_equations_and_renamed_channels_are_found() -> None:
     model = sp.structure("yaw")
     with pytest.raises(IdentificationError, match="no equation can be estimated"):
-        sp.track(flight_of(short_period(400)), model)
+        sp.track(flight_of(short_period(400)), vehicle=model)
     other = flight_of(short_period(600))
-    renamed = sp.track(other, "r_dot = Nr*r + Nd*cmd + bias", names={"r": "q", "cmd": "servo_pitch"})
+    renamed = sp.track(other, "r_dot = Nr*r + Nd*cmd + bias", rename={"r": "q", "cmd": "servo_pitch"})
     assert renamed["Nr"][0] != 0.0
 
 
@@ -95,12 +95,12 @@ def test_models_give_their_equations_and_renamed_channels_are_found() -> None:
     ("equation", "arguments", "error"),
     [
         ("q_dot = Ma*alpha", {}, FlightError),
-        ("q_dot = Mq*q", {"delays": {"alpha": 0.1}}, IdentificationError),
+        ("q_dot = Mq*q", {"delay": {"alpha": 0.1}}, IdentificationError),
         ("q_dot = Mq*q", {"held": ["servo_pich"]}, IdentificationError),
-        ("q_dot = Mq*q", {"instruments": ["servo_pich"]}, IdentificationError),
-        ("q_dot = Mq*q", {"instruments": ["q"]}, IdentificationError),
-        ("q_dot = Mq*q", {"rate": 0.4}, IdentificationError),
-        ([], {}, IdentificationError),
+        ("q_dot = Mq*q", {"instrument": ["servo_pich"]}, IdentificationError),
+        ("q_dot = Mq*q", {"instrument": ["q"]}, IdentificationError),
+        ("q_dot = Mq*q", {"rate": 0.4}, SwashError),
+        ([], {}, SwashError),
     ],
 )
 def test_what_cannot_be_tracked_is_refused(equation: str, arguments: dict[str, object], error: type) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.api.bench import evaluate_bench, simulate_bench
+from swashplate.api.verbs.bench import evaluate_bench, simulate_bench
 from swashplate.bench.evaluate import evaluate
 from swashplate.bench.plan import plan as plan_bench
 from swashplate.bench.record import BenchRecord, read_record, write_record
@@ -213,7 +213,9 @@ def test_a_table_of_averaged_points_needs_no_time(coax: Vehicle, tmp_path: Path)
         evaluate(read_records(path), coax)
 
 
-@pytest.mark.parametrize("work", [plan_bench, simulate_bench, lambda vehicle: evaluate_bench(vehicle=vehicle)])
+@pytest.mark.parametrize(
+    "work", [plan_bench, lambda v: simulate_bench(vehicle=v), lambda v: evaluate_bench((), vehicle=v)]
+)
 def test_another_vehicle_than_the_bench_measures_is_refused(work: Callable[[Vehicle], object]) -> None:
     with pytest.raises(BenchError, match=r"raptor50: has the inputs theta0, B1, A1, theta0T, expected motor_lower"):
         work(sp.vehicle("raptor50"))

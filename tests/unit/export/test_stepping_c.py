@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import swashplate as sp
 from link_bench import PlainFloats
 from swashplate.api import link
-from swashplate.api.link import link_ardupilot
+from swashplate.api.verbs.link import LinkArduPilot
 from swashplate.compiler import compiler
 from swashplate.errors import DivergenceError, ExportError
 from swashplate.export import stepping_c
@@ -82,8 +81,9 @@ def test_a_compiler_that_fails_is_told_of_and_the_link_flies_on(monkeypatch: pyt
         raise ExportError("cc refused the exported sources: no math.h")
 
     monkeypatch.setattr(stepping_c, "loaded", refused)
+    monkeypatch.setattr(link, "notice", said.append)
     monkeypatch.setattr(link, "VirtualEngine", PlainFloats)  # nothing to compile
-    linked = link_ardupilot(sp.vehicle("coax"), port=0, idle_exit=0.1, notice=said.append)
+    linked = LinkArduPilot("coax", port=0, idle_exit=0.1).answer()
     assert linked.exchanges == 0
     assert said == [
         "The vehicle's C cannot be used here, a slower virtual machine steps instead: "

@@ -55,7 +55,7 @@ def test_a_command_and_its_rate(command: str, motion: str, gain: float, sense: f
     assert len(wrong) == (sense < 0.0)
     assert all(f"Give --unit {command}=-" in text for text in wrong)
     assert line in str(look)
-    assert look.as_dict()["signs"] == (line,) or look.as_dict()["signs"] == [line]
+    assert look.to_document()["signs"] == (line,) or look.to_document()["signs"] == [line]
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])

@@ -215,13 +215,13 @@ def test_it_prints_as_text_as_tables_and_as_json() -> None:
     for text in (str(found), console.file.getvalue()):  # type: ignore[attr-defined]
         for shown in ("a.csv: 4.0 s", "furlong", "not in the schema", "never moves", "a note"):
             assert shown in text
-    assert json.loads(json.dumps(found.as_dict(), allow_nan=False))["streams"][0]["n"] == N
+    assert json.loads(json.dumps(found.to_document(), allow_nan=False))["streams"][0]["n"] == N
 
 
 def test_single_samples_and_nothing_at_all() -> None:
     found = inspect(Flight({"log": stream([1.0], {"x": [2.0]})}))
     assert found.streams[0].n == 1
-    assert found.as_dict()["streams"][0]["rate"] is None
+    assert found.to_document()["streams"][0]["rate"] is None
     assert "x" in str(found)
     assert inspect(Flight({})).channels == ()
     assert "problems: none" in str(inspect(Flight({})))

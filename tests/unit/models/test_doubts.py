@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import swashplate as sp
-from swashplate.api.fly_maneuver import fly_maneuver
+from swashplate.api.verbs.simulate import Simulate
 from swashplate.errors import TrimError
 from swashplate.models.doubts import doubts, nominal_voltage
 
@@ -31,5 +31,5 @@ def test_a_helicopter_with_an_engine_has_no_battery() -> None:
 
 
 def test_a_flight_on_a_battery_far_from_the_cards_says_so() -> None:
-    flown = fly_maneuver(sp.vehicle("coax"), "hover:0.2s", voltage=7.0)
+    flown = Simulate("coax", "hover:0.2s", voltage=7.0).answer()
     assert any("the battery gives 7 V" in words for words in flown.remarks)

@@ -95,7 +95,7 @@ def test_a_trim_curve_tells_its_numbers_in_every_form(curve: TrimCurve) -> None:
     drawn = [panel.get_title(loc="left") for panel in curve.plot().axes]
     assert drawn == [head.replace("[1]", "[-]") for head in list(columns)[1:]]
     assert "0.500" in repr(curve)
-    assert [at["speed"] for at in curve.as_dict()["trims"]] == [0.0, 0.5]
+    assert [at["speed"] for at in curve.to_document()["trims"]] == [0.0, 0.5]
     assert "theta [deg]" in curve._repr_html_()
     with pytest.raises(SwashError, match="at least one speed"):
         trim_curve(curve.vehicle, ())
@@ -112,7 +112,7 @@ def test_derivatives_are_drawn_in_total_and_by_contributor() -> None:
     total, main, fin = (float(np.asarray(line.get_ydata())[0]) for line in panel.lines)
     assert main + fin == pytest.approx(total, rel=1e-5)
     assert total == pytest.approx(3.0 / 0.3048, rel=1e-5)
-    assert found.as_dict()["tables"][1]["derivatives"]["Xtheta0"]["value"] == pytest.approx(total)
+    assert found.to_document()["tables"][1]["derivatives"]["Xtheta0"]["value"] == pytest.approx(total)
     with pytest.raises(SwashError, match="expected one of X, Y, Z, L, M, N"):
         found.plot(row="Q")
     assert "Derivatives of Thunder Tiger Raptor 50" in found._repr_html_()

@@ -85,7 +85,7 @@ def test_the_truth_is_at_its_ceiling_and_a_spoilt_model_is_short_of_it() -> None
         assert (floor.fit, floor.rms) == (pytest.approx(found["p"].fit), pytest.approx(found["p"].rms))
         assert floor.low < floor.fit < floor.high
         assert floor.summary_text in repr(found)
-        assert found.as_dict()["floors"][0]["ceiling"] == floor.ceiling
+        assert found.to_document()["floors"][0]["ceiling"] == floor.ceiling
     assert good.floors[0].reached
     assert not spoilt.floors[0].reached
     assert spoilt.floors[0].gap_low > 5.0

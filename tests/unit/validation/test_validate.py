@@ -158,7 +158,7 @@ def test_the_result_is_plain_json_and_prints() -> None:
     import json
 
     found = _validation()
-    document = json.loads(json.dumps(found.as_dict()))
+    document = json.loads(json.dumps(found.to_document()))
     assert document["kind"] == "validation"
     assert [set(told) >= {"record", "delay_servo", "level_psi"} for told in document["calibrated"]] == [True]
     assert len(document["scores"]) == len(PREDICTED) * len(HORIZONS) * len(PREDICTORS)
@@ -178,7 +178,7 @@ def test_every_score_of_the_model_stands_beside_its_floor() -> None:
     assert 0.0 < phi.expected < phi.fit  # the usual gusts are promised, and this flight had none
     assert np.isnan(phi.low)  # five seconds of starts are too few blocks
     assert "filter expects" in repr(found)
-    assert found.as_dict()["floors"][0]["words"] == found.floors[0].summary_text
+    assert found.to_document()["floors"][0]["words"] == found.floors[0].summary_text
 
 
 def test_a_flight_that_is_over_before_it_is_calibrated_is_refused() -> None:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
 import msgspec
 
 from swashplate import documents
 from swashplate.api.campaigns.tasks import Columns, Portion, portions
+from swashplate.api.question import VerbQuestion, default_of, entries
 from swashplate.errors import CampaignError
 from swashplate.registry import Registry
+
+Asked = TypeVar("Asked", bound=VerbQuestion[Any])
 
 
 class CampaignSettings(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
@@ -134,6 +138,30 @@ CAMPAIGNS: Registry[CampaignKind] = Registry(
 def in_batches(settings: CampaignSettings, *, usual: int) -> tuple[Portion, ...]:
     """The campaign's rows in tasks of `batch`, or of `usual` where the file says nothing."""
     return portions(count=settings.count, batch=settings.batch or usual, seed=settings.seed)
+
+
+def schema_of(question: type[VerbQuestion[Any]]) -> type[CampaignSettings]:
+    """What the file of a campaign says whose tasks ask a verb: the words of the verb."""
+    words: list[Any] = []
+    for name in entries(question):
+        if name not in CampaignSettings.__struct_fields__:
+            default = default_of(question, name)
+            words.append((name, Any) if default is dataclasses.MISSING else (name, Any, default))
+    made = msgspec.defstruct(
+        f"{question.__name__}Campaign",
+        words,
+        bases=(CampaignSettings,),
+        forbid_unknown_fields=True,
+        kw_only=True,
+        frozen=True,
+    )
+    return cast(type[CampaignSettings], made)
+
+
+def question_of(settings: CampaignSettings, question: type[Asked], **instead: Any) -> Asked:
+    """The question of a campaign's file, some of its fields from elsewhere."""
+    own = {name: getattr(settings, name) for name in entries(question)}
+    return question(**own | instead)
 
 
 def settings_of(name: str, document: Mapping[str, Any], *, where: str = "") -> Any:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from swashplate.api.campaigns import worker
 from swashplate.api.campaigns.engine import CampaignStanding, TaskEngine, Work, carry_out
@@ -17,46 +17,25 @@ from swashplate.api.campaigns.results import Campaign, campaign_results
 from swashplate.api.campaigns.scheduler import DaskScheduler
 from swashplate.api.campaigns.store import FAILED, CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
-from swashplate.api.saying import Say, silent
+from swashplate.api.saying import Say
 from swashplate.errors import CampaignError, WriteError
 
+if TYPE_CHECKING:
+    from swashplate.api.verbs.campaign import ResumeCampaign, RunCampaign
 
-def campaign(
-    file: str | Path,
-    folder: str | Path,
-    *,
-    workers: int | None = None,
-    scheduler: DaskScheduler | str | None = None,
-    accept_changes: bool = False,
-    say: Say = silent,
-) -> Campaign:
+
+def run_campaign(asked: RunCampaign, folder: Path, say: Say) -> Campaign:
     """Compute a campaign, or what is left of it, into a folder.
 
     Stopped or killed at any moment it goes on where it was the next time: every task is named by the SHA-256 of what it
     depends on, and its result is a file that appears when it is complete.
-
-    Args:
-        file: the campaign's TOML file.
-        folder: its store; it is made, or holds what is done already.
-        workers: processes on this machine, one core each; as many as it has cores where None.
-        scheduler: of Dask, whose workers are taken instead; an address alone is one with TLS, whose files Dask's
-            configuration names.
-        accept_changes: go on with a file, or a program, that is not what the store was begun with: tasks whose inputs
-            are the same are kept, results of others are left out of the table.
-        say: told how far it is.
-
-    Raises:
-        CampaignError: a file that is none; one that has changed, with what has; a store that another client holds; no
-            scheduler, one without TLS that was not asked for, or a worker that is another program; nothing that can be
-            done.
-        WriteError: a store that cannot be written to.
     """
-    made, make = plan_campaign(file), _chosen(scheduler, workers)
+    made, make = plan_campaign(asked.file), _chosen(asked.where(), asked.workers)
     store = CampaignStore(folder)
     with store.held():
         if store.exists:
             changed = changes(store.plan(), made.stored())
-            if changed and not accept_changes:
+            if changed and not asked.accept_changes:
                 raise CampaignError(
                     f"was begun otherwise: {'; '.join(changed)}.",
                     where=store.folder,
@@ -72,35 +51,18 @@ def campaign(
     return campaign_results(folder)
 
 
-def resume_campaign(
-    folder: str | Path,
-    *,
-    workers: int | None = None,
-    scheduler: DaskScheduler | str | None = None,
-    retry_failed: bool = False,
-    say: Say = silent,
-) -> Campaign:
-    """Go on with a campaign where it was, from its folder alone.
-
-    Args:
-        folder: where it was begun.
-        workers, scheduler, say: as of `campaign`; they may be others than before.
-        retry_failed: try tasks again that were given up.
-
-    Raises:
-        CampaignError: no campaign there, another client at work, another program than it was begun with.
-        WriteError: a store that cannot be written to.
-    """
-    store, make = CampaignStore(folder), _chosen(scheduler, workers)
+def go_on(asked: ResumeCampaign, say: Say) -> Campaign:
+    """Go on with a campaign where it was, from its folder alone."""
+    store, make = CampaignStore(asked.folder), _chosen(asked.where(), asked.workers)
     store.plan()
     with store.held():
         made = planned_in(store)
         _check_same_program(made, store)
-        if retry_failed:
+        if asked.retry_failed:
             for name in store.failed():
                 (store.folder / FAILED / f"{name}.json").unlink(missing_ok=True)
         _finish(made, store, make, say=say)
-    return campaign_results(folder)
+    return campaign_results(asked.folder)
 
 
 def replay_campaign(folder: str | Path, number: int) -> Any:
@@ -148,21 +110,18 @@ def _check_same_program(made: CampaignPlan, store: CampaignStore) -> None:
         )
 
 
-def _chosen(scheduler: DaskScheduler | str | None, workers: int | None) -> Callable[[Work, int], TaskEngine]:
+def _chosen(scheduler: DaskScheduler | None, workers: int | None) -> Callable[[Work, int], TaskEngine]:
     """What makes the engine for so many tasks.
 
     Raises:
-        CampaignError: less than one worker; a scheduler without TLS, or files for TLS that are none.
+        CampaignError: a scheduler without TLS, or files for TLS that are none.
     """
-    if workers is not None and workers < 1:
-        raise CampaignError(f"is {workers}, expected one or more.", channel="workers")
     if scheduler is None:
         return lambda work, tasks: ProcessPool(work, workers=min(workers or cores(), tasks))
     from swashplate.api.campaigns.dask_engine import DaskEngine
 
-    named = DaskScheduler(scheduler) if isinstance(scheduler, str) else scheduler
-    named.security()  # what is wrong with it comes before anything is written
-    return lambda work, _: DaskEngine(work, scheduler=named, least=workers or 1)
+    scheduler.security()  # what is wrong with it comes before anything is written
+    return lambda work, _: DaskEngine(work, scheduler=scheduler, least=workers or 1)
 
 
 def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int], TaskEngine], *, say: Say) -> None:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import strings
 from swashplate.api.languages import Aircraft, Texts, Things
-from swashplate.api.question import Answer, VerbQuestion, argument, option, setting
+from swashplate.api.question import Answer, VerbQuestion, argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 from swashplate.models.usual import USUAL
 
 if TYPE_CHECKING:
     from swashplate.bench.plan import MeasurementPlan
+    from swashplate.bench.record import BenchRecord
     from swashplate.bench.result import Bench
     from swashplate.models.vehicle import Vehicle
 
@@ -48,14 +49,15 @@ class EvaluateBench(OnBench["Bench"]):
     )
 
     def answer(self, say: Say = silent) -> Bench:
-        from swashplate.api.bench import evaluate_bench
+        from swashplate.bench.evaluate import evaluate
+        from swashplate.bench.record import BenchRecord
         from swashplate.bench.record_files import read_records
 
         aircraft = self.published()
         say("reading records")
-        read = read_records(*self.records)
+        read = [one for g in self.records for one in ([g] if isinstance(g, BenchRecord) else read_records(str(g)))]
         say("evaluating the bench")
-        return evaluate_bench(*read, vehicle=aircraft)
+        return evaluate(read, aircraft)
 
     def write(self, answer: Bench, folder: Path, names: tuple[str, ...]) -> None:
         from swashplate.atomic import write_text
@@ -116,28 +118,40 @@ class PlanBench(OnBench["MeasurementPlan"]):
         ]
 
 
-class SimulateBench(OnBench[Any]):
+class SimulateBench(OnBench["tuple[BenchRecord, ...]"]):
     """Make the records of the virtual bench: the vehicle held still, by the equations of flight."""
 
-    folder: Path = argument(metavar="DIR", help="Folder for the records; it is made if missing.")
+    folder: Path | None = argument(default=None, metavar="DIR", help="Folder for the records; it is made if missing.")
     only: Texts = option(default=(), metavar="PROCEDURE", help="Only this procedure; may be repeated.")
     repeats: int = setting(default=1, help="passes through the points of each record.", least=1)
     seed: int = option(default=0, help="Seed of noise, bias, drift and vibration.", least=0)
 
-    def answer(self, say: Say = silent) -> Any:
+    def check_places(self, outs: tuple[Path, ...]) -> None:
+        if self.folder is None:
+            raise SwashError("is missing.", channel="DIR", hint="Name the folder for the records.")
+
+    def answer(self, say: Say = silent) -> tuple[BenchRecord, ...]:
         from swashplate import atomic
-        from swashplate.api.bench import simulate_bench
+        from swashplate.bench.plan import planned
         from swashplate.bench.record import write_record
+        from swashplate.bench.virtual_bench import repeated, virtual_bench
 
         say("simulating the bench (compiling takes longest the first time)")
-        records = simulate_bench(self.published(), only=strings(self.only), repeats=self.repeats, seed=self.seed)
-        with atomic.folder_when_complete(self.folder, ours=()) as folder:
-            for record in records:
-                write_record(record, folder / record.name)
+        aircraft = self.published()
+        wanted = [repeated(record, self.repeats) for record in planned(aircraft, strings(self.only))]
+        records = tuple(virtual_bench(aircraft, wanted, seed=self.seed))
+        if self.folder is not None:
+            with atomic.folder_when_complete(self.folder, ours=()) as folder:
+                for record in records:
+                    write_record(record, folder / record.name)
         return records
 
     def document(self, answer: Any) -> Any:
-        return {"written": [str(self.folder / record.name) for record in answer]}
+        return {"written": [str((self.folder or Path()) / record.name) for record in answer]}
 
     def text(self, answer: Any, width: int) -> list[Any]:
         return [f"{len(answer)} records in {self.folder}: {', '.join(record.name for record in answer)}"]
+
+
+evaluate_bench = verb("evaluate_bench", EvaluateBench)
+simulate_bench = verb("simulate_bench", SimulateBench)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.question import Answer, VerbQuestion, argument, option, setting
+from swashplate.api.question import Answer, VerbQuestion, argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from swashplate.api.campaigns.plan import CampaignPlan
     from swashplate.api.campaigns.results import Campaign
     from swashplate.api.campaigns.scheduler import DaskScheduler
 
@@ -50,61 +51,66 @@ class OnWorkers(VerbQuestion[Answer]):
     def problems(self, answer: Any) -> list[str]:
         return _problems(answer, judged=True)
 
-    def remarks(self, answer: Any) -> list[str]:
+
+def _problems(study: Campaign | CampaignPlan, *, judged: bool) -> list[str]:
+    from swashplate.api.campaigns.plan import CampaignPlan
+
+    if isinstance(study, CampaignPlan):
         return []
-
-
-def _problems(study: Any, *, judged: bool) -> list[str]:
-    refused = list(getattr(study, "refused", {}).values())[:3]
-    if refused or not judged or not getattr(study, "failed", ()):
+    refused = list(study.refused.values())[:3]
+    if refused or not judged or not study.failed:
         return refused
     return [f"{len(study.failed)} of {len(study.names)} tasks were given up: swash campaign status {study.folder}"]
 
 
 class RunCampaign(OnWorkers[Any]):
-    """Compute a campaign into the folder of --out, or continue one that was stopped."""
+    """Compute a campaign into the folder of --out, or continue one that was stopped.
+
+    Raises:
+        CampaignError: a file that is none; one that has changed, with what has; a store that another client holds; no
+            scheduler, one without TLS that was not asked for, or a worker that is another program; nothing that can be
+            done.
+        WriteError: a store that cannot be written to.
+    """
 
     file: Path = argument(metavar="FILE", help="The campaign: a TOML file (docs/howto/campaigns.md).")
     folder: Path | None = option(
         default=None, flag="--out", metavar="DIR", help="Folder for the results.", kw_only=False
     )
     dry_run: bool = option(default=False, help="Only print cost and size: two tasks are computed.")
-    accept_changes: bool = setting(default=False, help="continue although the file or the program has changed")
+    accept_changes: bool = setting(
+        default=False, help="continue although the file or the program has changed: what is the same is kept"
+    )
 
     def answer(self, say: Say = silent) -> Any:
         from swashplate.api.campaigns.plan import plan_campaign
-        from swashplate.api.campaigns.verbs import campaign
+        from swashplate.api.campaigns.verbs import run_campaign
 
-        named = self.where()
+        self.where()  # what is wrong in what was typed comes first
         if self.dry_run:
             say("doing the first task twice")
             return plan_campaign(self.file, measure=True)
         if self.folder is None:
-            plan_campaign(self.file)  # what is wrong in what was typed comes first
+            plan_campaign(self.file)
             raise SwashError("is missing.", channel="--out", hint="Say where results are kept: -o FOLDER.")
-        return campaign(
-            self.file,
-            self.folder,
-            workers=self.workers,
-            scheduler=named,
-            accept_changes=self.accept_changes,
-            say=say,
-        )
+        return run_campaign(self, self.folder, say)
 
 
 class ResumeCampaign(OnWorkers["Campaign"]):
-    """Continue a campaign from its folder, with any number of workers on any machine."""
+    """Continue a campaign from its folder, with any number of workers on any machine.
+
+    Raises:
+        CampaignError: no campaign there, another client at work, another program than it was begun with.
+        WriteError: a store that cannot be written to.
+    """
 
     folder: Path = argument(metavar="FOLDER", help="Folder of the campaign.")
     retry_failed: bool = option(default=False, help="Try failed tasks again.")
 
     def answer(self, say: Say = silent) -> Campaign:
-        from swashplate.api.campaigns.verbs import resume_campaign
+        from swashplate.api.campaigns.verbs import go_on
 
-        named = self.where()
-        return resume_campaign(
-            self.folder, workers=self.workers, scheduler=named, retry_failed=self.retry_failed, say=say
-        )
+        return go_on(self, say)
 
 
 class OfCampaign(VerbQuestion["Campaign"]):
@@ -119,9 +125,6 @@ class OfCampaign(VerbQuestion["Campaign"]):
 
     def problems(self, answer: Any) -> list[str]:
         return _problems(answer, judged=False)
-
-    def remarks(self, answer: Any) -> list[str]:
-        return []
 
 
 class ShowCampaign(OfCampaign):
@@ -165,8 +168,6 @@ class ReplayRow(VerbQuestion[Any]):
     def text(self, answer: Any, width: int) -> list[Any]:
         return []
 
-    def remarks(self, answer: Any) -> list[str]:
-        return []
 
-    def problems(self, answer: Any) -> list[str]:
-        return []
+campaign = verb("campaign", RunCampaign)
+resume_campaign = verb("resume_campaign", ResumeCampaign)

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import OfVehicle, one_or_more
-from swashplate.api.languages import Aircraft, Delays, Gusts, Numbers, Speeds, Values
-from swashplate.api.question import VerbQuestion, argument, option, setting
+from swashplate.api.asking import OfVehicle
+from swashplate.api.languages import Aircraft, Delays, GainsFile, Gusts, Numbers, Pilot, Speeds, Values
+from swashplate.api.question import Answer, argument, option, setting, verb
 from swashplate.api.saying import Say, silent
-from swashplate.api.verbs.simulate import turbulence
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from swashplate.api.autopilot_gains import AutopilotGains
     from swashplate.api.check_controller import ControllerCheck
     from swashplate.api.design_controller import ControllerDesign
@@ -31,6 +32,11 @@ class FindGains(OfVehicle["AutopilotGains"]):
     Rotorflight's flies ANGLE, and a hover with a simulated pilot. Exit code 2 if no gains keep the margins, or if those
     of --parameters do not. --out FILE.parm (PX4: .params, Rotorflight: .txt) writes the parameters, --out FILE.toml the
     law as a controller that `swash` flies.
+
+    Raises:
+        ControllerError: naming the loop for which nothing holds the margins, the command that the vehicle turns
+            against, or the axis that was fitted although no flight moved it.
+        SwashError: where there is no servo mapping.
     """
 
     by_name: ClassVar[tuple[str, ...]] = ("gains.parm", "gains.params", "gains.txt", "law.toml", "report.html")
@@ -41,7 +47,10 @@ class FindGains(OfVehicle["AutopilotGains"]):
         help="Autopilot whose law and parameter names are used.",
         choices=("ardupilot", "px4", "rotorflight"),
     )
-    parameters: Path | None = option(default=None, help="Judge the gains of this .parm file instead (ArduPilot).")
+    parameters: GainsFile | None = option(
+        default=None,
+        help="Judge these gains instead: ArduPilot's .parm file; in Python also by name, and Rotorflight's.",
+    )
     servos: str | None = option(
         default=None, metavar="NAME|FILE", help="Servo mapping; by default the one of the vehicle's name."
     )
@@ -62,36 +71,51 @@ class FindGains(OfVehicle["AutopilotGains"]):
                 raise SwashError(f"ends in '{out.suffix}', expected {own}.", where=out, channel="--out")
 
     def answer(self, say: Say = silent) -> AutopilotGains:
-        from swashplate.api.autopilot_gains import autopilot_gains
+        from swashplate.api.autopilot_gains import find_gains
 
-        room = self.notch
-        if room is not None and len(room) != 2:
-            raise SwashError("is not HZ, WIDTH.", channel="notch")
         say("searching gains")
-        return autopilot_gains(
-            self.flying(self.vehicle),
-            autopilot=self.autopilot,  # pyrefly: ignore[bad-argument-type]
-            name=str(self.vehicle) if isinstance(self.vehicle, str | Path) else None,
-            servos=self.servos,
-            delays=self.delay,
-            notch=(room[0], room[1]) if room else None,
-            rate=self.rate,
-            parameters=self.parameters,
-            voltage=self.voltage,
-            fly=self.fly,
-        )
+        return find_gains(self)
 
-    def remarks(self, answer: AutopilotGains) -> list[str]:
-        return []
+    def problems(self, answer: AutopilotGains) -> Sequence[str]:
+        return answer.problems
 
 
-class DesignController(OfVehicle["ControllerDesign"]):
+class WritesC(OfVehicle[Answer]):
+    """A design of which one step becomes C."""
+
+    precision: str = setting(default="double", help="number type of C.", choices=("double", "float"))
+
+    written: ClassVar[Any] = None
+
+    def write(self, answer: Any, folder: Path, names: tuple[str, ...]) -> None:
+        """A controller's file, its page, and its C, whose cost `text` tells."""
+        super().write(answer, folder, tuple(name for name in names if not name.endswith(".c")))
+        for name in (name for name in names if name.endswith(".c")):
+            code = answer.code(precision=self.precision)
+            code.save(folder / name)
+            object.__setattr__(self, "written", code)
+
+    def text(self, answer: Any, width: int) -> list[Any]:
+        if self.written is None:
+            return [repr(answer)]
+        code, kept = self.written, ""
+        if code.memory_bytes:
+            kept = f", {code.memory_bytes} bytes between steps"
+        told = f"{code.operations} operations, {code.work_bytes} bytes of temporaries{kept}"
+        return [repr(answer), f"\nC of one step: {told}"]
+
+
+class DesignController(WritesC["ControllerDesign"]):
     """Design a linear-quadratic controller with integral action from a model's own trims and linear models.
 
     Where no effort is given the loops stay slower than delays, sampling and computation allow: they cross below
     1 / (3 total delay), or just above a mode that must be held. With --holding speed and a range of --speed the gains
     are scheduled over the speed that the observer estimates. --out FILE.toml writes the controller, FILE.c one step of
     it as C99 (needs the extra 'model').
+
+    Raises:
+        ControllerError: what cannot be seen, held or reached, with the direction.
+        TrimError: for a speed that cannot be flown.
     """
 
     files: ClassVar[tuple[str, ...]] = ("controller.toml", "report.html")
@@ -111,7 +135,7 @@ class DesignController(OfVehicle["ControllerDesign"]):
     rate: float = option(default=100.0, help="Steps of the controller per second.", unit="Hz", least=1.0)
     delay: Delays | None = option(default=None, help=DELAY)
     allow: Values | None = setting(
-        default=None, help="deviation of a state that weighs as much as the effort. Repeatable."
+        default=None, help="deviation of a state that weighs as much as the effort, by name. Repeatable."
     )
     effort: Values | None = setting(default=None, help="share of an input's range that weighs the same. Repeatable.")
     gain: str = option(
@@ -119,71 +143,38 @@ class DesignController(OfVehicle["ControllerDesign"]):
         help="Gain of the observer: computed in flight, or constant (for a small processor).",
         choices=("flying", "steady"),
     )
-    precision: str = setting(default="double", help="number type of C.", choices=("double", "float"))
     computation: float | None = setting(
-        default=None, help="time from a reading to its command; one sample by default", unit="ms"
+        default=None,
+        help="time from a reading to its command; one sample by default",
+        unit="ms",
+        least=0.0,
+        most=1000.0,
     )
     state_weights: Numbers | None = setting(default=None, help="weights of all states instead of `allow`")
     input_weights: Numbers | None = setting(default=None, help="weights of all inputs instead of `effort`")
     voltage: float | None = setting(default=None, help="battery voltage of the trims", unit="V")
 
     def answer(self, say: Say = silent) -> ControllerDesign:
-        from swashplate.api.design_controller import design_controller
+        from swashplate.api.design_controller import design_lq_controller
 
         say("designing the controller")
-        return design_controller(
-            self.flying(self.vehicle),
-            method=self.method,  # pyrefly: ignore[bad-argument-type]
-            sensors=self.sensors,
-            holding=self.holding,  # pyrefly: ignore[bad-argument-type]
-            speeds=one_or_more(self.speed),
-            rate=self.rate,
-            delays=self.delay,
-            computation=None if self.computation is None else self.computation / 1e3,
-            allowed=self.allow or {},
-            effort=self.effort or None,
-            Q=self.state_weights,
-            R=self.input_weights,
-            gain=self.gain,  # pyrefly: ignore[bad-argument-type]
-            voltage=self.voltage,
-        )
-
-    def write(self, answer: ControllerDesign, folder: Path, names: tuple[str, ...]) -> None:
-        write_design(self, answer, folder, names)
-
-    def text(self, answer: ControllerDesign, width: int) -> list[Any]:
-        return [repr(answer), *costs(self)]
-
-
-def write_design(question: Any, answer: Any, folder: Path, names: tuple[str, ...]) -> None:
-    """A controller's file, its page, and its C, which the question keeps for `costs`."""
-    c = [name for name in names if name.endswith(".c")]
-    VerbQuestion.write(question, answer, folder, tuple(name for name in names if name not in c))
-    for name in c:
-        code = answer.code(precision=question.precision)
-        code.save(folder / name)
-        object.__setattr__(question, "_code", code)
-
-
-def costs(question: Any) -> list[str]:
-    """What a step of C that was written costs."""
-    code = getattr(question, "_code", None)
-    if code is None:
-        return []
-    per_step = f"\nC of one step: {code.operations} operations, {code.work_bytes} bytes of temporaries"
-    return [per_step + (f", {code.memory_bytes} bytes between steps" if code.memory_bytes else "")]
+        return design_lq_controller(self)
 
 
 class CheckController(OfVehicle["ControllerCheck"]):
     """Judge a controller on a model: margins, disturbance rejection, handling qualities, steps, coupling, gusts.
 
     Exit code 2 if the loop is unstable; everything that could be computed is written and marked.
+
+    Raises:
+        ControllerError: where the controller is for another vehicle, or its file is not one.
+        TrimError: where the speed cannot be flown.
     """
 
     files: ClassVar[tuple[str, ...]] = ("report.html", "check.json")
 
     vehicle: Aircraft = argument(metavar="MODEL", help="A model file, or a vehicle's name.", complete="vehicle")
-    controller: Path = option(help="The controller's file.", kw_only=False)
+    controller: Pilot = option(help="The controller's file.", kw_only=False)
     task: str = option(
         default="other",
         help="Which boundaries of ADS-33E: target tracking, or all other tasks.",
@@ -199,7 +190,7 @@ class CheckController(OfVehicle["ControllerCheck"]):
     )
     response: str = setting(
         default="auto",
-        help="type of the response to a steady command; it determines which bandwidth counts",
+        help="type of the response to a steady command: rate counts the lower bandwidth, attitude that by phase",
         choices=("auto", "rate", "attitude"),
     )
     computation: float | None = setting(default=None, help="time from a reading to its command", unit="ms", least=0.0)
@@ -213,23 +204,18 @@ class CheckController(OfVehicle["ControllerCheck"]):
     voltage: float | None = setting(default=None, help="battery voltage", unit="V")
 
     def answer(self, say: Say = silent) -> ControllerCheck:
-        from swashplate.api.check_controller import check_controller
+        from swashplate.api.check_controller import judge_controller
 
         if self.scale is not None and not self.scale > 0.0:
             hint = "Full size is 1."
             raise SwashError(f"is {self.scale:g}, expected a positive number.", channel="--scale", hint=hint)
         say("checking the controller")
-        return check_controller(
-            self.flying(self.vehicle),
-            self.controller,
-            speed=self.speed,
-            voltage=self.voltage,
-            task=self.task,
-            command=self.response,  # pyrefly: ignore[bad-argument-type]
-            scale=self.scale,
-            duration=self.duration,
-            gusts=turbulence(self.gusts),
-            delays=self.delay,
-            computation=None if self.computation is None else self.computation / 1e3,
-            required_delay=None if self.delay_margin is None else self.delay_margin / 1e3,
-        )
+        return judge_controller(self)
+
+    def problems(self, answer: ControllerCheck) -> Sequence[str]:
+        return answer.problems
+
+
+autopilot_gains = verb("autopilot_gains", FindGains)
+design_controller = verb("design_controller", DesignController)
+check_controller = verb("check_controller", CheckController)

@@ -65,15 +65,15 @@ class Demo(VerbQuestion["Identification"]):
     seed: int = setting(default=1, help="seed of the simulated flights' noise.", least=0)
 
     def answer(self, say: Say = silent) -> Identification:
-        from swashplate.api.demo import demo
+        from swashplate.api.demo import run_demo
 
-        return demo(simulated=self.simulated, seed=self.seed, say=say)
+        return run_demo(self, say)
 
     def text(self, answer: Identification, width: int) -> list[Any]:
-        parts = Identify.text(self, answer, width)  # pyrefly: ignore[bad-argument-type]
+        parts = answer.parts()
         if any(source.simulated for source in answer.fit.data):
             parts = ["On simulated flights; `swash data fetch coax56` gets the real ones.\n", *parts]
         return parts + ([f"Truth:      {answer.fit.beside_truth}"] if answer.fit.beside_truth else [])
 
     def problems(self, answer: Identification) -> list[str]:
-        return Identify.problems(self, answer)  # pyrefly: ignore[bad-argument-type]
+        return list(answer.problems)

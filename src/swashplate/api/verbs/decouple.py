@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import OfVehicle, strings
-from swashplate.api.languages import Aircraft, Gusts, Names, Numbers, Words
-from swashplate.api.question import argument, default_of, option, setting
+from swashplate.api.languages import Aircraft, Fitted, Gusts, Names, Numbers, Rule, Words
+from swashplate.api.question import argument, default_of, option, setting, verb
 from swashplate.api.saying import Say, silent
-from swashplate.api.verbs.control import costs, write_design
-from swashplate.api.verbs.simulate import turbulence
+from swashplate.api.verbs.control import WritesC
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from swashplate.api.decouple import DecouplingDesign
     from swashplate.api.decouple_axes import AxesDecoupling
 
@@ -22,7 +21,7 @@ _BOTH = ("linear", "vehicle", "changes", "precision", "paged")
 _LINEAR = ("pair", "frequency", "bandwidth", "keep", "at", "speed")
 
 
-class Decouple(OfVehicle["DecouplingDesign | AxesDecoupling"]):
+class Decouple(WritesC["DecouplingDesign | AxesDecoupling"]):
     """Decouple the axes of a coaxial helicopter by its equations, or of any model by a matrix and a filter.
 
     A vehicle with the CoaX's equations gets a controller: height and yaw held, roll and pitch decoupled. The law
@@ -33,6 +32,10 @@ class Decouple(OfVehicle["DecouplingDesign | AxesDecoupling"]):
     Any other model, and every one with --linear, gets a constant matrix, and a filter that copies its fast states: the
     table has the ratio of off-axis to on-axis response without, with the matrix, and with the filter. Exit code 2 if
     the filter would be unstable; the matrix is still printed and written. --out FILE.json writes both.
+
+    Raises:
+        ControllerError: where the loop does not stand, or a step does not get there.
+        SwashError: names that the model does not have, axes that no input moves, options that contradict each other.
     """
 
     by_name: ClassVar[tuple[str, ...]] = ("controller.toml", "controller.c", "decoupling.json", "report.html")
@@ -44,7 +47,7 @@ class Decouple(OfVehicle["DecouplingDesign | AxesDecoupling"]):
     mode: str = option(
         default="manual", help="What the servos hold besides a pilot's commands.", choices=("manual", "speed", "place")
     )
-    lag: str | None = option(
+    lag: Rule | None = option(
         default=None,
         metavar="RULE|DEG",
         help="Phase lag that makes the model's step straight (straight; by default in mode manual), the rotor's from "
@@ -58,18 +61,23 @@ class Decouple(OfVehicle["DecouplingDesign | AxesDecoupling"]):
         most=1.0,
     )
     to_speed: float | None = option(
-        default=None, help="The same with the step that reaches this speed; the paper's is 1.8.", unit="m/s"
+        default=None,
+        help="The same with the step that reaches this speed; the paper's is 1.8.",
+        unit="m/s",
+        least=0.01,
     )
     drift: float | None = option(
         default=None,
-        help="Drift that a flown step with this law had [m to the right after 6 m]; the new law corrects it.",
+        help="Drift that a flown step with this law had, to the right after 6 m; the new law corrects it.",
+        unit="m",
+        least=-6.0,
+        most=6.0,
     )
-    fit: Path | None = option(default=None, help="With a step: also on models drawn from a fit.json.")
+    fit: Fitted | None = option(default=None, help="With a step: also on models drawn from a fit.json.")
     gusts: Gusts = option(
         default="none",
         help="With a step: fly drawn models, or this one, in gusts: none, indoor, indoor=SIGMA, or a wind [m/s].",
     )
-    precision: str = setting(default="double", help="number type of C.", choices=("double", "float"))
     pair: Words | None = option(
         default=None, metavar="INPUT=OUTPUT", help="The input that moves an output, for example lateral=p. Repeatable."
     )
@@ -115,70 +123,31 @@ class Decouple(OfVehicle["DecouplingDesign | AxesDecoupling"]):
                 raise SwashError(f"is not for {why}.", channel=f"--{name.replace('_', '-')}")
 
     def _law(self, vehicle: Any, say: Say) -> DecouplingDesign:
-        from swashplate.api.decouple import PAPERS_SPEED, decouple
+        from swashplate.api.decouple import decouple_coaxial
 
-        page = self.paged and self.step is None and self.to_speed is None
         say("designing the controller")
-        return decouple(
-            vehicle,
-            mode=self.mode,  # pyrefly: ignore[bad-argument-type]
-            lag=None if self.lag is None else _lag(self.lag),
-            mixing=self.mixing,  # pyrefly: ignore[bad-argument-type]
-            speed_terms=self.speed_terms,
-            voltage=self.voltage,
-            rate=self.rate,
-            step=self.step,
-            to_speed=PAPERS_SPEED if page else self.to_speed,
-            drift=self.drift,
-            fit=self.fit,
-            gusts=turbulence(self.gusts),
-            draws=self.draws,
-            seed=self.seed,
-        )
+        return decouple_coaxial(self, vehicle)
 
     def _axes(self, vehicle: Any, say: Say) -> AxesDecoupling:
         from swashplate.api.decouple_axes import decouple_axes
 
-        if min(self.at) <= 0.0:
+        if not self.at or min(self.at) <= 0.0:
             raise SwashError(f"'{','.join(f'{one:g}' for one in self.at)}' is not all positive.", channel="at")
         say("designing the decoupling")
-        return decouple_axes(
-            vehicle,
-            pairs=dict(self.pair or {}),
-            frequency=self.frequency,
-            bandwidth=self.bandwidth,
-            keep=None if self.keep is None else strings(self.keep),
-            frequencies=self.at,
-            speed=self.speed,
-            name=str(self.vehicle) if isinstance(self.vehicle, str | Path) else vehicle.name,
-        )
+        return decouple_axes(self, vehicle)
 
     def write(self, answer: Any, folder: Path, names: tuple[str, ...]) -> None:
-        law = hasattr(answer, "code")
+        from swashplate.api.decouple import DecouplingDesign
+
+        law = isinstance(answer, DecouplingDesign)
         for name in names:
             if (name.endswith((".toml", ".c")) and not law) or (name.endswith(".json") and law):
                 kinds = ".toml, .c or .html" if law else ".json or .html"
                 raise SwashError(f"ends in '{Path(name).suffix}', expected {kinds}.", where=name, channel="--out")
-        write_design(self, answer, folder, names)
+        super().write(answer, folder, names)
 
-    def text(self, answer: Any, width: int) -> list[Any]:
-        return [repr(answer), *costs(self)]
-
-    def problems(self, answer: Any) -> list[str]:
-        problem = getattr(answer, "problem", None)
-        return [] if problem is None else [f"No filter: {problem}"]
+    def problems(self, answer: DecouplingDesign | AxesDecoupling) -> Sequence[str]:
+        return answer.problems
 
 
-def _lag(text: Any) -> Any:
-    """A rule's name, or degrees as radians."""
-    from swashplate.api.languages import numbers
-    from swashplate.control.laws.decoupling import LAGS
-
-    if text in ("straight", *LAGS):
-        return text
-    if str(text).isalpha():
-        raise SwashError(f"is '{text}', expected straight, {', '.join(LAGS)} or a number.", channel="lag")
-    degrees = numbers(str(text), "--lag", count=1)[0]
-    if not abs(degrees) <= 180.0:
-        raise SwashError(f"is {text} degrees, expected at most 180 either way.", channel="--lag")
-    return math.radians(degrees)
+decouple = verb("decouple", Decouple)

@@ -1,12 +1,11 @@
-"""`swash identify`: what is fitted follows from what is given."""
+"""`swash identify`: what is fitted follows from what is given. Each kind of fit is a question of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import FLIGHT, FromConditioned, called, strings
+from swashplate.api.asking import FLIGHT, FromConditioned
 from swashplate.api.languages import (
     Aircraft,
     Bands,
@@ -20,53 +19,90 @@ from swashplate.api.languages import (
     Things,
     Values,
 )
-from swashplate.api.question import option, setting
+from swashplate.api.question import Answer, default_of, entries, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.api.verbs.respond import load_responses
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from swashplate.api.identification import Identification
     from swashplate.api.linear_study import LinearStudy
+    from swashplate.models.linear.state_space import StateSpaceModel
 
 
-class Identify(FromConditioned["Identification | LinearStudy"]):
-    """Identify a model, validate it on flights that the fit has not seen, and write a report.
+class Fit(FromConditioned[Answer]):
+    """What every fit takes."""
 
-    What is fitted follows from what is given:
+    hold_out: Logs | None = option(
+        default=None, help="Flight that the fit never sees, to validate on.", complete="flight"
+    )
+    outputs: Names | None = option(
+        default=None, help="Channels to fit, separated by commas; all that there are by default."
+    )
+    fix: Values | None = option(default=None, help="Hold a parameter at a value. Repeatable.")
 
-    --vehicle and --flight: the vehicle's parameters, by maximum likelihood.
+    kind: ClassVar[str]
 
-    --responses and --structure: a state-space model (compose:body+flap, a ready structure, a model file).
 
-    --responses and --input: transfer functions with a delay; without --form the usual forms are tried.
+class LinearFit(Fit[Answer]):
+    """What fits of linear models take."""
 
-    --flight and --structure: a state-space model along records in time.
+    rename: Renamed | None = option(
+        default=None, help="NAME=CHANNEL, by commas: the log's CHANNEL as the model's NAME, for example az=az_sid."
+    )
 
-    Writes report.html, model.toml, fit.json and (with --hold-out) validation.json or verification.json to --out. A fit
-    that ends at values which physics forbids has failed: exit code 2, a report that says so, and no model. A posterior
-    that did not converge is not written, and gains that are refused are said: exit code 2, and the reason.
-    """
 
-    files: ClassVar[tuple[str, ...]] = (
-        "report.html", "model.toml", "fit.json", "validation.json", "verification.json", "posterior.nc",
-    )  # fmt: skip
+class FromResponses(LinearFit[Answer]):
+    """What fits to responses take."""
+
+    responses: Aircraft | None = option(
+        default=None, help="What `swash respond` wrote: the file responses.nc or its folder.", kw_only=False
+    )
+    gains: bool = option(default=False, help="Also suggest rate-loop gains, ArduPilot's or Rotorflight's.")
+    band: Bands | None = option(
+        default=None, help="Limits in Hz: 0.1-10 for all, p/lateral=0.5-12 for a pair, collective=0.3-5 for a channel."
+    )
+    coherence: float = setting(default=0.6, help="smallest coherence that is used", least=0.0, most=1.0)
+
+    def split_band(self) -> tuple[tuple[float, float] | None, dict[str, tuple[float, float]]]:
+        """The band of all pairs, and those of some."""
+        if self.band is None or isinstance(self.band, tuple):
+            return self.band, {}
+        return self.band.get(""), {name: band for name, band in self.band.items() if name}
+
+
+class WithStructure(LinearFit[Answer]):
+    """What fits of state-space models take."""
+
+    structure: Aircraft | None = option(
+        default=None,
+        help="Structure of a state-space model: compose:body+flap, a name or a file; several with --search.",
+        kw_only=False,
+    )
+    start: Values | None = option(default=None, help="Start value of a parameter of a state-space model. Repeatable.")
+
+    def structures(self) -> Iterator[StateSpaceModel]:
+        """Those that are named or given; texts may have several by commas."""
+        from swashplate.models.catalogue import structure
+        from swashplate.models.linear.linear_vehicle import structure_of
+
+        given = self.structure
+        if isinstance(given, str) and not Path(given).exists():
+            given = given.split(",")
+        for one in () if given is None else given if isinstance(given, list | tuple) else (given,):
+            yield structure_of(structure(one) if isinstance(one, str | Path) else one)
+
+
+class FitVehicle(Fit["Identification"]):
+    """Identify a vehicle from flights and, where it has not failed, predict others with it."""
 
     vehicle: Aircraft | None = option(
         default=None, help="A vehicle's name, or a card or model file.", complete="vehicle", kw_only=False
     )
     flight: Logs | None = option(
         default=None, help=f"Flight: {FLIGHT}. May be repeated.", complete="flight", kw_only=False
-    )
-    responses: Aircraft | None = option(
-        default=None, help="What `swash respond` wrote: the file responses.nc or its folder."
-    )
-    structure: Aircraft | None = option(
-        default=None,
-        help="Structure of a state-space model: compose:body+flap, a name or a file; several with --search.",
-    )
-    hold_out: Logs | None = option(
-        default=None, help="Flight that the fit never sees, to validate on.", complete="flight"
     )
     free: Names = option(
         default=("full",),
@@ -77,10 +113,6 @@ class Identify(FromConditioned["Identification | LinearStudy"]):
         default=None,
         help="filter-error (a vehicle's usual), output-error (the usual in time), prediction-error, or another's.",
     )
-    outputs: Names | None = option(
-        default=None, help="Channels to fit, separated by commas; all that there are by default."
-    )
-    fix: Values | None = option(default=None, help="Hold a parameter at a value. Repeatable.")
     tie: Texts = setting(default=(), metavar="'A = B'", help="tie a parameter to an expression. Repeatable.")
     prior: Priors | None = option(
         default=None,
@@ -110,6 +142,28 @@ class Identify(FromConditioned["Identification | LinearStudy"]):
         help="Draw models from the fit's uncertainty, into posterior.nc (for ArviZ) and for Monte Carlo: laplace "
         "(normal, fast) or nuts (from the likelihood, minutes).",
     )
+    iterations: int | None = setting(default=None, help="largest number of iterations; 60, in time 80", least=1)
+    leave_out: Stretches = setting(
+        default=(), help="learn nothing from these stretches, as ['10,12'], where it was touched", unit="s"
+    )
+
+    kind = "a vehicle"
+
+    def answer(self, say: Say = silent) -> Identification:
+        from swashplate.api.identification import identify_vehicle
+
+        return identify_vehicle(self, say)
+
+
+class FitTransferFunctions(FromResponses["LinearStudy"]):
+    """Fit transfer functions with a delay to responses; without a form the usual ones are tried and one is suggested.
+
+    Raises:
+        IdentificationError: no coherent response, a fixed name that the form does not have, or a hold-out for a form
+            that cannot be flown.
+        FlightError: a hold-out flight without the model's channels.
+    """
+
     input: str | None = option(default=None, help="The input channel of transfer functions.")
     form: str | None = option(
         default=None, help='Zeros/poles of transfer functions: "1/2", "0/1+1s" (integrator), "0/0" (gain and delay).'
@@ -117,55 +171,116 @@ class Identify(FromConditioned["Identification | LinearStudy"]):
     margins: bool = option(
         default=False, help="Also margins of the responses as open loops; bandwidth and phase delay."
     )
-    gains: bool = option(default=False, help="Also suggest rate-loop gains, ArduPilot's or Rotorflight's.")
-    band: Bands | None = option(
-        default=None, help="Limits in Hz: 0.1-10 for all, p/lateral=0.5-12 for a pair, collective=0.3-5 for a channel."
-    )
+
+    kind = "transfer functions"
+
+    def answer(self, say: Say = silent) -> LinearStudy:
+        from swashplate.api.fit_linear import transfer_functions
+
+        return transfer_functions(self, say)
+
+
+class FitStateSpace(FromResponses["LinearStudy"], WithStructure["LinearStudy"]):
+    """Fit a state-space model to responses, with accuracy figures, and verify it in time on what it has not seen.
+
+    Raises:
+        CardError: a name that the model does not have, or a value outside its bounds.
+        IdentificationError: channels that do not meet, no coherent response, parameters without a trace.
+        FlightError: a hold-out flight without the model's channels.
+        SwashError: several structures, or none, without a search; a search that is to start from something.
+    """
+
     search: bool = option(default=False, help="Try structures, drop the worst early, choose one and say why.")
-    start: Values | None = option(default=None, help="Start value of a parameter of a state-space model. Repeatable.")
     start_from: Things | None = option(
         default=None,
         metavar="SOURCE",
         help="Start from a vehicle's linearisation in hover, or from models of earlier fits.",
     )
-    iterations: int | None = setting(default=None, help="largest number of iterations; 60, in time 80", least=1)
-    leave_out: Stretches = setting(
-        default=(), help="learn nothing from these stretches, as ['10,12'], where it was touched", unit="s"
-    )
     without: Texts = setting(default=(), help="pairs (r/collective) or channels that are not fitted")
-    coherence: float = setting(default=0.6, help="smallest coherence that is used", least=0.0, most=1.0)
     reduce: bool = setting(default=False, help="remove parameters that the responses do not determine")
     starts: int = setting(default=4, help="number of starting points", least=1)
     seed: int = setting(default=0, help="seed of the starting points", least=0)
+
+    kind = "a state-space model"
+
+    def answer(self, say: Say = silent) -> LinearStudy:
+        from swashplate.api.fit_linear import state_space
+
+        return state_space(self, say)
+
+
+class FitInTime(WithStructure["LinearStudy"]):
+    """Fit a state-space model, delays included, to records in time by maximum likelihood, and verify it on others.
+
+    Without hold-outs the records of the fit are shown, and marked as such.
+    """
+
+    flight: Logs | None = option(default=None, help=f"Flight: {FLIGHT}.", complete="flight", kw_only=False)
+    method: str | None = option(
+        default=None, help="output-error; in gusts filter-error (a gain made of the noise) or prediction-error."
+    )
+    horizon: Numbers | None = option(default=None, metavar="FIRST,LAST", help="As of a vehicle.")
+    iterations: int | None = setting(default=None, help="largest number of iterations", least=1)
     gusts: str | None = setting(
         default=None, help="of filter-error in time: white (usual) or lasting, in the air of u, v, w or on p, q, r"
     )
     biases: Names = setting(default=(), help="outputs with a constant bias in each record, in time")
     shifts: bool = setting(default=True, help="estimate constants in the states' rates, in time")
-    rename: Renamed | None = option(
-        default=None, help="NAME=CHANNEL, by commas: the log's CHANNEL as the model's NAME, for example az=az_sid."
-    )
 
-    def answer(self, say: Say = silent) -> Identification | LinearStudy:
-        kind, wanted = self._kind()
-        self._refuse_others(kind, wanted)
-        return _KINDS[kind](self, say)
+    kind = "a state-space model in time"
 
-    def _kind(self) -> tuple[str, frozenset[str]]:
-        """What is fitted, and the fields that belong to it."""
+    def answer(self, say: Say = silent) -> LinearStudy:
+        from swashplate.api.fit_linear import in_time
+
+        return in_time(self, say)
+
+
+class Identify(FitVehicle, FitTransferFunctions, FitStateSpace, FitInTime):  # pyrefly: ignore[invalid-inheritance]
+    """Identify a model, validate it on flights that the fit has not seen, and write a report.
+
+    What is fitted follows from what is given:
+
+    --vehicle and --flight: the vehicle's parameters, by maximum likelihood.
+
+    --responses and --structure: a state-space model (compose:body+flap, a ready structure, a model file).
+
+    --responses and --input: transfer functions with a delay; without --form the usual forms are tried.
+
+    --flight and --structure: a state-space model along records in time.
+
+    Writes report.html, model.toml, fit.json and (with --hold-out) validation.json or verification.json to --out. A fit
+    that ends at values which physics forbids has failed: exit code 2, a report that says so, and no model. A posterior
+    that did not converge is not written, and gains that are refused are said: exit code 2, and the reason.
+    """
+
+    files: ClassVar[tuple[str, ...]] = (
+        "report.html", "model.toml", "fit.json", "validation.json", "verification.json", "posterior.nc",
+    )  # fmt: skip
+
+    def answer(self, say: Say = silent) -> Any:
+        of = self._kind()
+        own, every = entries(of), entries(type(self))
+        for name in every:
+            if name not in own and getattr(self, name) != default_of(type(self), name):
+                raise SwashError(f"is not for {of.kind}.", channel=f"--{name.replace('_', '-')}")
+        return of(**{name: getattr(self, name) for name in own}).answer(say)
+
+    def _kind(self) -> type[Fit[Any]]:
+        """What is fitted."""
         if self.responses is not None:
-            transfer = self.structure is None and not self.search
-            if transfer and self.input is None:
+            if self.structure is not None or self.search:
+                return FitStateSpace
+            if self.input is None:
                 hint = "--input CHANNEL fits transfer functions, --structure compose:body+flap a state-space model."
                 raise self._missing("--input", hint)
-            return ("transfer functions", _TRANSFER) if transfer else ("a state-space model", _STATE_SPACE)
+            return FitTransferFunctions
         if self.flight is None:
             raise self._missing("--flight", "Name a log, or responses with --responses.")
         if self.structure is not None:
-            return "a state-space model in time", _TIME
+            return FitInTime
         if self.vehicle is None:
             raise self._missing("--vehicle", "Name one, or a linear model with --structure.")
-        return "a vehicle", _VEHICLE
+        return FitVehicle
 
     def _missing(self, which: str, hint: str) -> SwashError:
         """What was typed is judged before what was not."""
@@ -179,188 +294,15 @@ class Identify(FromConditioned["Identification | LinearStudy"]):
             load_responses(self.responses)
         return SwashError("is missing.", channel=which, hint=hint)
 
-    def _refuse_others(self, kind: str, wanted: frozenset[str]) -> None:
-        from swashplate.api.question import default_of, entries
-
-        for name in entries(type(self)):
-            if name in wanted | _ALWAYS or name.startswith("_"):
-                continue
-            if getattr(self, name) != default_of(type(self), name):
-                raise SwashError(f"is not for {kind}.", channel=f"--{name.replace('_', '-')}")
-
-    def _vehicle(self, say: Say) -> Identification:
-        from swashplate.api.identification import identify_and_validate
-        from swashplate.engine.roots import require_casadi
-        from swashplate.models.catalogue import vehicle
-        from swashplate.models.vehicle import Vehicle
-
-        card = (self.prior or {}).get("")
-        priors = {name: value for name, value in (self.prior or {}).items() if name}
-        prior_card = None if card is None else vehicle(card).card  # pyrefly: ignore[bad-argument-type]
-        given: Any = self.vehicle
-        aircraft = given if isinstance(given, Vehicle) else vehicle(given)
-        require_casadi()
-        say("reading flights")
-        seen, unseen = self.conditioned(self.flight), self.conditioned(self.hold_out)
-        named, free = (called(self.flight), called(self.hold_out)), strings(self.free)
-        return identify_and_validate(
-            aircraft,
-            seen,
-            hold_out=unseen,
-            free=free[0] if len(free) == 1 else free,
-            method=self.method or "filter-error",
-            outputs=None if self.outputs is None else strings(self.outputs),
-            ties=strings(self.tie),
-            fixed=self.fix,
-            priors=priors or None,
-            prior_card=prior_card,
-            iterations=self.iterations or 60,
-            keep_unexcited=self.keep_unexcited,
-            wind=self.wind,
-            leave_out=self.leave_out,
-            horizon=self.horizon,
-            residual=self.residual,
-            close_loop=strings(self.close_loop),
-            posterior=self.posterior,
-            names=None if None in named else [*(named[0] or ()), *(named[1] or ())],
-            say=say,
-        )
-
-    def _transfer_functions(self, say: Say) -> LinearStudy:
-        from swashplate.api.fit_tf import fit_tf
-
-        band, own = _split(self.band)
-        if own:
-            raise SwashError("takes one band for transfer functions.", channel="--band")
-        return fit_tf(
-            load_responses(self.responses),
-            input=self.input or "",
-            outputs=strings(self.outputs) or None,
-            form=self.form,
-            fixed=self.fix,
-            band=band,
-            least_coherence=self.coherence,
-            margins=self.margins,
-            gains=self.gains,
-            hold_out=self.read(self.hold_out),
-            rate=self.rate,
-            cutoff=self.cutoff,
-            names=self.rename,  # pyrefly: ignore[bad-argument-type]
-            say=say,
-        )
-
-    def _state_space(self, say: Say) -> LinearStudy:
-        from swashplate.api.fit_ss import fit_ss
-        from swashplate.models.catalogue import structure
-
-        given = self.structure.split(",") if self.search and isinstance(self.structure, str) else self.structure
-        named = () if given is None else (given,) if isinstance(given, str | Path) or not _listed(given) else given
-        begun: Any = [structure(one) if isinstance(one, str | Path) else one for one in named]
-        band, own = _split(self.band)
-        return fit_ss(
-            begun,
-            load_responses(self.responses),
-            search=self.search,
-            start=self.start,
-            start_from=_sources(self.start_from),
-            fixed=self.fix,
-            band=band,
-            bands=own,
-            without=strings(self.without),
-            least_coherence=self.coherence,
-            reduce=self.reduce,
-            starts=self.starts,
-            seed=self.seed,
-            gains=self.gains,
-            hold_out=self.read(self.hold_out),
-            rate=self.rate,
-            cutoff=self.cutoff,
-            names=self.rename,  # pyrefly: ignore[bad-argument-type]
-            say=say,
-        )
-
-    def _in_time(self, say: Say) -> LinearStudy:
-        from swashplate.api.fit_time import fit_time
-        from swashplate.models.catalogue import structure
-
-        begun: Any = structure(self.structure) if isinstance(self.structure, str | Path) else self.structure
-        return fit_time(
-            begun,
-            self.read(self.flight),
-            method=self.method or "output-error",
-            outputs=strings(self.outputs) or None,
-            gusts=self.gusts,
-            biases=strings(self.biases),
-            shifts=self.shifts,
-            start=self.start,
-            fixed=self.fix,
-            iterations=self.iterations or 80,
-            horizon=self.horizon,
-            hold_out=self.read(self.hold_out),
-            rate=self.rate,
-            cutoff=self.cutoff,
-            names=self.rename,  # pyrefly: ignore[bad-argument-type]
-            say=say,
-        )
-
     def remarks(self, answer: Any) -> list[str]:
-        return list(getattr(answer, "remarks", ()))
+        return list(answer.remarks)
 
     def text(self, answer: Any, width: int) -> list[Any]:
-        if not hasattr(answer, "lines"):
-            return [repr(answer)]
-        from swashplate.reporting.terminal_tables import fit_table
-
-        fit = answer.fit
-        shown: list[Any] = [fit_table(fit) if hasattr(fit.solution, "card") else repr(fit)]
-        shown += [f"\n{fit.posterior!r}"] if fit.posterior is not None else []
-        return [*shown, "\n" + "\n".join(answer.lines())]
+        return answer.parts()
 
     def problems(self, answer: Any) -> list[str]:
-        if not hasattr(answer, "refused"):
-            return list(answer.problems)
-        if answer.fit.failed:
-            return [f"The fit failed: {' '.join(answer.fit.problems) or 'see the report.'}"]
-        return [f"The fit is written, its posterior is not: {answer.refused}"] if answer.refused else []
+        return list(answer.problems)
 
 
-def _listed(given: Any) -> bool:
-    return isinstance(given, list | tuple)
-
-
-def _sources(given: Any) -> Any:
-    """A vehicle, or the places of models; texts may have several by commas."""
-    if given is None or not _listed(given):
-        return given
-    parts = [part.strip() for one in given for part in str(one).split(",") if part.strip()]
-    return parts or None
-
-
-def _split(bands: Any) -> tuple[tuple[float, float] | None, dict[str, tuple[float, float]]]:
-    """The band of all pairs, and those of some."""
-    if bands is None or isinstance(bands, tuple):
-        return bands, {}
-    return bands.get(""), {name: band for name, band in bands.items() if name}
-
-
-_KINDS: dict[str, Callable[[Identify, Say], Any]] = {
-    "a vehicle": Identify._vehicle,
-    "transfer functions": Identify._transfer_functions,
-    "a state-space model": Identify._state_space,
-    "a state-space model in time": Identify._in_time,
-}
-_ALWAYS = frozenset(
-    ("hold_out", "outputs", "fix", "rate", "cutoff", "mapping", "units", "drop_bad_stamps", "as_logged")
-)
-_VEHICLE = frozenset(
-    ("vehicle", "flight", "free", "method", "tie", "prior", "keep_unexcited", "wind", "horizon",
-     "residual", "close_loop", "posterior", "iterations", "leave_out")
-)  # fmt: skip
-_TRANSFER = frozenset(("responses", "input", "form", "margins", "gains", "band", "coherence", "rename"))
-_STATE_SPACE = frozenset(
-    ("responses", "structure", "search", "start", "start_from", "gains", "band", "without", "coherence", "reduce",
-     "starts", "seed", "rename")
-)  # fmt: skip
-_TIME = frozenset(
-    ("flight", "structure", "method", "start", "horizon", "iterations", "gusts", "biases", "shifts", "rename")
-)
+fit_tf = verb("fit_tf", FitTransferFunctions)
+fit_ss = verb("fit_ss", FitStateSpace)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import InAir, OfVehicle, linear_model, strings
+from swashplate.api.asking import InAir, OfVehicle, linear_model, name_of, strings
 from swashplate.api.languages import Aircraft, Band, Names, Paths, Texts, Values, Wind
-from swashplate.api.question import Answer, argument, option, setting
-from swashplate.api.saying import Say, notice, notice_unless_quiet, silent
+from swashplate.api.question import Answer, argument, option, setting, verb
+from swashplate.api.saying import Say, notice, silent
 from swashplate.errors import SwashError
 
-_PACE = 0.25
-"""Simulated seconds a second of Betaflight's trial, where nothing slower is asked for: it has no lockstep."""
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from swashplate.api.acceptance import Acceptance
     from swashplate.api.check_autopilot import AutopilotCheck
     from swashplate.models.vehicle import Vehicle
@@ -27,10 +28,6 @@ class Linkable(OfVehicle[Answer]):
         default=None, metavar="NAME|FILE", help="Servo mapping; by default the one of the vehicle's name."
     )
 
-    def name(self) -> str | None:
-        """As the vehicle was called."""
-        return str(self.vehicle) if isinstance(self.vehicle, str | Path) else None
-
     def whole(self) -> Vehicle:
         """The vehicle; a linear one has no ground, told before anything is assumed about its inputs."""
         if linear_model(self.vehicle) is not None:
@@ -40,21 +37,12 @@ class Linkable(OfVehicle[Answer]):
         return self.flying(self.vehicle)
 
 
-class Link(InAir[None], Linkable):
-    """A vehicle linked to a SITL."""
+class Linking(InAir[None], Linkable):
+    """A vehicle as the physics of a SITL, until it is interrupted."""
 
-    port: int = option(default=9002, help="Port to listen on.", least=0, most=65535)
     record: Path | None = option(default=None, help="Save the true flights while they are flown: .nc or .csv.")
+    record_rate: float = setting(default=200.0, help="samples per second kept", unit="Hz", least=1.0, most=2000.0)
     idle_exit: float | None = setting(default=None, help="end after so many seconds without an autopilot", least=0.1)
-    estimate: Texts = option(
-        default=(),
-        metavar="NAMES|EQUATION",
-        help="Estimate while it flies: parameters of the model (mass), or an equation.",
-    )
-    truth: Values | None = setting(
-        default=None, help="what flies has this number instead of the card's: for --estimate to find. Repeatable."
-    )
-    listen: str = setting(default="127.0.0.1", help="address to listen on: this machine only unless given")
     voltage: float | None = setting(default=None, help="battery voltage at the start.", unit="V")
     sag: float = setting(default=0.0, help="fall of the voltage.", unit="V/s", least=0.0)
     altitude: float | None = setting(default=0.0, help="altitude in the standard atmosphere", unit="m")
@@ -64,42 +52,55 @@ class Link(InAir[None], Linkable):
         choices=("clean", "noisy"),
     )
     seed: int = setting(default=0, help="seed of the noise", least=0)
-    record_rate: float = setting(default=200.0, help="samples per second kept", unit="Hz", least=1.0, most=2000.0)
 
     noisy: ClassVar[bool] = False
 
-    def serve(self, verb: Any, listen: Any) -> None:
-        """Listen, and be the physics until it is interrupted."""
-        from swashplate.api import link
+    @property
+    def noise(self) -> bool:
+        """Whether its sensors are noisy."""
+        return self.noisy if self.sensors is None else self.sensors == "noisy"
 
-        link.check_record(self.record)
-        listen(self.listen, self.port).close()  # told before anything is compiled
-        vehicle = self.whole()
-        verb(
-            vehicle,
-            name=self.name(),
-            servos=self.servos,
-            port=self.port,
-            listen=self.listen,
-            environment=self.around(vehicle),
-            voltage=self.voltage,
-            sag=self.sag,
-            noisy=self.noisy if self.sensors is None else self.sensors == "noisy",
-            seed=self.seed,
-            record=self.record,
-            record_rate=self.record_rate,
-            idle_exit=self.idle_exit,
-            estimate=strings(self.estimate),
-            truth=dict(self.truth or {}),
-            notice=notice,
-            say=notice_unless_quiet,
-        )
+    def watched(self) -> tuple[tuple[str, ...], dict[str, float]]:
+        """What is estimated while it flies, and the numbers that what flies has instead of the card's."""
+        return (), {}
+
+    def check_places(self, outs: tuple[Path, ...]) -> None:
+        """That a recording can be kept there, before anything is compiled."""
+        record = self.record
+        if record is None:
+            return
+        if record.suffix.lower() not in (".nc", ".csv"):
+            raise SwashError(f"ends in '{record.suffix}', expected .nc or .csv.", where=record, channel="--record")
+        folder = record.absolute().parent
+        if not folder.is_dir():
+            hint = "Make it first."
+            raise SwashError("the folder does not exist.", where=record.parent, channel="--record", hint=hint)
+        if not os.access(folder, os.W_OK):
+            raise SwashError("the folder cannot be written to.", where=record.parent, channel="--record")
 
     def document(self, answer: Any) -> Any:
         raise SwashError("is not for a link that runs.", channel="--json")
 
     def text(self, answer: Any, width: int) -> list[Any]:
         return []
+
+
+class Link(Linking):
+    """A vehicle linked to an autopilot in lockstep."""
+
+    port: int = option(default=9002, help="Port to listen on.", least=0, most=65535)
+    listen: str = setting(default="127.0.0.1", help="address to listen on: this machine only unless given")
+    estimate: Texts = option(
+        default=(),
+        metavar="NAMES|EQUATION",
+        help="Estimate while it flies: parameters of the model (mass), or an equation.",
+    )
+    truth: Values | None = setting(
+        default=None, help="what flies has this number instead of the card's: for --estimate to find. Repeatable."
+    )
+
+    def watched(self) -> tuple[tuple[str, ...], dict[str, float]]:
+        return strings(self.estimate), dict(self.truth or {})
 
 
 class LinkArduPilot(Link):
@@ -109,11 +110,12 @@ class LinkArduPilot(Link):
     the autopilot is restarted. Ctrl-C ends the program.
     """
 
-    def answer(self, say: Say = silent) -> None:
-        from swashplate.api.link import link_ardupilot
+    def answer(self, say: Say = silent) -> Any:
+        from swashplate.api.link import serve_ardupilot
         from swashplate.links.sockets import listen_udp
 
-        self.serve(link_ardupilot, listen_udp)
+        listen_udp(self.listen, self.port).close()  # told before anything is compiled
+        return serve_ardupilot(self)
 
 
 class LinkPx4(Link):
@@ -126,14 +128,15 @@ class LinkPx4(Link):
 
     noisy: ClassVar[bool] = True
 
-    def answer(self, say: Say = silent) -> None:
-        from swashplate.api.link import link_px4
+    def answer(self, say: Say = silent) -> Any:
+        from swashplate.api.link import serve_px4
         from swashplate.links.sockets import listen_tcp
 
-        self.serve(link_px4, listen_tcp)
+        listen_tcp(self.listen, self.port).close()  # told before anything is compiled
+        return serve_px4(self)
 
 
-class LinkBetaflight(InAir[None], Linkable):
+class LinkBetaflight(Linking):
     """Be the physics of Betaflight's SITL: states to UDP 9003, motors from 9001. For multirotors.
 
     Both run on clocks of their own, without lockstep. It waits until the SITL has opened TCP 5761. The vehicle stands
@@ -141,43 +144,18 @@ class LinkBetaflight(InAir[None], Linkable):
     """
 
     pace: float = setting(default=1.0, help="simulated seconds per second", least=0.02, most=1.0)
-    record: Path | None = option(default=None, help="Save the true flights while they are flown: .nc or .csv.")
-    idle_exit: float | None = setting(default=None, help="end after so many seconds without motors", least=0.1)
     wait: float = setting(default=60.0, help="seconds to wait for the SITL", least=0.1, most=3600.0)
     pilot: bool = option(default=False, help="A simulated pilot arms, takes off and hovers.")
-    record_rate: float = setting(default=200.0, help="samples per second kept", unit="Hz", least=1.0, most=2000.0)
-    altitude: float | None = setting(default=0.0, help="altitude in the standard atmosphere", unit="m")
 
-    def answer(self, say: Say = silent) -> None:
-        self.serve(pilot=self.pilot)
+    def answer(self, say: Say = silent) -> Any:
+        from swashplate.api.link_betaflight import serve_betaflight
 
-    def serve(self, **more: Any) -> None:
-        """Be the physics until it is interrupted."""
-        from swashplate.api.link import check_record
-        from swashplate.api.link_betaflight import link_betaflight
+        self._check_servos()
+        return serve_betaflight(self)
 
+    def _check_servos(self) -> None:
         if self.servos is not None:
             raise SwashError("is for ArduPilot and PX4.", channel="--servos")
-        check_record(self.record)
-        vehicle = self.whole()
-        link_betaflight(
-            vehicle,
-            environment=self.around(vehicle),
-            record=self.record,
-            record_rate=self.record_rate,
-            idle_exit=self.idle_exit,
-            pace=self.pace,
-            wait=self.wait,
-            notice=notice,
-            say=notice_unless_quiet,
-            **more,
-        )
-
-    def document(self, answer: Any) -> Any:
-        raise SwashError("is not for a link that runs.", channel="--json")
-
-    def text(self, answer: Any, width: int) -> list[Any]:
-        return []
 
 
 class LinkRotorflight(LinkBetaflight):
@@ -188,8 +166,11 @@ class LinkRotorflight(LinkBetaflight):
 
     swash: str = option(default="120", help="Type of the swashplate.", choices=("120", "135", "140", "thru"))
 
-    def answer(self, say: Say = silent) -> None:
-        self.serve(swash=self.swash, pilot=self.pilot)
+    def answer(self, say: Say = silent) -> Any:
+        from swashplate.api.link_betaflight import serve_betaflight
+
+        self._check_servos()
+        return serve_betaflight(self, swash=self.swash)
 
 
 class WriteParameters(Linkable[Path]):
@@ -215,7 +196,7 @@ class WriteParameters(Linkable[Path]):
                 write_betaflight_configuration(answer, folder / name)
                 continue
             write_ardupilot_parameters(
-                answer, folder / name, name=self.name(), servos=self.servos, trim=hover, notice=notice
+                answer, folder / name, name=name_of(self.vehicle), servos=self.servos, trim=hover, notice=notice
             )
 
     def text(self, answer: Any, width: int) -> list[Any]:
@@ -226,9 +207,19 @@ class WriteParameters(Linkable[Path]):
 
 
 class CheckAutopilot(Linkable["AutopilotCheck"]):
-    """Read a running autopilot's parameters and checks over MAVLink, and judge them for a vehicle."""
+    """Read a running autopilot's parameters and checks over MAVLink, and judge them for a vehicle.
 
-    firmware: str = option(default="ardupilot", help="What is expected to run.", choices=("ardupilot", "px4"))
+    The physics (`swash link`) has to run at the same time. Nothing is changed in the autopilot but how often it sends
+    two messages.
+
+    Raises:
+        SwashError: no answer, a port that is taken, another firmware or another kind of vehicle; a vehicle without
+            servo mapping; pymavlink missing.
+    """
+
+    firmware: str = option(
+        default="ardupilot", help="What is expected to run.", choices=("ardupilot", "px4"), kw_only=False
+    )
     mavlink: str | None = option(
         default=None,
         metavar="ADDRESS",
@@ -236,17 +227,17 @@ class CheckAutopilot(Linkable["AutopilotCheck"]):
     )
     timeout: float = setting(default=10.0, help="seconds until an autopilot is heard.", unit="s", least=0.1, most=600.0)
 
-    def answer(self, say: Say = silent) -> AutopilotCheck:
-        from swashplate.api.check_autopilot import check_autopilot
+    listen: float = setting(
+        default=4.0, help="how long its checks and clock are heard", unit="s", least=0.1, most=600.0
+    )
 
-        return check_autopilot(
-            self.flying(self.vehicle),
-            self.firmware,  # pyrefly: ignore[bad-argument-type]
-            name=self.name(),
-            servos=self.servos,
-            mavlink=self.mavlink,
-            timeout=self.timeout,
-        )
+    def answer(self, say: Say = silent) -> AutopilotCheck:
+        from swashplate.api.check_autopilot import hear_autopilot
+
+        return hear_autopilot(self)
+
+    def problems(self, answer: AutopilotCheck) -> Sequence[str]:
+        return answer.problems
 
 
 class Accept(InAir["Acceptance"], Linkable):
@@ -260,10 +251,15 @@ class Accept(InAir["Acceptance"], Linkable):
     A multirotor is tried with Betaflight's SITL: configured, armed, hovered in ANGLE mode, its sticks swept from 0.5 to
     6 Hz (roll, pitch, yaw), and its Blackbox log compared. There is no lockstep, so it flies at a quarter of real time
     or slower (speedup). Options of modes, parameter files and ports are for ArduPilot.
+
+    Raises:
+        SwashError: a binary that is missing, cannot be run, ends at once or is another program (ArduCopter 4.5 or
+            later); a port that is taken; a vehicle whose frame is not known here; pymavlink missing. What goes wrong
+            later is a line of the result that fails.
     """
 
     binary: Path = argument(
-        metavar="BINARY", help="ArduCopter's SITL, e.g. build/sitl/bin/arducopter-heli, or Betaflight's.", kw_only=True
+        metavar="BINARY", help="ArduCopter's SITL, e.g. build/sitl/bin/arducopter-heli, or Betaflight's."
     )
     folder: Path = option(
         flag="--out", metavar="DIR", help="New folder for the report, the log and the binary's output."
@@ -272,14 +268,22 @@ class Accept(InAir["Acceptance"], Linkable):
         default=None, metavar="MODEL", help="compare the estimates with another vehicle or card."
     )
     axes: Names = option(default=("roll", "pitch", "yaw", "heave"), help="Axes that are swept.")
-    band: Band = setting(default=(0.4, 8.0), help="band of the sweeps [Hz]")
+    band: Band | None = setting(
+        default=None, help="band of the sweeps, 0.4-8 by default, of Betaflight 0.5-6", unit="Hz"
+    )
     defaults: Paths | None = setting(default=None, help="an additional parameter file, read last; may be repeated")
     instance: int = setting(
         default=0, help="instance of SITL: adds 10 times this number to every port.", least=0, most=99
     )
-    seconds: float = setting(default=40.0, help="seconds of each sweep", unit="s", least=10.0, most=255.0)
-    hover: float = setting(default=10.0, help="seconds in each mode", unit="s", least=1.0, most=600.0)
-    height: float = setting(default=5.0, help="height of the hover", unit="m", least=1.0, most=50.0)
+    seconds: float | None = setting(
+        default=None, help="seconds of each sweep, 40 by default, of Betaflight 20", unit="s", least=10.0, most=255.0
+    )
+    hover: float | None = setting(
+        default=None, help="seconds in each mode, 10 by default, of Betaflight 5", unit="s", least=1.0, most=600.0
+    )
+    height: float | None = setting(
+        default=None, help="height of the hover, 5 by default, of Betaflight 1.5", unit="m", least=1.0, most=50.0
+    )
     ekf: float = setting(
         default=120.0, help="simulated seconds within which it must be ready to arm", unit="s", least=1.0, most=3600.0
     )
@@ -289,54 +293,28 @@ class Accept(InAir["Acceptance"], Linkable):
     wind: Wind = setting(default=(0.0, 0.0, 0.0), help="wind towards north, east and down", unit="m/s")
 
     def answer(self, say: Say = silent) -> Acceptance:
-        from swashplate.api.accept_autopilot import accept_autopilot
-        from swashplate.models.catalogue import vehicle as find
-
         vehicle = self.flying(self.vehicle)
         if "motor_3" in vehicle.input_names:
-            return self._multirotor(vehicle, say)
-        acceptance = accept_autopilot(
-            vehicle,
-            self.binary,
-            out=self.folder,
-            name=self.name(),
-            servos=self.servos,
-            truth=find(self.against) if isinstance(self.against, str | Path) else self.against,
-            axes=strings(self.axes),
-            band=self.band,
-            seconds=self.seconds,
-            hover=self.hover,
-            height=self.height,
-            ekf=self.ekf,
-            defaults=tuple(self.defaults or ()),  # pyrefly: ignore[bad-argument-type]
-            environment=self.around(vehicle),
-            instance=self.instance,
-            speedup=self.speedup,
-            timeout=self.timeout,
-            say=say,
-        )
+            from swashplate.api.accept_betaflight import accept_multirotor as accept
+        else:
+            from swashplate.api.accept_autopilot import accept_helicopter as accept
+        acceptance = accept(self, vehicle, say)
         say("writing the report")
         acceptance.save(self.folder)
         return acceptance
 
-    def _multirotor(self, vehicle: Vehicle, say: Say) -> Acceptance:
-        from swashplate.api.accept_betaflight import accept_betaflight
+    def other(self) -> Vehicle | None:
+        """What the estimates are held against instead of the vehicle itself."""
         from swashplate.models.catalogue import vehicle as find
 
-        trial = accept_betaflight(
-            vehicle,
-            self.binary,
-            out=self.folder,
-            name=self.name(),
-            truth=find(self.against) if isinstance(self.against, str | Path) else self.against,
-            axes=tuple(axis for axis in strings(self.axes) if axis != "heave"),
-            environment=self.around(vehicle),
-            pace=min(self.speedup, _PACE),
-            timeout=self.timeout,
-            say=say,
-        )
-        trial.save(self.folder)
-        return trial
+        return find(self.against) if isinstance(self.against, str | Path) else self.against
+
+    def problems(self, answer: Acceptance) -> Sequence[str]:
+        return answer.problems
 
     def text(self, answer: Acceptance, width: int) -> list[Any]:
         return [repr(answer), f"\nReport: {self.folder / 'report.html'}"]
+
+
+check_autopilot = verb("check_autopilot", CheckAutopilot)
+accept_autopilot = verb("accept_autopilot", Accept)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from swashplate.api.asking import FLIGHT, FromConditioned, OfVehicle, drawn, strings
-from swashplate.api.languages import Aircraft, Log, Texts, Values
+from swashplate.api.asking import FLIGHT, FromConditioned, OfVehicle
+from swashplate.api.languages import Aircraft, Log, Pilot, Texts, Values
 from swashplate.api.question import argument, option, setting
-from swashplate.api.saying import QUIET, Say, notice, ready, silent
+from swashplate.api.saying import QUIET, Say, notice, silent
 from swashplate.api.verbs.look import Served
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
-    from swashplate.links.live.replay import Replay
+    pass
 
 
 class Live(OfVehicle[None], FromConditioned[None], Served):
@@ -33,7 +33,7 @@ class Live(OfVehicle[None], FromConditioned[None], Served):
         least=0.1,
         most=60.0,
     )
-    controller: Path | None = option(
+    controller: Pilot | None = option(
         default=None, help="A controller's file: one of `swash control decouple` for all modes, any other for Position."
     )
     estimate: Texts = option(
@@ -61,65 +61,15 @@ class Live(OfVehicle[None], FromConditioned[None], Served):
     as_logged: bool = setting(default=False, help="with replay: use channels even where they contradict each other")
 
     def answer(self, say: Say = silent) -> None:
+        from swashplate.api.live import serve_live, serve_replay
+
         if self.replay is not None:
-            return self._replayed(say)
+            return serve_replay(self, say)
         if self.vehicle is None:
             raise SwashError("is missing.", channel="MODEL", hint="Name a vehicle, or a flight with --replay.")
-        from swashplate.api.live import live
-
         if self.folder.exists() and not self.folder.is_dir():
             raise SwashError("is a file, expected a folder.", where=self.folder, channel="--out")
         vehicle = self.flying(self.vehicle, whole=True)
         if vehicle.traits.remark and not QUIET.get():
             notice(vehicle.traits.remark)
-        return live(
-            vehicle,
-            controller=self.controller,
-            estimate=strings(self.estimate),
-            truth=dict(self.truth or {}),
-            draws=drawn(vehicle, self.posterior, count=self.draws),
-            folder=self.folder,
-            host=self.host,
-            port=self.port or 0,
-            allow_remote=self.allow_remote,
-            open_page=self.open_page,
-            say=say,
-            ready=ready,
-            tell=notice,
-        )
-
-    def _replayed(self, say: Say) -> None:
-        from swashplate.api.live import show_replay
-        from swashplate.links.live.replay import replay
-        from swashplate.models.catalogue import vehicle as find
-
-        model = self.vehicle
-        chosen = find(model) if isinstance(model, str | Path) else model
-        if self.posterior is not None and chosen is None:
-            raise SwashError("is of no model: name it.", channel="--posterior")
-
-        def prepared() -> Replay:
-            say("reading the flight")
-            (log,) = self.read(self.replay)
-            # A simulation's true states have no outliers, and what looks like one is a maneuver.
-            clean = log.provenance.simulated and "phi" in log
-            logged = log.condition(rate=self.rate, cutoff=self.cutoff, outliers=not clean, trim_ground=not clean)
-            say(f"predicting {'(compiling takes longest the first time)' if chosen else ''}".strip())
-            draws = () if chosen is None else drawn(chosen, self.posterior, count=self.draws)
-            shown = replay(logged, model=chosen, draws=draws, ahead=self.ahead, hold_missing=self.hold_missing)
-            for note in shown.notes:
-                notice(note)
-            return shown
-
-        show_replay(
-            prepared,
-            host=self.host,
-            port=self.port or 0,
-            allow_remote=self.allow_remote,
-            open_page=self.open_page,
-            say=say,
-            ready=ready,
-        )
-
-    def remarks(self, answer: Any) -> list[str]:
-        return []
+        return serve_live(self, vehicle, say)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from swashplate.api.asking import FLIGHT, FromLogs
 from swashplate.api.languages import Logs, Names, Texts
 from swashplate.api.question import argument, option, setting
-from swashplate.api.saying import QUIET, Say, ready, silent
+from swashplate.api.saying import QUIET, Say, silent
 from swashplate.errors import FlightError, SwashError
 
 if TYPE_CHECKING:
@@ -45,20 +45,9 @@ class Open(Served):
     )
 
     def answer(self, say: Say = silent) -> None:
-        from swashplate.api.open_logs import open_logs
+        from swashplate.api.open_logs import serve_logs
 
-        open_logs(
-            self.logs or (),
-            units=self.units or {},
-            mapping=self.mapping,
-            bad_stamps="drop" if self.drop_bad_stamps else "error",
-            host=self.host,
-            port=self.port,
-            allow_remote=self.allow_remote,
-            open_page=self.open_page,
-            say=say,
-            ready=ready,
-        )
+        serve_logs(self, say)
 
 
 @dataclass(frozen=True, repr=False)
@@ -153,7 +142,9 @@ class Inspect(FromLogs[Looked]):
 
         result = [inspect(flight) for flight in flights]
         reviews = [review(flight, swept=one.sweeps) for flight, one in zip(flights, result, strict=True)]
-        documents = [{**one.as_dict(), "review": beside.as_dict()} for one, beside in zip(result, reviews, strict=True)]
+        documents = [
+            {**one.to_document(), "review": beside.to_document()} for one, beside in zip(result, reviews, strict=True)
+        ]
         damage = [words for one in result for words in one.damage]
         shown = [
             part
@@ -171,7 +162,7 @@ class Inspect(FromLogs[Looked]):
         from swashplate.links.logs.kept_mappings import map_table
 
         mapped = map_table(Path(name), self.mapping)
-        return Looked((str(mapped),), mapped.as_dict(), damage=" ".join(mapped.faults))
+        return Looked((str(mapped),), mapped.to_document(), damage=" ".join(mapped.faults))
 
     def _drawn(self, flights: list[Flight], path: Path) -> None:
         from swashplate.api.plot_logs import plot_logs
@@ -204,7 +195,7 @@ class Inspect(FromLogs[Looked]):
 
         flown = self.read(self.logs)[0].condition(rate=self.rate, cutoff=0.0)
         result = reconstruct(flown)
-        return Looked((str(result),), result.as_dict(), flight=result.corrected(flown))
+        return Looked((str(result),), result.to_document(), flight=result.corrected(flown))
 
     def write(self, answer: Looked, folder: Path, names: tuple[str, ...]) -> None:
         for name in names:

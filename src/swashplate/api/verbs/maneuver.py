@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import strings
-from swashplate.api.languages import Aircraft, Band, Limits, Names
-from swashplate.api.question import VerbQuestion, argument, option, setting
+from swashplate.api.languages import Aircraft, Band, Judged, Limits, Names, Pilot, Values
+from swashplate.api.question import VerbQuestion, argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
@@ -70,6 +69,10 @@ class DesignManeuver(VerbQuestion["DesignedManeuver"]):
     noise that the model's own identification found, or else for that of usual indoor flights. If no maneuver within
     the limits determines all parameters, the exit code is 2, and the reason is printed. --out FILE.csv writes the
     series, and the flight card beside it as .txt; --out FILE.lua a script with which ArduPilot flies it as angles.
+
+    Raises:
+        ManeuverError: where nothing feasible tells all that is unknown, with what stands in the way.
+        IdentificationError: an unknown parameter, or a vehicle whose pose is not tracked.
     """
 
     files: ClassVar[tuple[str, ...]] = ("maneuver.csv",)
@@ -84,10 +87,20 @@ class DesignManeuver(VerbQuestion["DesignedManeuver"]):
     )
     band: Band = option(default=(0.3, 8.0), help="Frequencies [Hz].")
     axes: Names | None = option(default=None, help="Of roll, pitch, yaw, heave, by commas; all that the vehicle has.")
-    controller: Path | None = option(default=None, help="Controller that flies (.toml); else a hold of hover.")
-    criterion: str = setting(default="D", help="D (minimum volume of the errors) or A (minimum sum of squares)")
+    controller: Pilot | None = option(default=None, help="Controller that flies (.toml); else a hold of hover.")
+    criterion: str = setting(
+        default="D",
+        help="D (minimum volume of the error ellipsoid) or A (minimum sum of squared relative errors)",
+        choices=("D", "A"),
+    )
     robust: str = setting(
-        default="average", help="optimise for the average over draws of the prior, or for the worst of them"
+        default="average",
+        help="optimise for the average over draws of the prior, or for the worst of them",
+        choices=("average", "worst"),
+    )
+    noise: Values | None = setting(
+        default=None,
+        help="of air and sensors, by name; the model's own identification's, else that of usual indoor flights",
     )
     spread: float = setting(default=0.3, help="possible relative error of the unknown parameters", least=0.0, most=0.9)
     draws: int = setting(default=5, help="number of draws of the prior", least=1, most=100)
@@ -95,27 +108,9 @@ class DesignManeuver(VerbQuestion["DesignedManeuver"]):
     seed: int = setting(default=0, help="seed of the draws")
 
     def answer(self, say: Say = silent) -> DesignedManeuver:
-        from swashplate.api.controllers import from_file
-        from swashplate.api.design_maneuver import design_maneuver
-        from swashplate.models.catalogue import vehicle
+        from swashplate.api.design_maneuver import design_for
 
-        aircraft = vehicle(self.vehicle) if isinstance(self.vehicle, str | Path) else self.vehicle
-        flies = from_file(self.controller) if isinstance(self.controller, str | Path) else self.controller
-        return design_maneuver(
-            aircraft,
-            strings(self.unknown),
-            limits=dict(self.limits or {}),
-            band=self.band,
-            axes=None if self.axes is None else strings(self.axes),
-            controller=flies,
-            criterion=self.criterion,
-            robust=self.robust,
-            spread=self.spread,
-            draws=self.draws,
-            rate=self.rate,
-            seed=self.seed,
-            say=say,
-        )
+        return design_for(self, say)
 
     def write(self, answer: DesignedManeuver, folder: Path, names: tuple[str, ...]) -> None:
         from swashplate.api.maneuver_script import maneuver_script
@@ -136,12 +131,6 @@ class DesignManeuver(VerbQuestion["DesignedManeuver"]):
             "\n" + answer.card(),
         ]
 
-    def remarks(self, answer: DesignedManeuver) -> list[str]:
-        return []
-
-    def problems(self, answer: DesignedManeuver) -> list[str]:
-        return []
-
 
 class NeedManeuver(VerbQuestion["NeededExcitation"]):
     """Say what the next flight must have for a model to show what it can.
@@ -150,13 +139,18 @@ class NeedManeuver(VerbQuestion["NeededExcitation"]):
     share that may be missed. Axes whose command only answered the motion need an excitation of their own.
     """
 
-    validation: Path = argument(
-        metavar="FILE", help="validation.json of `swash identify --hold-out` or `swash validate`."
+    validation: Judged = argument(
+        metavar="FILE",
+        help="Of flights that the fit had not seen: validation.json of `identify --hold-out` or `validate`.",
     )
-    fit: float = option(default=70.0, help="Prediction fit that the flight is to show [%].")
-    ahead: float = option(default=1.0, help="Seconds ahead.")
+    fit: float = option(default=70.0, help="Prediction fit that the flight is to show.", unit="%")
+    ahead: float = option(default=1.0, help="Seconds ahead, one of those that were validated.", unit="s")
 
     def answer(self, say: Say = silent) -> NeededExcitation:
-        from swashplate.api.needed_excitation import needed_excitation
+        from swashplate.api.needed_excitation import needed_for
 
-        return needed_excitation(self.validation, fit=self.fit, horizon=self.ahead)
+        return needed_for(self)
+
+
+design_maneuver = verb("design_maneuver", DesignManeuver)
+needed_excitation = verb("needed_excitation", NeedManeuver)

@@ -12,6 +12,8 @@ from swashplate.api.saying import Say, notice_unless_quiet, silent
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from swashplate.flights.flight import Flight
     from swashplate.identification.responses.frequency_response import FrequencyResponse
 
@@ -113,10 +115,10 @@ class Respond(FromConditioned["FrequencyResponse"]):
 
     def document(self, answer: FrequencyResponse) -> Any:
         if self.combine is not None:
-            return answer.as_dict()
+            return answer.to_document()
         from swashplate.identification.frequency.handling_readings import handling_lines
 
-        return {**answer.as_dict(), "handling": [one.as_dict() for one in handling_lines(answer)]}
+        return {**answer.to_document(), "handling": [one.to_document() for one in handling_lines(answer)]}
 
     def write(self, answer: FrequencyResponse, folder: Path, names: tuple[str, ...]) -> None:
         from swashplate.atomic import write_json
@@ -130,6 +132,9 @@ class Respond(FromConditioned["FrequencyResponse"]):
             else:
                 report(answer, path=folder / name)
 
+    def problems(self, answer: FrequencyResponse) -> Sequence[str]:
+        return answer.problems
+
     def text(self, answer: FrequencyResponse, width: int) -> list[Any]:
         if self.combine is not None or not answer.problems:
             return super().text(answer, width)
@@ -139,9 +144,6 @@ class Respond(FromConditioned["FrequencyResponse"]):
         beside = [review(flight, swept=()) for flight in self.read(self.logs) if not sweeps(flight)]
         told = [f"\nWhat {each.source} tells without a sweep\n\n{each.words}" for each in beside if each.tells]
         return [*super().text(answer, width), *told]
-
-    def remarks(self, answer: FrequencyResponse) -> list[str]:
-        return []
 
 
 def _pairs(given: Any) -> dict[str, str]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import OfVehicle
-from swashplate.api.languages import Aircraft, Battery, FlightLimits, Gusts, Wind, Words
-from swashplate.api.question import option, setting
+from swashplate.api.languages import Aircraft, Battery, Fitted, FlightLimits, Gusts, Motion, Pilot, Wind, Words
+from swashplate.api.question import option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from swashplate.api.fly_maneuver import SimulatedFlight
     from swashplate.api.monte_carlo import MonteCarlo
 
@@ -31,12 +32,11 @@ class Simulate(OfVehicle["SimulatedFlight"]):
     needs_out: ClassVar[bool] = True
 
     vehicle: Aircraft = option(help="A vehicle's name, or a card or model file.", complete="vehicle", kw_only=False)
-    maneuver: str = option(
-        metavar="SPEC",
+    maneuver: Motion = option(
         help='For example "sweep:pitch,0.5-8Hz,60s" or "doublet:roll,0.5s,0.2".',
         kw_only=False,
     )
-    controller: Path | None = option(
+    controller: Pilot | None = option(
         default=None, help="A controller's file, of `swash control design` or `swash control decouple`."
     )
     pilot: bool = option(default=False, help="Roll and pitch of the maneuver are a pilot's commands to the controller.")
@@ -59,23 +59,16 @@ class Simulate(OfVehicle["SimulatedFlight"]):
             parse(self.maneuver)  # says what is wrong with it before anything else is looked at
 
     def answer(self, say: Say = silent) -> SimulatedFlight:
-        from swashplate.api.fly_maneuver import fly_maneuver
+        from swashplate.api.fly_maneuver import fly
 
+        if self.pilot and self.controller is None:
+            raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
         aircraft = self.flying(self.vehicle)
         say(f"simulating {_COMPILING}")
-        return fly_maneuver(
-            aircraft,
-            self.maneuver,
-            controller=self.controller,
-            pilot=self.pilot,
-            sensors=self.sensors,  # pyrefly: ignore[bad-argument-type]
-            voltage=self.voltage,
-            sag=self.sag,
-            speed=self.speed,
-            rate=self.rate,
-            wind=dict(zip(_WIND, self.wind, strict=True)),
-            seed=self.seed,
-        )
+        return fly(self, aircraft)
+
+    def remarks(self, answer: SimulatedFlight) -> Sequence[str]:
+        return careful(answer.remarks)
 
     def document(self, answer: SimulatedFlight) -> Any:
         return answer.to_document() | {"vehicle": _called(self.vehicle)}
@@ -85,18 +78,25 @@ class FlyMany(OfVehicle["MonteCarlo"]):
     """Fly a controller on many aircraft in many gusts, with sensor noise, and keep the worst flight.
 
     --out FILE.nc or FILE.csv has the worst flight, --out FILE.html the distribution and the worst flight.
+
+    Raises:
+        SwashError: what the model has no equation for, a maneuver that the controller cannot be told.
+        ControllerError: a controller for another vehicle, a file that is none, a number that the card does not have.
     """
 
     files: ClassVar[tuple[str, ...]] = ("worst.nc", "report.html")
     by_name: ClassVar[tuple[str, ...]] = ("worst.csv",)
 
     vehicle: Aircraft = option(help="A vehicle's name, or a card or model file.", complete="vehicle", kw_only=False)
-    controller: Path = option(
+    controller: Pilot = option(
         help="A controller's file, of `swash control design` or `swash control decouple`.", kw_only=False
     )
-    maneuver: str = option(metavar="SPEC", help='For example "hold:10s" or "doublet:roll,0.5s,0.2".', kw_only=False)
+    maneuver: Motion = option(
+        help='Roll and pitch are a pilot\'s commands; x, y, z, psi, ahead or right is asked of every one: "hold:10s".',
+        kw_only=False,
+    )
     count: int = option(default=100, help="Number of flights.", least=2)
-    fit: Path | None = option(default=None, help="Models drawn from this fit.json.")
+    fit: Fitted | None = option(default=None, help="Models drawn from this fit.json.")
     gusts: Gusts = option(default="none", help="none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s].")
     battery: Battery | None = option(default=None, help="Voltage at start and end, 12.5-10.5.")
     tolerances: bool = setting(default=False, help="the card's numbers drawn from their sigmas.")
@@ -121,87 +121,31 @@ class FlyMany(OfVehicle["MonteCarlo"]):
 
     def answer(self, say: Say = silent) -> MonteCarlo:
         from swashplate.api.languages import numbers
-        from swashplate.api.monte_carlo import monte_carlo
+        from swashplate.api.monte_carlo import fly_many
 
         for text in (self.vary or {}).values():
             numbers(str(text).removesuffix("%"), "--vary", count=1)
         aircraft = self.flying(self.vehicle)
         say(f"simulating {self.count} flights {_COMPILING}")
-        return monte_carlo(
-            aircraft,
-            self.controller,
-            maneuver=self.maneuver,
-            count=self.count,
-            fit=self.fit,
-            gusts=turbulence(self.gusts),
-            battery=self.battery,
-            tolerances=self.tolerances,
-            vary=dict(self.vary or {}),
-            payload=self.payload,
-            delay=self.delay,
-            bits=self.command_bits,
-            limits=flight_limits(self.limit),
-            voltage=self.voltage,
-            sag=self.sag,
-            seed=self.seed,
-        )
+        return fly_many(self, aircraft)
 
     def document(self, answer: MonteCarlo) -> Any:
         return answer.to_document() | {"vehicle": _called(self.vehicle)}
 
     def remarks(self, answer: MonteCarlo) -> list[str]:
-        return [f"late: {answer.late}", *super().remarks(answer)]
+        return [f"late: {answer.late}", *careful(answer.remarks)]
 
     def text(self, answer: MonteCarlo, width: int) -> list[Any]:
         return [repr(answer.spread)]
+
+
+def careful(remarks: Sequence[str]) -> list[str]:
+    """Remarks as they are said."""
+    return [f"Careful: {words}" for words in remarks]
 
 
 def _called(vehicle: Any) -> str:
     return str(vehicle) if isinstance(vehicle, str | Path) else vehicle.name
 
 
-def turbulence(gusts: Any) -> Any:
-    """What `gusts` asks for: none, indoor, indoor=SIGMA, a mean wind [m/s], or gusts as they are."""
-    from swashplate.api.languages import numbers
-    from swashplate.simulation.wind import INDOOR, indoor, outdoor
-
-    if gusts is None or gusts == "none":
-        return None
-    if not isinstance(gusts, str | int | float):
-        return gusts
-    if gusts == "indoor":
-        return INDOOR
-    kind, told, sigma = str(gusts).partition("=")
-    try:
-        if told and kind.strip() == "indoor":
-            return indoor(numbers(sigma, "--gusts", count=1)[0])
-        return outdoor(numbers(str(gusts), "--gusts", count=1)[0])
-    except SwashError as error:
-        raise SwashError(
-            f"is '{gusts}', expected none, indoor, indoor=0.3 (m/s), or a mean wind in m/s ({error.problem}).",
-            channel="--gusts",
-        ) from None
-
-
-def flight_limits(given: Any) -> Any:
-    """`lean=30deg` and so on as what is judged by; those that are not given keep their defaults."""
-    from dataclasses import replace
-
-    from swashplate.api.languages import numbers
-    from swashplate.control.draws.spread import SHOWN, Limits
-
-    chosen = Limits()
-    if isinstance(given, Limits):
-        return given
-    for name, text in (given or {}).items():
-        if name not in SHOWN:
-            raise SwashError(f"'{name}' is no limit; expected {', '.join(SHOWN)}.", channel="--limit")
-        unit, factor = SHOWN[name]
-        if str(text).strip() == "none":
-            chosen = replace(chosen, **{name: math.inf})
-            continue
-        value = numbers(str(text).strip().removesuffix(unit).strip(), "--limit", count=1)[0]
-        if not value > 0.0:
-            raise SwashError(f"{name} is {text}, expected more than 0 {unit}.", channel="--limit")
-        chosen = replace(chosen, **{name: value / factor})
-    return chosen
+monte_carlo = verb("monte_carlo", FlyMany)

@@ -69,7 +69,7 @@ class TrimVehicle(Steadily):
         _report(answer.curve, folder, names)
 
     def document(self, answer: Flown) -> Any:
-        return {"vehicle": answer.name, **answer.curve.as_dict()}
+        return {"vehicle": answer.name, **answer.curve.to_document()}
 
     def text(self, answer: Flown, width: int) -> list[Any]:
         from swashplate.text_table import text_columns
@@ -234,7 +234,7 @@ class FindDerivatives(Steadily):
         _report(answer.result, folder, names)
 
     def document(self, answer: Flown) -> Any:
-        result = answer.result.as_dict()
+        result = answer.result.to_document()
         if self.published is not None:
             return {"vehicle": answer.name, "speed": self.speeds()[0], "published": str(self.published)} | result
         if self.left_out:

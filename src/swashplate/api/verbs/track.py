@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import FLIGHT, FromFewLogs, strings
 from swashplate.api.languages import Aircraft, Band, Log, Names, Renamed, Texts, Values
-from swashplate.api.question import argument, option, setting
+from swashplate.api.question import argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from swashplate.api.track import Tracking
 
 
@@ -25,13 +27,17 @@ class TrackLog(FromFewLogs["Tracking"]):
     swash track flight.csv --equation "q_dot = Mq*q + Md*servo_pitch + bias" --held servo_pitch --out tracked
 
     swash track flight.nc --vehicle coax --unknown mass --out tracked
+
+    Raises:
+        IdentificationError: an equation that is none, none at all, or settings that cannot work.
+        FlightError: a channel that the flight lacks, or a stream of fewer than three samples.
     """
 
     files: ClassVar[tuple[str, ...]] = ("report.html", "track.json")
 
     log: Log = argument(metavar="FLIGHT", help=f"{FLIGHT}.", complete="flight")
     equation: Texts | None = option(
-        default=None, help="As 'p_dot = Lp*p + La*aileron - 9.81*theta + bias'. Repeatable."
+        default=None, help="As 'p_dot = Lp*p + La*aileron - 9.81*theta + bias'. Repeatable.", kw_only=False
     )
     vehicle: Aircraft | None = option(
         default=None,
@@ -44,7 +50,7 @@ class TrackLog(FromFewLogs["Tracking"]):
         default=None, help="Frequencies that are used [Hz]; 0.1-2.5 if not given, or to a fifth of the rate."
     )
     memory: float | None = option(default=None, help="Time constant of forgetting; none by default.", unit="s")
-    wander: float = setting(default=0.02, help="possible relative change of the parameters in a second.")
+    wander: float = setting(default=0.02, help="relative change of the parameters in a second, one sigma")
     code: Path | None = option(default=None, metavar="DIR", help="Write the estimators as C99 here.")
     rate: float | None = setting(
         default=None, help="samples a second; the log's own if not given", unit="Hz", least=1.0
@@ -55,7 +61,7 @@ class TrackLog(FromFewLogs["Tracking"]):
     instrument: Names = setting(
         default=(), help="commands that no controller gives: with them strong gusts do not bias"
     )
-    delay: Values | None = setting(default=None, help="channels that act late, seconds by name")
+    delay: Values | None = setting(default=None, help="channels that act late, by name", unit="s")
     spread: float = setting(default=0.2, help="possible relative error of the parameters at the start")
     every: float = setting(default=0.2, help="time between two estimates", unit="s", least=0.001)
     rename: Renamed | None = setting(
@@ -63,35 +69,13 @@ class TrackLog(FromFewLogs["Tracking"]):
     )
 
     def answer(self, say: Say = silent) -> Tracking:
-        from swashplate.api.track import track
-        from swashplate.models.catalogue import structure, vehicle
+        from swashplate.api.track import follow_log
 
-        unknown = strings(self.unknown)
-        if unknown and self.vehicle is None:
+        if strings(self.unknown) and self.vehicle is None:
             raise SwashError("is of a vehicle: give --vehicle too.", channel="--unknown")
         if (self.vehicle is None) == (not self.equation):
             raise SwashError("is wanted, or --vehicle: one of the two.", channel="--equation")
-        what: Any = strings(self.equation)
-        if self.vehicle is not None:
-            text = isinstance(self.vehicle, str | Path)
-            what = self.vehicle if not text else vehicle(self.vehicle) if unknown else structure(self.vehicle)
-        made = track(
-            self.read(self.log)[0],
-            what,
-            rate=self.rate,
-            band=self.band,
-            spacing=self.spacing,
-            memory=self.memory,
-            held=strings(self.held),
-            instruments=strings(self.instrument),
-            delays=self.delay or {},
-            unknown=unknown,
-            spread=self.spread,
-            wander=self.wander,
-            every=self.every,
-            names=self.rename or {},  # pyrefly: ignore[bad-argument-type]
-            say=say,
-        )
+        made = follow_log(self, say)
         if self.code is not None:
             made.code().save(self.code)
         return made
@@ -100,5 +84,8 @@ class TrackLog(FromFewLogs["Tracking"]):
         notes = [f"\n{note}" for note in answer.code().notes] if self.code is not None else []
         return [repr(answer), *notes, *([f"\nWritten: {self.code}"] if self.code is not None else [])]
 
-    def remarks(self, answer: Tracking) -> list[str]:
-        return []
+    def problems(self, answer: Tracking) -> Sequence[str]:
+        return answer.problems
+
+
+track = verb("track", TrackLog)

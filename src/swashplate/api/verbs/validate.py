@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import FLIGHT, FromConditioned, FromFewLogs, called, drawn, strings
 from swashplate.api.languages import Aircraft, Band, Logs, Names, Numbers, Renamed, Things
-from swashplate.api.question import argument, option, setting
+from swashplate.api.question import argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from swashplate.api.case_comparison import CaseComparison
     from swashplate.api.linear_study import LinearStudy
     from swashplate.validation.compare import ModelComparison
@@ -109,54 +111,56 @@ class Validate(FromConditioned["Validation | LinearStudy"]):
         return str(self.vehicle) if isinstance(self.vehicle, str | Path) else model.name
 
     def _linear(self, model: Any, other: Any, say: Say, *, draws: bool) -> LinearStudy:
-        from swashplate.api.validate_linear import validate_linear
+        from swashplate.api.fit_linear import along_flights
 
         if self.close_loop or draws:
             channel = "--close-loop" if self.close_loop else "--posterior"
             raise SwashError(
                 f"'{self._name(model)}' is a state-space model: it flies along the inputs.", channel=channel
             )
-        return validate_linear(
-            model,
-            self.read(self.flight),
-            published=other,
-            band=self.band,
-            rate=self.rate,
-            cutoff=self.cutoff,
-            names=self.rename,  # pyrefly: ignore[bad-argument-type]
-            say=say,
-        )
+        return along_flights(self, model.structure, other, say)
 
     def write(self, answer: Any, folder: Path, names: tuple[str, ...]) -> None:
-        if hasattr(answer, "write"):
-            answer.write(folder)
-            return
-        from swashplate.reporting.report import report
+        from swashplate.validation.validation import Validation
 
-        report(answer, path=folder / "report.html")
-        answer.save(folder / "validation.json")
+        super().write(answer, folder, names[:2] if isinstance(answer, Validation) else names)
 
     def text(self, answer: Any, width: int) -> list[Any]:
-        if hasattr(answer, "write"):
-            return [repr(answer)]
         from swashplate.reporting.terminal_tables import validation_parts
+        from swashplate.validation.validation import Validation
 
-        return validation_parts(answer, width=width)
+        return validation_parts(answer, width=width) if isinstance(answer, Validation) else [repr(answer)]
 
-    def remarks(self, answer: Any) -> list[str]:
-        return list(getattr(answer, "remarks", ()))
+    def remarks(self, answer: Any) -> Sequence[str]:
+        from swashplate.api.linear_study import LinearStudy
+
+        return answer.remarks if isinstance(answer, LinearStudy) else ()
+
+    def problems(self, answer: Any) -> Sequence[str]:
+        from swashplate.api.linear_study import LinearStudy
+
+        return answer.problems if isinstance(answer, LinearStudy) else ()
 
 
 class Compare(FromFewLogs["CaseComparison | ModelComparison"], FromConditioned["CaseComparison | ModelComparison"]):
     """Put cases side by side, each against the first: frequency responses, fits (parameters, modes) or models (modes).
 
-    With --flight the models are simulated with the recorded inputs, and the fit of every output is printed. --out
-    FILE.html writes a page with figures.
+    Responses show coherent bands and mismatch J; fits parameters in standard deviations; models modes and responses.
+    With --flight the models are simulated with the recorded inputs, and the fit of every output is printed: start
+    states, shifts of the rates and biases are solved for, each model alike; all else has to come from the model.
+    --out FILE.html writes a page with figures.
+
+    Raises:
+        SwashError: fewer than two cases (one model beside flights), responses beside something else, no common pair.
+        FlightError: an input that the flights lack, or no output that both have.
     """
 
     files: ClassVar[tuple[str, ...]] = ("report.html",)
 
-    cases: Things = argument(metavar="CASE...", help="responses.nc, fit.json, models' files or names, or folders.")
+    cases: Things = argument(
+        metavar="CASE...",
+        help="responses.nc, fit.json, models' files or names, or folders; in Python also a dict by name.",
+    )
     flight: Logs | None = option(
         default=None,
         help="Fly the models along this flight instead. May be repeated.",
@@ -167,10 +171,9 @@ class Compare(FromFewLogs["CaseComparison | ModelComparison"], FromConditioned["
     as_logged: bool = setting(default=False, help="use channels even where they contradict each other")
 
     def answer(self, say: Say = silent) -> CaseComparison | ModelComparison:
-        from swashplate.api.compare import compare
+        from swashplate.api.compare import compare_cases
 
-        flown = self.conditioned(self.flight) if self.flight else None
-        return compare(self.cases, flown, outputs=strings(self.outputs) or None)
+        return compare_cases(self)
 
-    def remarks(self, answer: Any) -> list[str]:
-        return []
+
+compare = verb("compare", Compare)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import FromFewLogs
 from swashplate.api.languages import Aircraft, Logs, Things
-from swashplate.api.question import VerbQuestion, argument, option, setting
+from swashplate.api.question import VerbQuestion, argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
@@ -155,7 +155,13 @@ class StitchModels(FromFewLogs["Vehicle"]):
     """Stitch linear models at several speeds into one that trims, flies, exports and links like every vehicle.
 
     Trims and derivatives are interpolated over the air speed ahead; gravity and kinematics are nonlinear. Points are
-    files of `swash vehicle linearize --out` or identified models with [trim].
+    files of `swash vehicle linearize --out` or identified models with [trim]. It trims, flies and is saved as any
+    vehicle. Between the points it is near what they were made of; beyond them trims and derivatives are held.
+
+    Raises:
+        CardError: fewer than two points, two at one speed, other states, inputs or units, no trim, no level flight,
+            kinematics or gravity that do not belong to the trim.
+        SwashError: trims that are not as many as the points, or a flight without what its means shall tell.
     """
 
     files: ClassVar[tuple[str, ...]] = ("model.toml",)
@@ -174,13 +180,9 @@ class StitchModels(FromFewLogs["Vehicle"]):
     title: str = setting(default="", help="title of the model.")
 
     def answer(self, say: Say = silent) -> Vehicle:
-        from swashplate.api.stitch import stitch
+        from swashplate.api.stitch import stitch_asked
 
-        flights = self.read(self.trim)
-        files = [file for point in self.points for file in _files(Path(point))]
-        if flights and len(flights) != len(files):
-            raise SwashError(f"{len(flights)} logs for {len(files)} points, expected one each.", channel="--trim")
-        return stitch(files, trims=flights or None, gradients=self.gradients, title=self.title)  # pyrefly: ignore[bad-argument-type]
+        return stitch_asked(self)
 
     def write(self, answer: Vehicle, folder: Path, names: tuple[str, ...]) -> None:
         for name in names:
@@ -190,14 +192,7 @@ class StitchModels(FromFewLogs["Vehicle"]):
         return {"vehicle": answer.name, "title": answer.card.title}
 
 
-def _files(place: Path) -> list[Path]:
-    """A point's file, or those of a folder."""
-    if not place.is_dir():
-        return [place]
-    files = sorted(place.glob("*.toml"))
-    if not files:
-        raise SwashError("has no .toml file in it.", where=place, channel="POINT")
-    return files
+stitch = verb("stitch", StitchModels)
 
 
 class ShowStructures(VerbQuestion[Any]):
@@ -232,4 +227,4 @@ class ShowStructures(VerbQuestion[Any]):
             structure(self.structure).save(folder / name)  # pyrefly: ignore[bad-argument-type]
 
     def document(self, answer: Any) -> Any:
-        return answer.as_dict()
+        return answer.to_document()

@@ -120,7 +120,7 @@ class Reconstruction(Shown):
         scale = {n: e.value if e.significant and abs(e.value) < 0.5 else 0.0 for n, e in self.scales.items()}
         return correct_sensors(flight, biases=bias, scales=scale)
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """As JSON types: values and standard errors by channel."""
         return {
             "biases": {name: [e.value, e.sigma] for name, e in self.biases.items()},

@@ -109,7 +109,7 @@ class FlightReview(Shown):
     def __str__(self) -> str:
         return f"{self.source or '(unnamed)'}: {self.vehicle or 'an aircraft'}\n\n{self.words}"
 
-    def as_dict(self) -> dict[str, object]:
+    def to_document(self) -> dict[str, object]:
         """The same as plain JSON types; NaN becomes None."""
         return {key: _plain(value) for key, value in asdict(self).items()} | {
             "filters": [{**dict(asdict(each)), "delay": each.delay} for each in self.filters]

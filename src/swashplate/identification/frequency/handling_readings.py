@@ -103,7 +103,7 @@ class Line:
     read: Handling | ResponseMargins | None
     problem: str = ""
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """Numbers and words as JSON types: each number with its error."""
         numbers = {f.name: list(astuple(getattr(self.read, f.name))) for f in fields(self.read)} if self.read else {}
         return {"response": self.response, "from": self.source, **numbers, "problem": self.problem}

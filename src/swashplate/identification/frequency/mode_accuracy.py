@@ -43,7 +43,7 @@ class ModeAccuracy:
     def frequency_percent(self) -> float:
         return 100.0 * self.frequency_bound / self.frequency if self.frequency else float("inf")
 
-    def as_dict(self) -> dict[str, float | bool]:
+    def to_document(self) -> dict[str, float | bool]:
         return {
             "real": self.eigenvalue.real,
             "imag": self.eigenvalue.imag,

@@ -154,7 +154,7 @@ class StructureSearch:
             table.append((c.name, f"{c.cost:.1f}", f"{max(c.fit.costs):.0f}", str(c.parameters), vague, seen, modes))
         return table if self.judged else [(*row[:5], *row[6:]) for row in table]
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """All of it as JSON types."""
         return {
             "picked": self.pick.name,
@@ -172,7 +172,7 @@ class StructureSearch:
                     "misfit": c.misfit,
                     "abandoned": c.abandoned,
                     "failed": c.failed,
-                    "modes": [mode.as_dict() for mode in c.fit.details.modes],
+                    "modes": [mode.to_document() for mode in c.fit.details.modes],
                 }
                 for c in self.tried
             ],

@@ -55,7 +55,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
         return {}
 
     def apply(log: int, units: dict[str, str], drop_bad_stamps: bool) -> dict[str, Any]:
-        return desk.apply(log, Remedy(units, drop_bad_stamps)).as_dict()
+        return desk.apply(log, Remedy(units, drop_bad_stamps)).to_document()
 
     def traces(wanted: list[list[Any]], bins: int) -> dict[str, Any]:
         rows = [(int(log), str(name), float(start), float(stop)) for log, name, start, stop in wanted]
@@ -80,7 +80,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
         Route("/", page(PAGE / "open.html")),
         Mount("/page", StaticFiles(directory=SHARED)),
         Mount("/open", StaticFiles(directory=PAGE)),
-        Route("/logs", ask.get(desk.as_dict)),
+        Route("/logs", ask.get(desk.to_document)),
         _post("/upload", begin, name=ask.text(1000), size=ask.whole(0, 1 << 50)),
         Route("/upload/{token}/{at:number}", piece, methods=["POST"]),
         _post("/example", lambda file: {"log": desk.open_example(file).number}, file=_NAME),
@@ -128,7 +128,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             output=ask.text(200, least=0),
         ),
         _post("/cancel", desk.job.cancel),
-        Route("/job", ask.get(desk.job.as_dict)),
+        Route("/job", ask.get(desk.job.to_document)),
         Route("/download/{name}", download),
         _post("/common", desk.common, numbers=_numbers),
     ]

@@ -24,7 +24,7 @@ class Code:
     shell: str
     python: str
 
-    def as_dict(self) -> dict[str, str]:
+    def to_document(self) -> dict[str, str]:
         """As the page has it."""
         return {"title": self.title, "shell": self.shell, "python": self.python}
 

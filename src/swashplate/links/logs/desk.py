@@ -114,12 +114,12 @@ class Desk:
         opened.load(opened.read.with_remedy(remedy))
         return opened
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """Every log as the page lists it, and what may be dropped."""
         with self._lock:
             logs = list(self._logs.values())
         examples = [{"file": e.file, "title": e.title, "words": e.words} for e in example_logs.EXAMPLES]
-        listed = [log.as_dict() for log in logs]
+        listed = [log.to_document() for log in logs]
         return {"logs": listed, "largest": LARGEST, "piece": PIECE, "examples": examples}
 
     # ---- what is drawn -----------------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ class Desk:
         wanted = [(number, name) for number, name in wanted if name in self.log(number).ready]
         numbers = list(dict.fromkeys(number for number, _ in wanted))
         channels = [[name for number, name in wanted if number == log] for log in numbers]
-        return code_lines.plotted([self.log(number).read for number in numbers], channels, span).as_dict()
+        return code_lines.plotted([self.log(number).read for number in numbers], channels, span).to_document()
 
     def align(self, first: int, second: int) -> dict[str, Any]:
         """How many seconds the second log's clock is put forward to show the same motion as the first's at one time.
@@ -168,7 +168,7 @@ class Desk:
         return {
             "offset": float(shift.offset + shift.drift * middle),
             "words": str(shift),
-            "code": code_lines.aligned(one.read, other.read).as_dict(),
+            "code": code_lines.aligned(one.read, other.read).to_document(),
         }
 
     # ---- identification ----------------------------------------------------------------------------------------

@@ -36,7 +36,7 @@ def review_of(opened: Opened) -> dict[str, Any]:
         "noise": [_noise(each) for each in told.noise],
         "next": [_next(each) for each in told.next],
         "about_next": told.about_next,
-        "code": code_lines.reviewed(opened.read).as_dict(),
+        "code": code_lines.reviewed(opened.read).to_document(),
     }
 
 

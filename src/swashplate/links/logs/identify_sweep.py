@@ -127,7 +127,7 @@ def identify_sweep(
         "words": " ".join(f"{one.sweep}." for one in swept),
         "joined": _joined(swept),
         "axes": axes,
-        "code": code.as_dict(),
+        "code": code.to_document(),
         "files": list(files),
     }
     return Identified(document, files)
@@ -178,8 +178,8 @@ class _Chosen(NamedTuple):
 
 
 def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., None]) -> _Chosen:
-    fit_tf, outputs = resolve("fit_tf"), [chosen.output]
-    study = fit_tf(responses, input=chosen.input, outputs=outputs, say=say)
+    asked = {"input": chosen.input, "outputs": [chosen.output]}
+    study = resolve("FitTransferFunctions")(responses, **asked).answer(say)
     fitted = study.material.transfer_functions[0]
     form = str(fitted.details.form.text)
     # What a model does outside of the lines that it was fitted to, nobody has told: it is judged within them.
@@ -192,7 +192,7 @@ def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., No
     except SwashError as error:
         words, gains = f"{error.problem} {error.hint or ''}", False
     # Once more with the form that was chosen: the same fit, with what is asked of it.
-    made = fit_tf(responses, input=chosen.input, outputs=outputs, form=form, band=band, gains=gains, hold_out=held)
+    made = resolve("fit_tf")(responses, **asked, form=form, band=band, gains=gains, hold_out=held)
     return _Chosen(made, words, form, band)
 
 

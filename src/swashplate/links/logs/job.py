@@ -93,7 +93,7 @@ class PageJob:
                 self._state = {"state": "cancelled"}
         return {}
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """How it is going, or what came of it."""
         with self._lock:
             state = dict(self._state, number=self._number)

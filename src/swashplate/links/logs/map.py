@@ -56,7 +56,7 @@ def map_of(opened: Opened) -> dict[str, Any]:
         "north": np.round(north, 3),
         "east": np.round(east, 3),
         "words": words,
-        "code": code_lines.tracked(opened.read, drawn, whole=False).as_dict() if drawn else None,
+        "code": code_lines.tracked(opened.read, drawn, whole=False).to_document() if drawn else None,
     }
 
 

@@ -203,15 +203,15 @@ class Opened:
             self._channels[name] = DrawnChannel(time, shown, unit, self._gaps[home])
         return self._channels[name]
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """What the page lists of it."""
         table = self.foreign or (self.flight is not None and self.flight.provenance.reader in _TABLES)
         head = {"id": self.number, "name": Path(self.read.file).name, "state": self.state, "version": self.version}
         head |= {"foreign": self.foreign, "table": table}
-        code = inspected(self.read).as_dict()
+        code = inspected(self.read).to_document()
         if self.state == FAILED:
             mend = remedy(self.hint)
-            told = {"problem": self.problem, "hint": self.hint, "remedy": mend and mend.as_dict()}
+            told = {"problem": self.problem, "hint": self.hint, "remedy": mend and mend.to_document()}
             return {**head, **told, "code": code}
         if self.flight is None or self.state == READING:
             return head
@@ -252,7 +252,7 @@ def _told(error: SwashError) -> tuple[str, str]:
 
 def _with_remedy(text: str) -> dict[str, Any]:
     mend = remedy(text)
-    return {"text": text, "remedy": mend and mend.as_dict()}
+    return {"text": text, "remedy": mend and mend.to_document()}
 
 
 def _change(flight: Flight, time: float, details: dict[str, Any]) -> dict[str, Any]:

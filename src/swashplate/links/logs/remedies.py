@@ -29,7 +29,7 @@ class Remedy:
         given = [f"--unit {name}={unit}" for name, unit in self.units.items()]
         return " ".join([*given, *([_DROP] if self.drop_bad_stamps else [])])
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """As the page has it."""
         return {"words": self.words, "units": dict(self.units), "drop_bad_stamps": self.drop_bad_stamps}
 

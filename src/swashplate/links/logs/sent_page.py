@@ -92,7 +92,7 @@ def sent_page(
     read = Read(called) if read is None else read.called(called)
     say("looking for what is wrong with the log")
     log = Opened.of(bare, read, path)
-    listed = log.as_dict()
+    listed = log.to_document()
     for problem in listed["problems"]:
         problem["remedy"] = None
     listed.update(table=False, foreign=False, listed=True)

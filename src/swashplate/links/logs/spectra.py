@@ -59,7 +59,7 @@ def spectra(opened: Opened, channel: str, start: float, stop: float) -> dict[str
             "floor": top - _FLOOR,
         },
         "rotor": rotor,
-        "code": code_lines.spectra(opened.read, channel, start, stop, rotor=rotor["speed"] is not None).as_dict(),
+        "code": code_lines.spectra(opened.read, channel, start, stop, rotor=rotor["speed"] is not None).to_document(),
     }
 
 

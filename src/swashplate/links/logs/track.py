@@ -72,7 +72,7 @@ def track(opened: Opened) -> dict[str, Any]:
         "rotors": len(shape["rotors"]),
         "tail": shape["tail"] is not None,
         "notes": notes,
-        "code": code_lines.tracked(opened.read, drawn, whole=whole).as_dict(),
+        "code": code_lines.tracked(opened.read, drawn, whole=whole).to_document(),
     }
 
 

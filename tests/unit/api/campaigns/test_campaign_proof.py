@@ -128,7 +128,7 @@ batch = 128
 vehicle = "thirteen_state"
 controller = "hold.toml"
 maneuver = "hover:2s"
-varies = {numbers = {Lb = "5%"}}
+vary = {Lb = "5%"}
 """
 
 

@@ -14,6 +14,7 @@ import pytest
 from scipy.signal import lfilter
 
 import swashplate as sp
+from swashplate.api.asking import flight_limits, turbulence
 from swashplate.api.campaigns import worker
 from swashplate.api.campaigns.fitting import unusable
 from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings, settings_of
@@ -23,6 +24,7 @@ from swashplate.api.campaigns.kinds.multi_start import MULTI_START, optima, star
 from swashplate.api.campaigns.kinds.recovery import RECOVERY, judged
 from swashplate.api.campaigns.shares import quantile, share_interval
 from swashplate.api.campaigns.tasks import Columns, Portion, portions
+from swashplate.api.verbs.simulate import FlyMany
 from swashplate.control.draws.spread import Limits
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight, stream
@@ -72,47 +74,47 @@ def test_seeds_of_tasks_are_their_own() -> None:
 
 
 # ---- flights ---------------------------------------------------------------------------------------------------------
-FLIGHTS: dict[str, Any] = {"vehicle": "coax", "controller": "c.toml"}
+FLIGHTS: dict[str, Any] = {"vehicle": "coax", "controller": "c.toml", "maneuver": "hover:10s"}
 
 
 def test_flights_are_asked_for_as_the_file_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: dict[str, Any] = {}
+    questions: list[FlyMany] = []
     spread = SimpleNamespace(
         lost_after=np.array([np.inf, 1.5]),
         values={"lean": np.array([0.1, np.inf]), "place": np.array([1.0, np.inf])},
         place_rms=np.array([0.5, np.inf]),
     )
 
-    def flown(vehicle: object, controller: object, **options: object) -> SimpleNamespace:
-        asked.update(options, vehicle=vehicle, controller=controller)
+    def flown(asked: FlyMany) -> SimpleNamespace:
+        questions.append(asked)
         return SimpleNamespace(spread=spread, drawn={"mass": np.array([0.3, 0.4])})
 
-    monkeypatch.setattr(of_flights, "monte_carlo", flown)
-    monkeypatch.setattr(of_flights, "load_controller", lambda path: f"from {path}")
-    varies = {"gusts": {"indoor": 0.3}, "numbers": {"mass": "5%"}, "payload": 0.01, "fit": "fit.json"}
-    document = {**FLIGHTS, "varies": varies, "limits": {"lean": 30.0, "place": 0.0}, "bits": 8}
+    monkeypatch.setattr(FlyMany, "answer", flown)
+    varies = {"gusts": "indoor=0.3", "vary": {"mass": "5%"}, "payload": 0.01, "fit": "fit.json"}
+    document = {**FLIGHTS, **varies, "limit": {"lean": "30deg", "place": "none"}, "command_bits": 8}
     settings: Any = settings_of("monte-carlo", document)
     files = {"c.toml": tmp_path / "c.toml", "fit.json": tmp_path / "fit.json"}
     table = of_flights.MONTE_CARLO.run(settings, Portion(4, 2, 77), files)
     assert list(table) == ["lost_after", "lost", "lean", "place", "place_rms", "drawn.mass"]
     assert list(table["lost"]) == [0, 1]
-    assert asked["vehicle"].name == "coax"
-    assert asked["controller"] == f"from {tmp_path / 'c.toml'}"
-    assert (asked["seed"], asked["count"], asked["bits"]) == (77, 2, 8)
-    assert asked["gusts"].sigma[0] == 0.3
-    assert (asked["fit"], asked["vary"], asked["payload"]) == (tmp_path / "fit.json", {"mass": "5%"}, 0.01)
-    assert asked["limits"] == Limits(lean=np.radians(30.0), place=np.inf)
+    (asked,) = questions
+    assert asked.vehicle.name == "coax"
+    assert asked.controller == tmp_path / "c.toml"
+    assert (asked.seed, asked.count, asked.command_bits) == (77, 2, 8)
+    assert turbulence(asked.gusts).sigma[0] == 0.3
+    assert (asked.fit, asked.vary, asked.payload) == (tmp_path / "fit.json", {"mass": "5%"}, 0.01)
+    assert flight_limits(asked.limit) == Limits(lean=np.radians(30.0), place=np.inf)
     says = found("monte-carlo", table, **document)
     assert says.summary[0][1].startswith("1 of 2 (50 %")
     assert (says.worst, says.again) == ("place", ".nc")
-    assert [entry.entry for entry in of_flights.MONTE_CARLO.files(settings)] == ["vehicle", "controller", "varies.fit"]
+    assert [entry.entry for entry in of_flights.MONTE_CARLO.files(settings)] == ["vehicle", "controller", "fit"]
 
 
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"varies": {"gusts": {"indoors": 1.0}}}, "indoors: expected one of"),
-        ({"limits": {"leaning": 3.0}}, "leaning = 3 is no limit"),
+        ({"gusts": "indoors"}, "is 'indoors', expected none"),
+        ({"limit": {"leaning": 3.0}}, "'leaning' is no limit"),
         ({"maneuver": "loop"}, "loop"),
     ],
 )

@@ -38,7 +38,7 @@ batch = 10
 vehicle = "coax"
 maneuver = "hover:4s"
 controller = "hold.toml"
-varies = {{gusts = {{indoor = 0.3}}}}
+gusts = "indoor=0.3"
 """
 
 

@@ -144,7 +144,7 @@ def test_inspect_lists_sweeps_and_damage(tmp_path: Path) -> None:
     text = str(found)
     for part in ("sweeps:", "roll mixer: 22.00 to", "not flown to its end", "the log is cut off", "HELI"):
         assert part in text
-    assert found.as_dict()["sweeps"][0]["axis"] == "roll mixer"
+    assert found.to_document()["sweeps"][0]["axis"] == "roll mixer"
 
 
 def test_a_sweep_has_no_jumps_though_its_changes_grow() -> None:

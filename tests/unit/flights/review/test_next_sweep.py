@@ -58,7 +58,7 @@ def test_betaflight_gets_its_chirp() -> None:
 
 def test_a_review_prints_and_becomes_json() -> None:
     told = review(flown("ArduCopter V4.5.7, HELI"), swept=())
-    document = json.loads(json.dumps(told.as_dict(), allow_nan=False))
+    document = json.loads(json.dumps(told.to_document(), allow_nan=False))
     assert document["loops"][0]["step"]["delay"]["value"] == pytest.approx(told.loops[0].step.delay.value)
     for heading in ("incidents", "rate loops", "noise", "what to fly next"):
         assert heading in str(told)

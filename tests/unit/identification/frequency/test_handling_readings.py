@@ -188,13 +188,13 @@ def test_every_axis_is_judged_by_its_own_input() -> None:
     assert isinstance(modelled, Handling)
     assert modelled.bandwidth.value == pytest.approx(flown.bandwidth.value, rel=0.02)
     assert 0.0 < modelled.bandwidth.sigma < 0.2 * modelled.bandwidth.value
-    assert lines[1].as_dict()["bandwidth"] == [modelled.bandwidth.value, modelled.bandwidth.sigma]
+    assert lines[1].to_document()["bandwidth"] == [modelled.bandwidth.value, modelled.bandwidth.sigma]
     assert not any(line.problem for line in lines)
     # The other way round the numbers are the same, and it is told.
     turned = handling_lines(replace(found, response=-found.response))
     assert [repr(line.read) for line in turned] == [repr(line.read) for line in lines if line.source == "flight"]
     assert "a positive mixer_roll makes phi negative" in repr(turned[0])
-    assert "a positive mixer_pitch makes theta negative" in turned[1].as_dict()["problem"]
+    assert "a positive mixer_pitch makes theta negative" in turned[1].to_document()["problem"]
 
 
 def test_a_delay_of_a_second_and_more_is_told_in_seconds() -> None:

@@ -144,7 +144,7 @@ def test_candidates_are_what_the_channels_allow() -> None:
 
 
 def test_the_verb_searches_prints_and_has_a_page() -> None:
-    study = sp.fit_ss([*NEAR[:1], "compose:heave+yaw"], heave_and_yaw(), search=True, fixed={"tau_ped": 0.015})
+    study = sp.fit_ss([*NEAR[:1], "compose:heave+yaw"], heave_and_yaw(), search=True, fix={"tau_ped": 0.015})
     assert study.structure is not None
     assert "*heave+yaw+inflow+torque" in repr(study)
     assert study.to_document()["search"]["picked"] == "heave+yaw+inflow+torque"
@@ -152,7 +152,7 @@ def test_the_verb_searches_prints_and_has_a_page() -> None:
     page = study.page()
     assert any(section.title == "Which structures were tried?" for section in page.sections)
     with pytest.raises(CardError, match="no parameter of any structure of this search"):
-        sp.fit_ss(None, heave_and_yaw(), search=True, fixed={"tau_pedd": 0.0})
+        sp.fit_ss(None, heave_and_yaw(), search=True, fix={"tau_pedd": 0.0})
     with pytest.raises(SwashError, match="takes one structure"):
         sp.fit_ss(None, heave_and_yaw())
     with pytest.raises(SwashError, match="no start values from elsewhere"):

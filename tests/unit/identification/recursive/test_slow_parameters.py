@@ -66,7 +66,7 @@ def test_it_is_the_maximum_of_the_filters_own_likelihood() -> None:
 
 
 def test_a_payload_is_found_and_the_bounds_hold() -> None:
-    found = sp.track(falling(1.2), sp.vehicle("coax"), unknown=("mass",))
+    found = sp.track(falling(1.2), vehicle="coax", unknown=("mass",))
     value, sigma = found["mass"]
     assert abs(value - 1.2 * MASS) < 3.0 * sigma
     assert value > MASS + 5.0 * sigma
@@ -77,7 +77,7 @@ def test_a_payload_is_found_and_the_bounds_hold() -> None:
 def test_readings_that_the_model_does_not_explain_are_told() -> None:
     flight = falling(1.0)
     shaken = flight.with_channel("p", flight.values("p") + 0.3 * np.sin(np.arange(200)), like="p")
-    (one,) = sp.track(shaken, sp.vehicle("coax"), unknown=("mass",)).followed
+    (one,) = sp.track(shaken, vehicle="coax", unknown=("mass",)).followed
     assert any("bounds are too narrow" in words for words in one.notes)
 
 
@@ -120,6 +120,6 @@ def test_what_cannot_be_a_slow_parameter_is_refused() -> None:
     flight = falling(1.0)
     inner = flight.streams[flight.stream_of("p")]
     with pytest.raises(FlightError, match="channels of no sensor"):
-        sp.track(flight.with_streams({"only": inner[["p", "z"]]}), coax, unknown=("mass",))
+        sp.track(flight.with_streams({"only": inner[["p", "z"]]}), vehicle=coax, unknown=("mass",))
     with pytest.raises(FlightError, match="lacks inputs"):
-        sp.track(flight.with_streams({"only": inner[list(CHANNELS)]}), coax, unknown=("mass",))
+        sp.track(flight.with_streams({"only": inner[list(CHANNELS)]}), vehicle=coax, unknown=("mass",))

@@ -104,7 +104,7 @@ def test_the_estimate_along_the_sweep_is_right_and_the_direct_one_is_kept_beside
     part = again.select(("roll_rate",), ("stick_roll",))
     assert part.direct is not None
     assert part.direct.shape == part.response.shape
-    assert "direct_magnitude_db" in part.as_dict()["responses"][0]
+    assert "direct_magnitude_db" in part.to_document()["responses"][0]
 
 
 def test_where_direct_and_tracked_differ_is_said_by_band(answers: FrequencyResponse) -> None:

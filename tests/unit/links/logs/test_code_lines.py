@@ -61,7 +61,7 @@ def desk(folder: Path) -> Iterator[Desk]:
 
 
 def test_a_log_read_with_options(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
-    code = desk.as_dict()["logs"][0]["code"]
+    code = desk.to_document()["logs"][0]["code"]
     flight = python(code)["flight"]
     assert flight.values("p").tolist() == desk.log(1).ready.values("p").tolist()
     assert str(sp.inspect(flight)) in capsys.readouterr().out

@@ -61,7 +61,7 @@ def test_a_foreign_table_is_mapped_and_the_next_one_opens_by_itself(asking: Aski
     assert flight.values("mixer_roll") == pytest.approx(flight.values("p") * 0.5 / np.radians(20.0), abs=1e-4)
     again = asking.drop("flug2.csv", content(seed=1))
     assert (listed(asking, again)["foreign"], asking.desk.log(again).ready.channels) == (False, ("p", "mixer_roll"))
-    shell = asking.desk.log(again).as_dict()["code"]["shell"]
+    shell = asking.desk.log(again).to_document()["code"]["shell"]
     assert f"--mapping {made['path']}" in shell, "a command reads it alike"
     assert sp.read(asking.desk.log(again).path, mapping=made["path"]).channels == ("p", "mixer_roll")
     other = asking.drop("other.csv", content(head=HEAD.replace("Zeit", "Uhrzeit")))

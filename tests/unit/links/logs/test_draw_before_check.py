@@ -49,7 +49,7 @@ def settled() -> None:
 def test_it_is_drawn_first_and_its_findings_follow(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     let_go = slow(monkeypatch, inspect)
     desk.read_given()
-    (log,) = desk.as_dict()["logs"]
+    (log,) = desk.to_document()["logs"]
     assert (log["state"], log["checked"], log["problems"]) == ("ready", False, [])
     (drawn,) = desk.traces([(1, "p", 0.0, 30.0)], bins=100)
     assert len(drawn["time"]) > 100
@@ -57,7 +57,7 @@ def test_it_is_drawn_first_and_its_findings_follow(desk: Desk, monkeypatch: pyte
         desk.identify(1, 0, "", "")
     let_go.set()
     settled()
-    (log,) = desk.as_dict()["logs"]
+    (log,) = desk.to_document()["logs"]
     assert (log["state"], log["checked"]) == ("ready", True)
     assert "other sign" in log["problems"][0]["text"]
 
@@ -69,7 +69,7 @@ def test_a_check_that_fails_is_said(desk: Desk, monkeypatch: pytest.MonkeyPatch)
     slow(monkeypatch, fails).set()
     desk.read_given()
     settled()
-    (log,) = desk.as_dict()["logs"]
+    (log,) = desk.to_document()["logs"]
     assert (log["state"], log["problem"]) == ("failed", "events: has events that are no numbers.")
 
 
@@ -82,5 +82,5 @@ def test_findings_of_an_earlier_reading_do_not_come_back(desk: Desk, monkeypatch
     let_go.set()
     settled()
     assert desk.log(1).inspection is not None
-    assert desk.as_dict()["logs"][0]["problems"] == []
+    assert desk.to_document()["logs"][0]["problems"] == []
     assert settled_before is None or settled_before is desk.log(1).inspection

@@ -15,7 +15,7 @@ import pytest
 from scipy.signal import chirp, lsim
 from typer.testing import CliRunner
 
-from swashplate.api import fit_tf
+from swashplate.api import fit_linear
 from swashplate.cli.app import app
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
@@ -57,14 +57,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Desk, dict[
     desk.drop(2)  # of one log alone first
     with pytest.MonkeyPatch.context() as patch:
         few = functools.partial(suggest, forms=(Form.parse("0/1"), Form.parse("1/2")))
-        patch.setattr(fit_tf, "suggest", few)
+        patch.setattr(fit_linear, "suggest", few)
         patch.chdir(folder)
         desk.identify(1, 0, "", "")
         end = clock.monotonic() + 120.0
-        while desk.job.as_dict()["state"] == "running":
+        while desk.job.to_document()["state"] == "running":
             assert clock.monotonic() < end
             clock.sleep(0.05)
-        state = desk.job.as_dict()
+        state = desk.job.to_document()
         assert state["state"] == "done", state
         yield desk, state["result"], folder
     desk.close()
@@ -97,7 +97,7 @@ def test_a_sweep_that_carries_no_gains_says_why_and_offers_no_file(tmp_path: Pat
     (sweep,) = sweeps(log.ready)
     chosen = channels_of(log.ready, sweep)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fit_tf, "suggest", functools.partial(suggest, forms=(Form.parse("0/1"),)))
+        patch.setattr(fit_linear, "suggest", functools.partial(suggest, forms=(Form.parse("0/1"),)))
         result = identify_sweep(log, sweep, chosen, others=[], folder=tmp_path, tell=lambda what, share: None)
     (axis,) = result.document["axes"]
     assert axis["gains"] == []
@@ -224,7 +224,7 @@ def test_sweeps_of_two_axes_in_two_logs_are_estimated_together(tmp_path: Path, m
         log.inspection = replace(log.inspection, sweeps=(sweep,))
     one = roll.inspection.sweeps[0]  # type: ignore[union-attr]
     chosen = channels_of(roll.ready, one)
-    monkeypatch.setattr(fit_tf, "suggest", functools.partial(suggest, forms=(Form.parse("0/1"),)))
+    monkeypatch.setattr(fit_linear, "suggest", functools.partial(suggest, forms=(Form.parse("0/1"),)))
     made = identify_sweep(roll, one, chosen, others=[pitch], folder=tmp_path, tell=lambda what, share: None)
     result = made.document
     assert [(axis["input"], axis["output"]) for axis in result["axes"]] == [("mixer_roll", "p"), ("mixer_pitch", "q")]
@@ -286,11 +286,11 @@ def test_channels_follow_from_the_axis(
 
 def until(job: PageJob, state: str) -> dict[str, Any]:
     for _ in range(400):
-        told = job.as_dict()
+        told = job.to_document()
         if told["state"] == state:
             return told
         clock.sleep(0.01)
-    raise AssertionError(job.as_dict())
+    raise AssertionError(job.to_document())
 
 
 def test_work_is_stopped_and_nothing_of_it_is_kept(tmp_path: Path) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from swashplate.api.open_logs import open_logs
+from swashplate.api import open_logs
+from swashplate.api.verbs.look import Open
 from swashplate.links.web.libraries import PAGE
 
 
@@ -17,5 +18,6 @@ def _interrupted(address: str) -> None:
     not (PAGE / "vendor" / "three.module.min.js").is_file(),
     reason="the page's libraries are not here: python scripts/vendor_page.py",
 )
-def test_an_interrupt_behind_the_address_ends_the_page() -> None:
-    open_logs((), port=0, ready=_interrupted)
+def test_an_interrupt_behind_the_address_ends_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(open_logs, "ready", _interrupted)
+    Open(port=0).answer()

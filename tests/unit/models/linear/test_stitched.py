@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from swashplate.api.stitch import stitch
+from swashplate.api.verbs.vehicle import stitch
 from swashplate.arrays import Array
 from swashplate.errors import CardError, SwashError
 from swashplate.flights.flight import Flight
@@ -225,14 +225,14 @@ def test_means_of_flights_are_trims(points: list[StateSpaceModel], stitched: Sti
         x, u = trimmed(speed)
         named = dict(zip((*STATES, *INPUTS), (*x, *u), strict=True))
         flown.append(Flight.from_arrays(np.arange(100) / 50.0, {k: v + wobble for k, v in named.items() if k != "a"}))
-    made = stitch(bare, trims=flown, gradients="derivatives")
+    made = stitch(bare, trim=flown, gradients="derivatives")
     assert "a counts from its trim" in made.card.trust
     assert made.card.parameters["trim_theta_2"].value == pytest.approx(stitched.card.parameters["trim_theta_2"].value)
     short = [replace(f, streams={k: s.drop_vars("w") for k, s in f.streams.items()}) for f in flown]
     with pytest.raises(SwashError, match="has no w, whose means"):
-        stitch(bare, trims=short)
+        stitch(bare, trim=short)
     with pytest.raises(SwashError, match="1 given for 4 points"):
-        stitch(bare, trims=flown[:1])
+        stitch(bare, trim=flown[:1])
 
 
 def _without(model: StateSpaceModel, *names: str) -> StateSpaceModel:

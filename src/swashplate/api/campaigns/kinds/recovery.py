@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 from scipy.stats import norm
 
+from swashplate.api.asking import turbulence
 from swashplate.api.campaigns.fitting import (
     Attempt,
     FitCampaign,
@@ -20,7 +21,7 @@ from swashplate.api.campaigns.fitting import (
     values_of,
     within_bounds,
 )
-from swashplate.api.campaigns.flown import gusts_of, vehicle_of
+from swashplate.api.campaigns.flown import vehicle_of
 from swashplate.api.campaigns.kind import CampaignFindings, NamedFile, in_batches
 from swashplate.api.campaigns.shares import SURE, share_interval, share_words
 from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
@@ -45,7 +46,7 @@ class RecoveryCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, fr
     Attributes:
         controller: its file; the hold of the vehicle's kind where not given.
         maneuver: as of `swash simulate`. rate: samples per second [Hz].
-        gusts: {indoor = SIGMA} or {outdoor = MEAN} [m/s].
+        gusts: none, "indoor", "indoor=SIGMA", or a mean wind outdoors [m/s].
         sensors: "clean" (motion capture with noise only) or "real" (with gaps and outliers).
         noise: instead of these, standard deviations of white noise by channel, for any model.
         start: each free number starts off the truth by up to this share of it; one that is zero starts there.
@@ -54,7 +55,7 @@ class RecoveryCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, fr
     maneuver: str
     controller: str | None = None
     rate: float = 100.0
-    gusts: dict[str, float] = msgspec.field(default_factory=dict)
+    gusts: str | float = "none"
     sensors: Literal["clean", "real"] = "clean"
     noise: dict[str, float] = msgspec.field(default_factory=dict)
     start: float = 0.2
@@ -72,7 +73,7 @@ class RecoveryKind:
 
     def parts(self, settings: RecoveryCampaign, folder: Path) -> tuple[Portion, ...]:
         check_method(settings.method)
-        gusts_of(settings.gusts)
+        turbulence(settings.gusts)
         parse_maneuver(settings.maneuver)
         if not 0.0 <= settings.start < 1.0:
             raise CampaignError(f"is {settings.start:g}, expected 0 to less than 1.", channel="start")
@@ -146,7 +147,7 @@ def judged(inside: int, of: int) -> str:
 def flown(settings: RecoveryCampaign, truth: Vehicle, controller: Path | None, seed: int) -> Flight:
     """One flight of the truth as its sensors saw it, conditioned."""
     maneuver = parse_maneuver(settings.maneuver)
-    gusts = gusts_of(settings.gusts)
+    gusts = turbulence(settings.gusts)
     samples = round((maneuver.duration + 6.0) * settings.rate) + 1
     blowing = None if gusts is None else dryden(gusts, samples=samples, rate=settings.rate, seed=seed)
     flight = simulate_maneuver(
