@@ -206,6 +206,11 @@ def test_gains_come_from_transfer_functions_too_and_their_lack_is_said(swept: Pa
     assert roll["flown"] == {}  # a table holds no parameters of an autopilot
     assert "nothing to compare with" in roll["words"]
     assert "joins no rate with its mixer command" in one_message(swash(*ask, "--outputs", "q", "--gains"))
+    own = swash(*ask, "--gains", "--json")
+    assert own.code == 0, own.err
+    assert [one["axis"] for one in json.loads(own.out)["gains"]] == [roll["axis"]], "the rate that it commands"
+    unnamed = one_message(swash("identify", "--responses", swept, "--gains"))
+    assert "--input: is missing. The responses have --input mixer_roll or mixer_pitch" in unnamed
 
 
 def test_the_fitted_flight_is_no_hold_out(answered: Path, flown: Path) -> None:

@@ -65,9 +65,7 @@ def test_every_line_passes_under_the_real_firmware(name: str, tmp_path: Path, mo
     monkeypatch.setattr(accepting, "serve", timed)
     place = Path(os.environ.get("SWASHPLATE_PROOF", str(tmp_path))) / "firmware" / name
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    found = sp.accept_autopilot(
-        sp.vehicle(name), Path(FOLDER, FIRMWARE[name]), out=place, name=name, instance=INSTANCE[name], timeout=60.0
-    )
+    found = sp.accept_autopilot(name, Path(FOLDER, FIRMWARE[name]), folder=place, instance=INSTANCE[name], timeout=60.0)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     firmware = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
     assert found.log is not None

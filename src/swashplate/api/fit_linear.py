@@ -11,6 +11,7 @@ from swashplate.api.gains import suggest_gains
 from swashplate.api.linear_study import LinearStudy, marked
 from swashplate.api.saying import Say
 from swashplate.api.verbs.respond import load_responses
+from swashplate.control.analysis.rate_gain_names import ARDUPILOT
 from swashplate.errors import CardError, IdentificationError, SwashError
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
@@ -47,7 +48,9 @@ if TYPE_CHECKING:
 # ---- from responses --------------------------------------------------------------------------------------------------
 def transfer_functions(asked: FitTransferFunctions, say: Say) -> LinearStudy:
     """Transfer functions, verified in time where they can be flown."""
-    responses, input, outputs = load_responses(asked.responses), asked.input or "", strings(asked.outputs) or None
+    responses = load_responses(asked.responses)
+    input = asked.input or _only_input(responses)
+    outputs = strings(asked.outputs) or (_rate_of(input, responses) if asked.gains else None)
     band, apart = asked.split_band()
     if apart:
         raise SwashError("takes one band for transfer functions.", channel="--band")
@@ -210,6 +213,28 @@ def along_flights(asked: Validate, model: StateSpaceModel, published: Vehicle | 
         other = published.structure or model_of(linearize(published), name=f"{published.name}, linearised in hover")
         rival = followed(other)
     return LinearStudy(ResponseMaterial(verification=followed(model), rival=rival), structure=model)
+
+
+def _only_input(responses: FrequencyResponse) -> str:
+    """The input where nobody named one and there is no other.
+
+    Raises:
+        SwashError: naming those that there are.
+    """
+    if len(responses.inputs) > 1:
+        raise SwashError(
+            "is missing.",
+            channel="--input",
+            hint=f"The responses have --input {' or '.join(responses.inputs)}; --structure compose:body+flap fits a "
+            "state-space model of all.",
+        )
+    return responses.inputs[0]
+
+
+def _rate_of(input: str, responses: FrequencyResponse) -> tuple[str, ...] | None:
+    """The rate that an autopilot's mixer moves by a command: what gains are for. None where it is not known."""
+    rates = [rate for rate, command in ARDUPILOT.values() if command == input and rate in responses.outputs]
+    return tuple(rates) or None
 
 
 # ---- names, start values ---------------------------------------------------------------------------------------------

@@ -47,7 +47,7 @@ def test_a_decoupled_autopilot_from_design_to_many_flights(tmp_path: Path) -> No
 
 def test_a_linear_quadratic_design(tmp_path: Path) -> None:
     coax = sp.vehicle("coax")
-    made = sp.design_controller(coax, method="lqr")
+    made = sp.design_controller("coax", method="lqr")
     assert "LQR of coax, 100 Hz" in told(made, tmp_path)
     assert kind_of(made.controller) is CONTROLLERS["lqg"]
     with pytest.raises(SwashError, match="expected one of lqg, lqr"):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import json
 import re
 from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -16,6 +19,7 @@ from report_samples import fit, flight, modes, validation
 from shown_results import MAKE, autopilot, responses, sweep
 from swashplate.errors import SwashError
 from swashplate.extras import library
+from swashplate.public import place
 from swashplate.reporting.compose import compose
 from swashplate.reporting.figures import of_flight
 from swashplate.reporting.figures.still import still
@@ -82,6 +86,16 @@ WITHOUT = {
 """What the verbs return that does not show itself, and why."""
 
 
+def _answers(name: str) -> list[type]:
+    """The classes of ours in what a verb says it returns, which its module imports for type checkers only."""
+    (module, _, _), found = place(name).partition(":"), []
+    told = re.findall(r"\w+", str(inspect.signature(getattr(sp, name)).return_annotation))
+    for node in ast.walk(ast.parse(Path(str(import_module(module).__file__)).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            found += [(node.module, alias) for alias in node.names if (alias.asname or alias.name) in told]
+    return [getattr(import_module(where), alias.name) for where, alias in found]
+
+
 def _returned() -> dict[str, type]:
     """Every class of ours that a public verb returns, by its name."""
     found: dict[str, type] = {}
@@ -93,7 +107,9 @@ def _returned() -> dict[str, type]:
             wanted = get_type_hints(verb).get("return")
         except NameError:  # a name that is imported for type checkers only
             continue
-        for kind in (wanted, *get_args(wanted), *(part for each in get_args(wanted) for part in get_args(each))):
+        asked = _answers(name) if ".verbs." in place(name) else ()
+        inside = (part for each in get_args(wanted) for part in get_args(each))
+        for kind in (*asked, wanted, *get_args(wanted), *inside):
             kind = get_origin(kind) or kind
             ours = inspect.isclass(kind) and not issubclass(kind, Exception)
             if ours and kind.__module__.startswith("swashplate"):

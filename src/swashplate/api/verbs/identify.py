@@ -164,7 +164,7 @@ class FitTransferFunctions(FromResponses["LinearStudy"]):
         FlightError: a hold-out flight without the model's channels.
     """
 
-    input: str | None = option(default=None, help="The input channel of transfer functions.")
+    input: str | None = option(default=None, help="The input channel of transfer functions; the only one by default.")
     form: str | None = option(
         default=None, help='Zeros/poles of transfer functions: "1/2", "0/1+1s" (integrator), "0/0" (gain and delay).'
     )
@@ -244,7 +244,8 @@ class Identify(FitVehicle, FitTransferFunctions, FitStateSpace, FitInTime):  # p
 
     --responses and --structure: a state-space model (compose:body+flap, a ready structure, a model file).
 
-    --responses and --input: transfer functions with a delay; without --form the usual forms are tried.
+    --responses and --input: transfer functions with a delay; without --form the usual forms are tried. With --gains the
+    rate that the input commands is fitted, and its gains are suggested.
 
     --flight and --structure: a state-space model along records in time.
 
@@ -270,9 +271,6 @@ class Identify(FitVehicle, FitTransferFunctions, FitStateSpace, FitInTime):  # p
         if self.responses is not None:
             if self.structure is not None or self.search:
                 return FitStateSpace
-            if self.input is None:
-                hint = "--input CHANNEL fits transfer functions, --structure compose:body+flap a state-space model."
-                raise self._missing("--input", hint)
             return FitTransferFunctions
         if self.flight is None:
             raise self._missing("--flight", "Name a log, or responses with --responses.")
