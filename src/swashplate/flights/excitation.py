@@ -42,7 +42,7 @@ _HEARD = 0.1
 
 _HELD = 0.5
 """Share of a rate's set-point from which an outer loop gives it. Simulated: at least 0.74 where one does and attitude
-and speed are logged, at most 0.35 where sticks or a program move it (`docs/decisions/0156-moved-from-outside.md`)."""
+and speed are logged, at most 0.35 where sticks or a program move it (`docs/decisions/0155-premises-of-gains.md`)."""
 
 _PURE = 0.8
 """Share of the local power that a program's sweep holds: 0.89 to 0.93 of sweeps of 0.5 to 8.5 Hz, while of 60 commands

@@ -30,7 +30,7 @@ NO_NEWS, NEWS, FRESH = 0.20, 0.40, 5e-4
 """Share of a command's news that motion explains: below the first, and if the news is more than rounding and noise (the
 third, of the command's variance), something else moves it; an answer has the second.
 
-How these six numbers were found, and how often they are wrong: `docs/decisions/0156-moved-from-outside.md`.
+How these six numbers were found, and how often they are wrong: `docs/decisions/0155-premises-of-gains.md`.
 """
 
 _FLOOR, _DUST = 0.01, 1e-4  # of a command's variance: no log is exact to less (rounding, filters, clocks)

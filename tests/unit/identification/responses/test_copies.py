@@ -113,7 +113,7 @@ def test_a_reference_that_is_an_input_or_an_output_is_refused() -> None:
 def test_an_output_that_is_a_copy_has_no_number_and_the_others_keep_theirs() -> None:
     u = excited("sweep", 9)
     out = signal.lfilter(*lag(3.0), u)
-    # A lag of first order without noise tells its input, as a controller's answer does (decision 156, known misses).
+    # A lag of first order without noise tells its input, as a controller's answer does (decision 155, known misses).
     out = out + 0.1 * out.std() * np.random.default_rng(1).standard_normal(u.size)
     log = flight(stick=u, echo=0.8 * u, out=out)
     found = respond(log, inputs=["stick"], outputs=["echo", "out"], band=(0.3, 6.0))
