@@ -191,6 +191,6 @@ def test_the_guide_to_the_report_names_its_sections() -> None:
     titles = {section.title for section in report.sections}
     assert named <= titles
     made = (ROOT / "src" / "swashplate" / "reporting" / "sections_responses.py").read_text(encoding="utf-8")
-    for name in ("sections_verification", "sections_search"):
+    for name in ("sections_verification", "response_report"):
         made += (ROOT / "src" / "swashplate" / "reporting" / f"{name}.py").read_text(encoding="utf-8")
     assert all(f'"{title}"' in made for title in re.findall(r"\*\*(.+?)\*\*", on_responses))

@@ -9,7 +9,7 @@ from swashplate.registry import Registry
 from swashplate.reporting.structure import Section
 
 _HERE = "swashplate.reporting.figures"
-_MODELS, _RESULTS = f"{_HERE}.of_models", f"{_HERE}.of_results"
+_RESULTS = f"{_HERE}.of_results"
 SECTIONS: Registry[Callable[..., Section]] = Registry(
     "sections",
     what="an object that shows itself",
@@ -21,9 +21,9 @@ SECTIONS: Registry[Callable[..., Section]] = Registry(
         "ModelComparison": f"{_HERE}.of_comparison:section_of_comparison",
         "Residuals": f"{_HERE}.of_comparison:section_of_residuals",
         "Suggestion": f"{_HERE}.views:section_of_gains",
-        "TrimCurve": f"{_MODELS}:section_of_trims",
-        "Derivatives": f"{_MODELS}:section_of_derivatives",
-        "LinearModel": f"{_MODELS}:section_of_linear_model",
+        "TrimCurve": f"{_RESULTS}:section_of_trims",
+        "Derivatives": f"{_RESULTS}:section_of_derivatives",
+        "LinearModel": f"{_RESULTS}:section_of_linear_model",
         "EquationError": f"{_RESULTS}:section_of_equation",
         "Harmonics": f"{_RESULTS}:section_of_harmonics",
         "PlannedManeuver": f"{_RESULTS}:section_of_planned",
