@@ -112,6 +112,8 @@ def identify(
         residual=residual,
         progress=progress,
     )
+    if isinstance(model, Vehicle) and model.structure is not None and free is None:
+        model = model.structure  # its named parameters say themselves what is free; entries of matrices are named
     name, estimator = _suited(model, data, method)
     unheard = sorted(set(question.asked) - estimator.takes)
     if unheard:

@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+import lacking
 import swashplate as sp
 from simulated_flights import FREE, TIE, ten_seconds
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
+from swashplate.models.linear.linear_vehicle import structure_of
 
 
 @lru_cache(maxsize=1)
@@ -134,3 +136,13 @@ def test_a_stretch_that_is_nowhere_and_one_that_leaves_nothing_are_refused() -> 
         sp.identify(coax, _flight(), free=FREE, leave_out=[(1.0, 7.0)])
     with pytest.raises(IdentificationError, match="'output-error' does not know it"):
         sp.identify(coax, _flight(), free=FREE, method="output-error", leave_out=[(1.0, 2.0)])
+
+
+def test_a_structure_that_flies_is_fitted_by_its_named_parameters() -> None:
+    """`sp.structure` gives a vehicle; without `free` its structure says what is free, as the file does."""
+    flown = lacking.flights([1], "mixer_roll", gust=0.0, lacking=False, seconds=8.0)
+    held = dict.fromkeys(("Ma", "Ba", "Ab", "Blon", "Alat", "Alon", "tau_pitch"), 0.0)
+    model = structure_of(sp.structure("rotor_body")).with_values(held, free=False)
+    fit = sp.identify(sp.structure("rotor_body").with_values(held, free=False), flown, method="output-error")
+    assert fit.names == model.free
+    assert abs(fit["Lb"].value - lacking.TRUTH["Lb"]) < 4.0 * fit["Lb"].best_sigma
