@@ -227,7 +227,7 @@ def _flown() -> _Link:
         return struct.pack(f"<{6 + n + m}d", session.version, tick, *[0.01] * n, *[0.1] * m, *surroundings)
 
     def take(data: bytes, chance: random.Random) -> None:
-        with suppress(MessageError):
+        with suppress(MessageError), np.errstate(all="ignore"):
             session.fly(data)
         json.dumps(session.told(), allow_nan=False)
 

@@ -73,8 +73,15 @@ def read_linear(path: str | Path) -> Linear:
         {name: str(unit) for name, unit in _table(document, "units", path).items()},
         {name: _number(value, f"delays.{name}", path) for name, value in _table(document, "delays", path).items()},
         {name: _number(value, f"about.{name}", path) for name, value in _table(document, "about", path).items()},
-        tuple(str(line) for line in document.get("origin") or ()),
+        tuple(str(line) for line in _lines(document, "origin", path)),
     )
+
+
+def _lines(document: dict[str, Any], name: str, path: str | Path) -> list[Any]:
+    found = document.get(name) or []
+    if not isinstance(found, list):
+        raise ExportError(f"is {str(found)[:40]}, expected a list of texts.", where=path, channel=name)
+    return found
 
 
 def read_control(path: str | Path, *, pade: int | None = None) -> Any:
