@@ -24,7 +24,8 @@ class ExportModel(OfVehicle["Exported"]):
     A log becomes a page too (--format web): what `swash open` shows of it, with its fit, gains and their sliders, in
     one file to send to others. Place, serial numbers and names are left out unless `keep` asks for them.
     A controller's file (`swash control decouple --out`) is written as C. Formats c, fmu, simulink and web need the
-    extra 'model', web the extra 'compiler' too; fmu has compiled code where there is a C compiler. Examples:
+    extra 'model', web of other equations than a ready vehicle's the extra 'compiler' too; fmu has compiled code where
+    there is a C compiler. Examples:
 
     swash export coax --format c --out firmware
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -26,6 +28,8 @@ _TARGET = ("-target", "wasm32-freestanding", "-nostdlib", "-Wl,--no-entry", "-Wl
 _OPTIONS = ("-O2", "-fno-math-errno", "-fno-trapping-math", "-w")
 _STACK = 1 << 18
 """Bytes: a period of a vehicle with a hundred states needs a tenth of it."""
+READY = Path(__file__).parent / "ready"
+"""Modules of the ready vehicles' equations, whatever their numbers, made by `scripts/ready_modules.py`."""
 
 
 def frame_code(world: World) -> str:
@@ -84,17 +88,27 @@ def frame_code(world: World) -> str:
     )
 
 
-def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS) -> bytes:
+def module_name(source: str, exports: Sequence[str]) -> str:
+    """The file's name of a module that ships, by what it is made of."""
+    made_of = "\n".join([source, filled("bare.h", {}), *_TARGET, *_OPTIONS, str(_STACK), *exports])
+    return f"{hashlib.sha256(made_of.encode()).hexdigest()[:20]}.wasm"
+
+
+def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS, ready: bool = True) -> bytes:
     """A C source as a WebAssembly module without a library: all that it imports is mathematics, from the browser.
 
     Args:
         source: C without a main.
         exports: functions that it shows, beside its memory.
+        ready: take the module that ships where there is one of this source.
 
     Raises:
         MissingLibraryError: without a compiler that makes it: ziglang (the extra `compiler`), or clang with wasm-ld.
         ExportError: where it refuses the source.
     """
+    ships = READY / module_name(source, exports)
+    if ready and ships.is_file():
+        return ships.read_bytes()
     program = web_compiler()
     if program is None:
         raise missing("ziglang", what="a page in which a model flies")

@@ -8,7 +8,6 @@ import subprocess
 import threading
 from importlib.util import find_spec
 
-from swashplate.compiler import web_compiler
 from swashplate.errors import SwashError
 from swashplate.extras import missing
 from swashplate.own_python import own_python
@@ -35,8 +34,6 @@ class Cockpit:
         """
         if find_spec("casadi") is None:
             raise missing("casadi", what="flying a vehicle")
-        if web_compiler() is None:
-            raise missing("ziglang", what="flying a vehicle")
         with self._lock:
             if self._process is None or self._process.poll() is not None:
                 self._start()
