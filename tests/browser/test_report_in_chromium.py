@@ -119,7 +119,7 @@ def test_reports_about_controllers_draw_everything_in_its_place(visit: Any, name
         "Array.from(document.querySelectorAll('.canvas'), c => c.querySelectorAll('svg.main-svg').length > 0"
         " && c.querySelectorAll('.trace').length > 0)"
     )
-    assert len(drawn) == {"check": 6, "path": 2}[name]
+    assert len(drawn) == {"check": 5, "path": 2}[name]
     assert all(drawn)
     page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     assert page.evaluate("document.documentElement.scrollWidth") <= SIZES[size][0]

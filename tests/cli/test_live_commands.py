@@ -82,9 +82,10 @@ def test_a_linear_model_flies_by_hand_but_stands_under_no_autopilot(
 
 def test_without_what_makes_webassembly_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("swashplate.links.live.frame_code.web_compiler", lambda: None)
-    told = one_message(swash("live", "thirteen_state", "--port", "0", "--out", tmp_path / "live"))
-    assert "a page in which a model flies needs the library ziglang" in told
-    assert "swashplate[compiler]" in told
+    outcome = swash("live", "thirteen_state", "--port", "0", "--out", tmp_path / "live")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "a page in which a model flies needs the library ziglang" in outcome.err
+    assert "swashplate[compiler]" in outcome.err
     assert not (tmp_path / "live").exists()
 
 

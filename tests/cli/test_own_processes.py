@@ -21,6 +21,7 @@ from swashplate.control.laws.autopilot import autopilot
 from swashplate.links.web import libraries
 from swashplate.models.catalogue import vehicle
 from swashplate.simulation.trim import trim
+from told_rows import told
 
 SWASH = "import sys\nfrom swashplate.__main__ import main\nif __name__ == '__main__':\n    sys.exit(main())\n"
 """As pip writes `swash`: Python then puts the script's folder on its path, and not the one it works in."""
@@ -167,10 +168,12 @@ def test_an_identification_on_the_live_page_imports_nothing_from_the_folder(fold
         def until(what: object) -> None:
             while True:
                 moment = json.loads(page.recv(timeout=120.0))
-                if moment["type"] == "moment" and what(moment):  # type: ignore[operator]
+                if moment["type"] == "told" and what(moment):  # type: ignore[operator]
                     return
 
+        version = json.loads(page.recv(timeout=120.0))["version"]
         say(type="record", value=True)
+        page.send(told(version, 1, 350))  # which it flew
         until(lambda m: (m["recording"] or 0.0) > 3.0)
         say(type="record", value=False)
         until(lambda m: m["recordings"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -110,8 +110,10 @@ class FromConditioned(FromLogs[Answer]):
 
 def called(given: Any) -> list[str] | None:
     """What the user calls logs, where all were named."""
-    listed = [given] if isinstance(given, str | Path) else list(given or ())
-    return [str(one) for one in listed] if all(isinstance(one, str | Path) for one in listed) else None
+    if isinstance(given, str | Path):
+        return [str(given)]
+    named = isinstance(given, Sequence) and all(isinstance(one, str | Path) for one in given)
+    return [str(one) for one in given] if named else [] if given is None else None
 
 
 class OfVehicle(VerbQuestion[Answer]):

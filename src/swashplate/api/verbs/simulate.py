@@ -95,7 +95,7 @@ class FlyMany(OfVehicle["MonteCarlo"]):
         help='Roll and pitch are a pilot\'s commands; x, y, z, psi, ahead or right is asked of every one: "hold:10s".',
         kw_only=False,
     )
-    count: int = option(default=100, help="Number of flights.", least=2)
+    count: int = option(default=100, help="Number of flights.", least=1)
     fit: Fitted | None = option(default=None, help="Models drawn from this fit.json.")
     gusts: Gusts = option(default="none", help="none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s].")
     battery: Battery | None = option(default=None, help="Voltage at start and end, 12.5-10.5.")

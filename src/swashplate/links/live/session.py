@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _LOOK_EVERY = 50
 """Periods of the controller between looks at what the equations hold for."""
+_FLOWN = 1e9
+"""No state, input or surrounding of a flight is larger, in SI units."""
 _JUMPED = "The flight began anew, and the recording ends with the one before. Save it."
 
 
@@ -110,7 +112,10 @@ class LiveSession:
             return
         if numbers.size % (2 + n + m + len(SURROUNDINGS)) or not np.all(np.isfinite(numbers)):
             raise MessageError("bad rows")
-        for version, tick, *rest in numbers.reshape(-1, 2 + n + m + len(SURROUNDINGS)):
+        rows = numbers.reshape(-1, 2 + n + m + len(SURROUNDINGS))
+        if np.any(np.abs(rows[:, 2:]) > _FLOWN):
+            raise MessageError("bad rows")
+        for version, tick, *rest in rows:
             row, jumped = np.array(rest), tick != self._tick + 1
             if version != self.version:
                 raise MessageError("bad rows")
