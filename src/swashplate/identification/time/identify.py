@@ -275,7 +275,7 @@ def _solver(question: Question) -> Solver:
     return Solver(iterations=most, progress=question.progress)
 
 
-def _found(
+def _read_optimum(
     table: Parameterization, likelihood: FlightLikelihood, optimum: Optimum, question: Question
 ) -> tuple[Found, Array]:
     """What the search says."""
@@ -284,11 +284,11 @@ def _found(
     return found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags), optimum.row
 
 
-def _found_ahead(
+def _read_ahead(
     table: Parameterization, likelihood: FilterError, optimum: Optimum, question: Question
 ) -> tuple[Found, Array]:
     """What the search says, or the search for small errors ahead that follows it."""
-    first, row = _found(table, likelihood, optimum, question)
+    first, row = _read_optimum(table, likelihood, optimum, question)
     horizon = _horizon(question)
     if horizon is None:
         return first, row
@@ -307,9 +307,11 @@ FILTER_ERROR = FlightEstimator(
     _TAKES | {"keep_unexcited", "wind", "leave_out", "horizon", "residual"},
     _filter_error,
     _scoring,
-    _found_ahead,
+    _read_ahead,
 )
-OUTPUT_ERROR = FlightEstimator("output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together, _found)
+OUTPUT_ERROR = FlightEstimator(
+    "output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together, _read_optimum
+)
 
 SHORTEST = 6.0
 """Seconds below which a piece is left out: the filter settles in a quarter of that."""
