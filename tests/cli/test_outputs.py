@@ -17,6 +17,7 @@ from commands import one_message, swash
 import swashplate as sp
 from swashplate.api import identification
 from swashplate.api.question import VerbQuestion
+from swashplate.api.saying import Say, silent
 from swashplate.atomic import folder_when_complete
 from swashplate.cli.app import app
 from swashplate.cli.console import as_json
@@ -78,6 +79,9 @@ class Paged(VerbQuestion[None]):
     """Writes a page and a fit."""
 
     files = ("report.html", "fit.json")
+
+    def answer(self, say: Say = silent) -> None:
+        """Nothing: only where it writes is asked."""
 
 
 class Work:

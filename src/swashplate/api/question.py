@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import typing
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, ParamSpec, TypeVar, cast
@@ -72,7 +73,7 @@ def setting(*, default: Any, help: str, kw_only: bool = True, **more: Any) -> An
 
 
 @typing.dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(argument, option, setting))
-class VerbQuestion(Generic[Answer]):
+class VerbQuestion(ABC, Generic[Answer]):
     """What a verb is asked. Subclasses are dataclasses; their docstring is the verb's help.
 
     Attributes:
@@ -98,9 +99,9 @@ class VerbQuestion(Generic[Answer]):
             check(value, entry, called=name)
             object.__setattr__(self, name, value)
 
+    @abstractmethod
     def answer(self, say: Say = silent) -> Answer:
         """Do what is asked."""
-        raise NotImplementedError
 
     def finish(self, answer: Any) -> None:
         """What the command line does with the answer, also without `--out`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -49,11 +50,12 @@ _LONGEST = 32
 def every_number(message: Any, above: str = "") -> Row:
     """Numbers of a message by their fields (`pose.position.x`, `channels[0]`), without header and covariances."""
     row: Row = {}
-    for name in getattr(message, "__dataclass_fields__", ()):
+    for field in dataclasses.fields(message):
+        name = field.name
         value, path = getattr(message, name), f"{above}{name}"
-        if name in ("header", "__msgtype__") or name.endswith("covariance"):
+        if name == "header" or name.endswith("covariance"):
             continue
-        if hasattr(value, "__dataclass_fields__"):
+        if dataclasses.is_dataclass(value):
             row |= every_number(value, f"{path}.")
         elif isinstance(value, int | float):
             row[path] = float(value)
