@@ -23,7 +23,7 @@ from swashplate.control.laws.height_yaw import (
     height_yaw_step,
 )
 from swashplate.engine.law import REFERENCES
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.errors import SwashError
 from swashplate.models.coax import CoaxInputs
 from swashplate.models.vehicle import Vehicle
@@ -144,7 +144,7 @@ def step(
     pitch = reference.pitch - g.lean * (theta - body.theta) + g.lean_rate * body.q
 
     # Cyclic to servos
-    around: dict[str, Any] = {"u": body.u, "v": body.v, "motor_lower": motors.lower, "voltage": voltage, "xp": xp}
+    around: dict[str, Operand] = {"u": body.u, "v": body.v, "motor_lower": motors.lower, "voltage": voltage, "xp": xp}
     wanted = decouple(gains.law, roll, pitch, **around)
     cancelling = decouple(gains.law, 0.0, 0.0, **around)
     servos = fit_into_limits(
@@ -288,7 +288,7 @@ def unpack(row: Symbols) -> Gains:
 
 def row_step(
     memory: Symbols, measured: Symbols, reference: Symbols, gains: Symbols, xp: ArrayFunctions
-) -> tuple[Any, Any]:
+) -> tuple[Operand, Operand]:
     """`step` on rows, as `simulate_closed_loop` calls it."""
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     wanted = Reference(*(reference[i] for i in range(len(REFERENCES))))

@@ -6,12 +6,12 @@ Enough to keep a CoaX in the room during a sweep; it is not meant to be a good c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.errors import SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
@@ -89,7 +89,7 @@ def hover_hold(
 
 def hold_step(
     memory: Symbols, measured: Symbols, reference: Symbols, gains: Symbols, xp: ArrayFunctions
-) -> tuple[Any, Any]:
+) -> tuple[Operand, Operand]:
     """One step: integrals of height and heading error and the sample time in, the same and four inputs out."""
     g = HoldGains._make(gains[i] for i in range(len(HoldGains._fields)))
     gravity, lower_gain, upper_gain, lower_yaw, upper_yaw = gains[len(g) : len(g) + 5]

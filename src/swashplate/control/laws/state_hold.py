@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from swashplate.arrays import Array
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.errors import SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
@@ -136,7 +135,7 @@ def state_hold_step(
     *,
     inputs: int,
     states: int,
-) -> tuple[Any, Any]:
+) -> tuple[Operand, Operand]:
     """Inputs for a measured state row: the trim's, less the gains times the deviation in heading axes."""
     K = gains[: inputs * states].reshape(inputs, states)
     commanded, rest = gains[inputs * states : inputs * states + inputs], gains[inputs * states + inputs :]

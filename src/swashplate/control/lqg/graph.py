@@ -15,6 +15,7 @@ import numpy as np
 from swashplate.control.lqg.law import LAW_MEMORY, Feedback, lqr_law
 from swashplate.engine.law import REFERENCES
 from swashplate.engine.roots import require_casadi
+from swashplate.engine.symbols import Operand
 from swashplate.filtering import observer, periodic_gain
 from swashplate.filtering.matrix_operations import Matrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
@@ -23,7 +24,9 @@ from swashplate.physics.backend import Backend, CasadiBackend
 from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
 
-LawOnEstimates = Callable[[list[Any], list[Any], list[Any], Any, list[Any]], tuple[list[Any], list[Any]]]
+LawOnEstimates = Callable[
+    [list[Operand], list[Operand], list[Operand], Operand, list[Operand]], tuple[list[Operand], list[Operand]]
+]
 """(memory, states, late commands, voltage, reference) to (memory, commands), as `lqr_law`."""
 
 
@@ -38,9 +41,9 @@ class Carried(NamedTuple):
     """
 
     estimate: ObserverEstimate
-    given: list[list[Any]]
-    counts: list[Any]
-    law: list[Any]
+    given: list[list[Operand]]
+    counts: list[Operand]
+    law: list[Operand]
 
 
 def late_inputs(plan: ObserverPlan) -> list[int]:
@@ -53,12 +56,12 @@ def lqg_step(
     numbers: Numbers,
     feedback: Feedback,
     carried: Carried,
-    y: Any,
-    voltage: Any,
-    reference: list[Any],
+    y: Operand,
+    voltage: Operand,
+    reference: list[Operand],
     M: Matrices,
     law: LawOnEstimates | None = None,
-) -> tuple[Carried, list[Any]]:
+) -> tuple[Carried, list[Operand]]:
     """One step of the controller.
 
     Args:
@@ -122,10 +125,10 @@ _BODY = len(RigidBody._fields)
 class Readable(Protocol):
     """A row of a backend's numbers."""
 
-    def __getitem__(self, place: int, /) -> Any: ...
+    def __getitem__(self, place: int, /) -> Operand: ...
 
 
-def true_readings(plan: ObserverPlan, x: Readable, force: Readable, bias: Readable, xp: Backend) -> list[Any]:
+def true_readings(plan: ObserverPlan, x: Readable, force: Readable, bias: Readable, xp: Backend) -> list[Operand]:
     """All channels of a true state row, without noise; x (states, ...), force (3, ...) and bias (biases, ...) are rows
     of the backend's numbers."""
     body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])
@@ -140,7 +143,7 @@ def readings_kept(plan: ObserverPlan) -> int:
 
 def step_graph(
     plan: ObserverPlan, numbers: Numbers, feedback: Feedback, memory: int, law: LawOnEstimates | None = None
-) -> Any:
+) -> Operand:
     """`(memory, measured, reference) -> (memory, command)` as one CasADi function; `measured` ends in the voltage.
 
     Args:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from swashplate.engine.symbols import Operand
 from swashplate.filtering.matrix_operations import Matrices
 from swashplate.physics.backend import Backend
 
@@ -28,32 +29,32 @@ class Feedback(NamedTuple):
         place: 1 holds a place, 0 a speed.
     """
 
-    speeds: Any
-    states: Any
-    inputs: Any
-    gains: Any
-    battery: Any
-    voltage: Any
-    low: Any
-    high: Any
-    reach: Any
-    reach_down: Any
-    pace: Any
-    place: Any
+    speeds: Operand
+    states: Operand
+    inputs: Operand
+    gains: Operand
+    battery: Operand
+    voltage: Operand
+    low: Operand
+    high: Operand
+    reach: Operand
+    reach_down: Operand
+    pace: Operand
+    place: Operand
 
 
-def _limited(value: Any, low: Any, high: Any, xp: Backend) -> Any:
+def _limited(value: Operand, low: Operand, high: Operand, xp: Backend) -> Operand:
     return xp.minimum(xp.maximum(value, low), high)
 
 
-def _shares(speed: Any, speeds: Sequence[Any], xp: Backend) -> list[Any]:
+def _shares(speed: Operand, speeds: Sequence[Operand], xp: Backend) -> list[Operand]:
     """Weights of the trims at a speed: straight lines between neighbours, the ends beyond."""
     if len(speeds) == 1:
         return [1.0]
     shares = []
     at = _limited(speed, speeds[0], speeds[-1], xp)
     for i, here in enumerate(speeds):
-        rise: Any = 1.0
+        rise: Operand = 1.0
         if i > 0:
             rise = xp.minimum(rise, (at - speeds[i - 1]) / (here - speeds[i - 1]))
         if i + 1 < len(speeds):
@@ -62,7 +63,7 @@ def _shares(speed: Any, speeds: Sequence[Any], xp: Backend) -> list[Any]:
     return shares
 
 
-def _mixed(shares: Sequence[Any], rows: Sequence[Sequence[Any]]) -> list[Any]:
+def _mixed(shares: Sequence[Operand], rows: Sequence[Sequence[Operand]]) -> list[Operand]:
     """Weighted sum of the trims' rows, number by number."""
     total = [shares[0] * value for value in rows[0]]
     for share, row in zip(shares[1:], rows[1:], strict=True):
@@ -71,18 +72,18 @@ def _mixed(shares: Sequence[Any], rows: Sequence[Sequence[Any]]) -> list[Any]:
 
 
 def lqr_law(
-    memory: Sequence[Any],
-    x: Sequence[Any],
-    late: Sequence[Any],
-    voltage: Any,
-    reference: Sequence[Any],
+    memory: Sequence[Operand],
+    x: Sequence[Operand],
+    late: Sequence[Operand],
+    voltage: Operand,
+    reference: Sequence[Operand],
     *,
     names: tuple[str, ...],
     late_of: Sequence[int],
     feedback: Feedback,
     dt: float,
     M: Matrices,
-) -> tuple[list[Any], list[Any]]:
+) -> tuple[list[Operand], list[Operand]]:
     """Commands within their limits for a state row.
 
     Args:

@@ -4,27 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.physics.backend import Scalar
 
 HARMONICS = (1.0, 2.0)
 """Of the gyros' notch: INS_HNTCH_HMNCS 3, the default."""
 
 
-def reached_by(now: Scalar, wanted: Scalar, hertz: Scalar, dt: Scalar, xp: ArrayFunctions) -> Any:
+def reached_by(now: Scalar, wanted: Scalar, hertz: Scalar, dt: Scalar, xp: ArrayFunctions) -> Operand:
     """One pole: a step of `dt` [s] from a value to what is wanted; 0 Hz is no filter."""
     slow = 1.0 / (2.0 * math.pi * xp.maximum(hertz, 1e-6))
     return now + xp.where(xp.greater(hertz, 0.0), dt / (dt + slow), 1.0) * (wanted - now)
 
 
-def one_pole(now: Scalar, wanted: Scalar, hertz: Scalar, dt: Scalar, begun: Scalar, xp: ArrayFunctions) -> Any:
+def one_pole(now: Scalar, wanted: Scalar, hertz: Scalar, dt: Scalar, begun: Scalar, xp: ArrayFunctions) -> Operand:
     """The same, which takes over the first value as it is."""
     return xp.where(xp.greater(begun, 0.5), reached_by(now, wanted, hertz, dt, xp), wanted)
 
 
-def low_pass(stages: Symbols, value: Symbols, hertz: Scalar, dt: Scalar, xp: ArrayFunctions) -> tuple[Any, Any]:
+def low_pass(stages: Symbols, value: Symbols, hertz: Scalar, dt: Scalar, xp: ArrayFunctions) -> tuple[Operand, Operand]:
     """Butterworth's two poles (LowPassFilter2p) on n signals: filtered, and what each keeps, shape (n, 2)."""
     turn = xp.tan(math.pi * xp.clip(hertz * dt, 1e-6, 0.49))
     root = 2.0 * math.cos(math.pi / 4.0)
@@ -36,7 +35,9 @@ def low_pass(stages: Symbols, value: Symbols, hertz: Scalar, dt: Scalar, xp: Arr
     return xp.where(passed, filtered, value), xp.stack([fresh, stages[:, 0]], axis=1)
 
 
-def notch(memory: Symbols, value: Symbols, k: Mapping[str, Any], dt: Scalar, xp: ArrayFunctions) -> tuple[Any, Any]:
+def notch(
+    memory: Symbols, value: Symbols, k: Mapping[str, Operand], dt: Scalar, xp: ArrayFunctions
+) -> tuple[Operand, Operand]:
     """The gyros' notch at a fixed frequency and twice it: filtered, and its memory, shapes (3,) and (12,)."""
     on = k["INS_HNTCH_ENABLE"] > 0.5
     deep = 10.0 ** (-k["INS_HNTCH_ATT"] / 40.0)

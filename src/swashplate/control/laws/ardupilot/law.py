@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from swashplate.control.laws.ardupilot.filters import low_pass, notch, one_pole,
 from swashplate.control.laws.ardupilot.mixers import FRAMES, Mixer, SwashplateMixer
 from swashplate.control.laws.ardupilot.outputs import LOOPS_LATER, WIDEST, LawFirmware, output_delays
 from swashplate.control.laws.ardupilot.parameters import AXES, DEFAULTS, RATE
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
 from swashplate.physics.rigid_body import RigidBody
@@ -142,18 +142,18 @@ def ardupilot_step(
     *,
     frame: str,
     inputs: int,
-) -> tuple[Any, Any]:
+) -> tuple[Operand, Operand]:
     """One step, as `simulate_closed_loop` calls it."""
     head, rest = len(_HEAD), len(_HEAD) + len(_NAMES)
     dt, height, place = (gains[i] for i in range(head))
     k = {name: gains[head + i] for i, name in enumerate(_NAMES)}
-    numbers: Any = [gains[rest + i] for i in range(len(FRAMES[frame]._fields))]
+    numbers: Operand = [gains[rest + i] for i in range(len(FRAMES[frame]._fields))]
     mixer = FRAMES[frame](*numbers)
     later = gains[rest + len(numbers) : rest + len(numbers) + inputs]
     m = {name: memory[where] for name, where in _PLACES.items()}
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     heli = issubclass(FRAMES[frame], SwashplateMixer)
-    after: dict[str, Any] = {"begun": xp.ones(1)}
+    after: dict[str, Operand] = {"begun": xp.ones(1)}
     velocity = _to_north_east_down(body, xp)
 
     lean = _horizontal(body, velocity, reference, k, m, after, dt, xp) * place
@@ -172,14 +172,14 @@ def ardupilot_step(
     return carried, xp.where(waits, m["sent"][:inputs], computed)
 
 
-def square_root(error: Scalar, p: Scalar, most: Scalar, xp: ArrayFunctions) -> Any:
+def square_root(error: Scalar, p: Scalar, most: Scalar, xp: ArrayFunctions) -> Operand:
     """ArduPilot's `sqrt_controller`: proportional near zero, and from there no faster than `most` can brake."""
     near = most / xp.maximum(p * p, 1e-12)
     beyond = xp.sqrt(2.0 * most * xp.maximum(xp.abs(error) - 0.5 * near, 0.5 * near))
     return xp.where(xp.greater(xp.abs(error), near), xp.sign(error) * beyond, p * error)
 
 
-def _to_north_east_down(body: RigidBody, xp: ArrayFunctions) -> Any:
+def _to_north_east_down(body: RigidBody, xp: ArrayFunctions) -> Operand:
     cf, sf, ct, st, cp, sp = (f(a) for a in (body.phi, body.theta, body.psi) for f in (xp.cos, xp.sin))
     u, v, w = body.u, body.v, body.w
     level, side, down = ct * u + sf * st * v + cf * st * w, cf * v - sf * w, -st * u + sf * ct * v + cf * ct * w
@@ -190,12 +190,12 @@ def _horizontal(
     body: RigidBody,
     velocity: Symbols,
     reference: Symbols,
-    k: Mapping[str, Any],
-    m: Mapping[str, Any],
-    after: dict[str, Any],
+    k: Mapping[str, Operand],
+    m: Mapping[str, Operand],
+    after: dict[str, Operand],
     dt: Scalar,
     xp: ArrayFunctions,
-) -> Any:
+) -> Operand:
     """Roll and pitch [rad] that the place asks for."""
     off = xp.stack([reference[0] - body.x, reference[1] - body.y])
     far = xp.sqrt(off @ off + 1e-12)
@@ -221,15 +221,15 @@ def _vertical(
     body: RigidBody,
     velocity: Symbols,
     reference: Symbols,
-    k: Mapping[str, Any],
-    m: Mapping[str, Any],
-    after: dict[str, Any],
+    k: Mapping[str, Operand],
+    m: Mapping[str, Operand],
+    after: dict[str, Operand],
     dt: Scalar,
     xp: ArrayFunctions,
     height: Scalar,
     *,
     heli: bool,
-) -> Any:
+) -> Operand:
     """The throttle, shape (1,): the hover's and what the height asks for."""
     climb, hover = -velocity[2:], k["H_COL_HOVER" if heli else "MOT_THST_HOVER"]
     felt = m["begun"] * (climb - m["climb"]) / dt  # what accelerometers feel, less gravity, since the last step
@@ -263,12 +263,12 @@ def _vertical(
 def _attitude(
     body: RigidBody,
     wanted: Symbols,
-    k: Mapping[str, Any],
-    m: Mapping[str, Any],
-    after: dict[str, Any],
+    k: Mapping[str, Operand],
+    m: Mapping[str, Operand],
+    after: dict[str, Operand],
     dt: Scalar,
     xp: ArrayFunctions,
-) -> Any:
+) -> Operand:
     """Rates [rad/s] asked of the rate controllers, shape (3,)."""
     now = xp.stack([body.phi, body.theta, body.psi])
     target = xp.where(xp.greater(m["begun"], 0.5), m["target"], now)
@@ -288,10 +288,10 @@ def _attitude(
     return rates + xp.stack([p - r * st, q * cf + r * sf * ct, r * cf * ct - q * sf])
 
 
-def _rotation(now: Symbols, target: Symbols, xp: ArrayFunctions) -> Any:
+def _rotation(now: Symbols, target: Symbols, xp: ArrayFunctions) -> Operand:
     """The rotation in body axes from one attitude to another [rad], from their quaternions."""
 
-    def quaternion(angles: Symbols) -> Any:
+    def quaternion(angles: Symbols) -> Operand:
         (cf, ct, cp), (sf, st, sp) = xp.cos(0.5 * angles), xp.sin(0.5 * angles)
         return (
             cf * ct * cp + sf * st * sp,
@@ -307,14 +307,14 @@ def _rotation(now: Symbols, target: Symbols, xp: ArrayFunctions) -> Any:
 def _rates(
     body: RigidBody,
     asked: Symbols,
-    k: Mapping[str, Any],
-    m: Mapping[str, Any],
-    after: dict[str, Any],
+    k: Mapping[str, Operand],
+    m: Mapping[str, Operand],
+    after: dict[str, Operand],
     dt: Scalar,
     xp: ArrayFunctions,
     *,
     heli: bool,
-) -> Any:
+) -> Operand:
     """Roll, pitch and yaw commands, shape (3,)."""
     at = {name: xp.stack([k[f"ATC_RAT_{axis}_{name}"] for axis in AXES]) for name in RATE}
     gyro = xp.stack([body.p, body.q, body.r])

@@ -8,12 +8,12 @@ each way through the thrust curve (AP_MotorsCoax, Thrust_Linearization).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.physics.backend import Scalar
 
 _FULL_STICK = 4500.0
@@ -23,8 +23,8 @@ _LEAST_ACTUATOR, _HALF = 0.5, 0.5
 class Mixed(NamedTuple):
     """Inputs of the vehicle, and which of roll, pitch and yaw are cut (1) or not (0)."""
 
-    inputs: Any
-    cut: Any
+    inputs: Operand
+    cut: Operand
 
 
 class SwashplateMixer(NamedTuple):
@@ -45,7 +45,7 @@ class SwashplateMixer(NamedTuple):
     turn: float
     engine: float
 
-    def mix(self, wanted: Symbols, k: Mapping[str, Any], xp: ArrayFunctions) -> Mixed:
+    def mix(self, wanted: Symbols, k: Mapping[str, Operand], xp: ArrayFunctions) -> Mixed:
         """Of roll, pitch, yaw (-1 to 1) and throttle (0 to 1), shape (4,), under parameters by ArduPilot's names."""
         size = xp.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + 1e-12)
         room = k["H_CYC_MAX"] / _FULL_STICK
@@ -90,7 +90,7 @@ class CoaxialMixer(NamedTuple):
     yaw: float = 0.5
     divided: float = 1.0
 
-    def mix(self, wanted: Symbols, k: Mapping[str, Any], xp: ArrayFunctions) -> Mixed:
+    def mix(self, wanted: Symbols, k: Mapping[str, Operand], xp: ArrayFunctions) -> Mixed:
         """As `SwashplateMixer.mix`."""
         largest = xp.maximum(xp.abs(wanted[0]), xp.abs(wanted[1]))
         kept = xp.minimum(xp.abs(wanted[2]), _HALF * k["MOT_YAW_HEADROOM"] / 1000.0)
@@ -134,7 +134,7 @@ FRAMES: Mapping[str, type[SwashplateMixer] | type[CoaxialMixer]] = {
 """By `Traits.servo_layout`."""
 
 
-def _actuator(thrust: Scalar, k: Mapping[str, Any], xp: ArrayFunctions) -> Any:
+def _actuator(thrust: Scalar, k: Mapping[str, Operand], xp: ArrayFunctions) -> Operand:
     """A motor's output, 0 to 1, for a thrust of 0 to 1; the battery is not compensated for (MOT_BAT_VOLT_MAX 0)."""
     expo = xp.maximum(k["MOT_THST_EXPO"], 1e-6)
     inside = xp.maximum((1.0 - expo) ** 2 + 4.0 * expo * xp.clip(thrust, 0.0, 1.0), 0.0)

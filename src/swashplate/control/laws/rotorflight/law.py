@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from swashplate.control.laws.rotorflight.mixers import GOVERNOR, SATURATED, gove
 from swashplate.control.laws.rotorflight.parameters import AXES, DEFAULTS, SCALES, known
 from swashplate.control.laws.rotorflight.pid import MEMORY, Deflections, pid_step
 from swashplate.control.laws.tail import turn_by_tail
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
@@ -207,7 +207,7 @@ def rotorflight_step(
     *,
     inputs: int,
     speed_state: int,
-) -> tuple[Any, Any]:
+) -> tuple[Operand, Operand]:
     """One step, as `simulate_closed_loop` calls it."""
     dt, places, hover = gains[0], gains[1], gains[2]
     first = 3 + len(Rigging._fields)
@@ -216,7 +216,7 @@ def rotorflight_step(
     m = {name: memory[where] for name, where in _PLACES.items()}
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     degrees = 180.0 / np.pi
-    after: dict[str, Any] = {}
+    after: dict[str, Operand] = {}
 
     # Rotorflight's axes: roll right, pitch nose down, yaw nose left.
     gyro = degrees * xp.stack([body.p, -body.q, -body.r])
@@ -248,13 +248,13 @@ def _pilot(
     body: RigidBody,
     reference: Symbols,
     pilot: SticksPilot,
-    m: Mapping[str, Any],
-    after: dict[str, Any],
+    m: Mapping[str, Operand],
+    after: dict[str, Operand],
     places: Scalar,
     hover: Scalar,
     dt: Scalar,
     xp: ArrayFunctions,
-) -> tuple[Any, Any]:
+) -> tuple[Operand, Operand]:
     """Lean to the right and nose down [deg], and the collective."""
     cf, sf, ct, st, cp, sp = (f(a) for a in (body.phi, body.theta, body.psi) for f in (xp.cos, xp.sin))
     u, v, w = body.u, body.v, body.w
@@ -275,8 +275,8 @@ def _pilot(
 
 
 def _demand(
-    body: RigidBody, reference: Symbols, lean: Symbols, pilot: SticksPilot, k: Mapping[str, Any], xp: ArrayFunctions
-) -> Any:
+    body: RigidBody, reference: Symbols, lean: Symbols, pilot: SticksPilot, k: Mapping[str, Operand], xp: ArrayFunctions
+) -> Operand:
     """Rates asked of the rate loops [deg/s], (3,): ANGLE mode, and the pilot's rate of the heading."""
     degrees, most = 180.0 / np.pi, k["angle_level_limit"]
     asked = xp.clip(most * reference[6:8] + lean, -most, most)

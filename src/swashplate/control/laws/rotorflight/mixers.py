@@ -7,13 +7,12 @@ for each command (H1), "90V" two at 45 degrees beside a collective that the roto
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.control.laws.rotorflight.filters import slope, two_poles
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.physics.backend import Scalar
 
 LIMIT = 1.25
@@ -39,7 +38,9 @@ def commands_of(kind: str, servos: Array) -> Array:
     return np.asarray(np.linalg.pinv(SWASHPLATES[kind]) @ servos)
 
 
-def limited(commands: Symbols, collective: Scalar, ring: Scalar, xp: ArrayFunctions) -> tuple[Any, Any, Any]:
+def limited(
+    commands: Symbols, collective: Scalar, ring: Scalar, xp: ArrayFunctions
+) -> tuple[Operand, Operand, Operand]:
     """Commands (3,) and collective within their limits and the ring, and which of the three were cut (0 or 1).
 
     Args:
@@ -59,16 +60,16 @@ def limited(commands: Symbols, collective: Scalar, ring: Scalar, xp: ArrayFuncti
 
 
 def governed(
-    m: Mapping[str, Any],
-    after: dict[str, Any],
+    m: Mapping[str, Operand],
+    after: dict[str, Operand],
     headspeed: Scalar,
     commands: Symbols,
     collective: Scalar,
     cyclic: Scalar,
-    k: Mapping[str, Any],
+    k: Mapping[str, Operand],
     dt: Scalar,
     xp: ArrayFunctions,
-) -> Any:
+) -> Operand:
     """The throttle of the governor in flight (governor.c), 0 to 1; 1 where no head speed is asked for.
 
     Args:
@@ -82,7 +83,7 @@ def governed(
     change, after["rpm_slope"] = slope(m["rpm_slope"], error, 0.1 * k["gov_d_filter"], dt, xp)
     gain = 0.01 * k["gov_gain"]
 
-    def within(value: Any, limit: str) -> Any:
+    def within(value: Operand, limit: str) -> Operand:
         return xp.clip(value, -0.01 * k[limit], 0.01 * k[limit])
 
     p = within(gain * 0.1 * k["gov_p_gain"] * error, "gov_p_limit")

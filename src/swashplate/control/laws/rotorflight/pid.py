@@ -8,13 +8,13 @@ stand cyclic cross-coupling of demands and precompensation of the tail by collec
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from swashplate.control.laws.rotorflight.filters import high_pass, low_pass, one_pole, slope, two_poles
 from swashplate.control.laws.rotorflight.parameters import AXES, CROSS_COUPLING, SCALES
-from swashplate.engine.symbols import ArrayFunctions, Symbols
+from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.physics.backend import Scalar
 
 ERROR_DECAY = ((12, 13, 14, 15, 17, 20, 23, 28, 36, 49, 78, 187, 250, 250, 250, 250), (12,) * 16)
@@ -45,12 +45,12 @@ class Deflections(NamedTuple):
         saturated: 1 where an axis was cut in the last steps, (3,).
     """
 
-    collective: Any
-    cyclic: Any
-    saturated: Any
+    collective: Operand
+    cyclic: Operand
+    saturated: Operand
 
 
-def table(x: Scalar, points: tuple[int, ...], xp: ArrayFunctions) -> Any:
+def table(x: Scalar, points: tuple[int, ...], xp: ArrayFunctions) -> Operand:
     """Between the points of a table over 0 to 1; beyond it the last piece goes on, never below zero."""
     bins = len(points) - 1
     steps = np.diff(points)
@@ -58,20 +58,20 @@ def table(x: Scalar, points: tuple[int, ...], xp: ArrayFunctions) -> Any:
     return xp.maximum(whole + steps[-1] * xp.maximum(x * bins - (bins - 1), 0.0), 0.0)
 
 
-def _within(value: Any, limit: Any, xp: ArrayFunctions) -> Any:
+def _within(value: Operand, limit: Operand, xp: ArrayFunctions) -> Operand:
     return xp.clip(value, -limit, limit)
 
 
-def _of(k: Mapping[str, Any], name: str, xp: ArrayFunctions) -> Any:
+def _of(k: Mapping[str, Operand], name: str, xp: ArrayFunctions) -> Operand:
     """A gain by axis, as commands per degree and second; of an axis without one 0."""
     return xp.stack([k.get(f"{axis}_{name}", 0.0) * scale for axis, scale in zip(AXES, SCALES[name], strict=True)])
 
 
-def _by_axis(k: Mapping[str, Any], pattern: str, xp: ArrayFunctions) -> Any:
+def _by_axis(k: Mapping[str, Operand], pattern: str, xp: ArrayFunctions) -> Operand:
     return xp.stack([k[pattern.format(axis)] for axis in AXES])
 
 
-def _turned(pair: Symbols, angle: Scalar) -> Any:
+def _turned(pair: Symbols, angle: Scalar) -> Operand:
     """Roll and pitch of what is kept, carried along as the nose turns left by a small angle [rad]."""
     t = 0.5 * angle * angle
     c, s = t * (1.0 - t / 6.0), angle * (1.0 - t / 3.0)
@@ -80,16 +80,16 @@ def _turned(pair: Symbols, angle: Scalar) -> Any:
 
 
 def pid_step(
-    m: Mapping[str, Any],
+    m: Mapping[str, Operand],
     gyro: Symbols,
     demand: Symbols,
     mixed: Deflections,
     headspeed: Scalar,
-    k: Mapping[str, Any],
+    k: Mapping[str, Operand],
     sense: Scalar,
     dt: Scalar,
     xp: ArrayFunctions,
-) -> tuple[Any, dict[str, Any]]:
+) -> tuple[Operand, dict[str, Operand]]:
     """Commands of roll, pitch and yaw, shape (3,), and what is carried on.
 
     Args:
@@ -105,7 +105,7 @@ def pid_step(
     turn = xp.radians(gyro[2]) * dt
     error[:2], offset[:2] = _turned(m["error"], turn), _turned(m["offset"], turn)
     error, offset = xp.stack(error), xp.stack(offset)
-    after: dict[str, Any] = {}
+    after: dict[str, Operand] = {}
 
     rate, kept = low_pass(m["rate"].reshape(2, 3), gyro, _by_axis(k, "{}_gyro_cutoff", xp), dt, xp)
     after["rate"] = kept.ravel()
@@ -169,12 +169,14 @@ def pid_step(
     return p + integral + gains["d"] * falling + gains["f"] * demand + gains["b"] * rising + added, after
 
 
-def _inverse(time: Scalar, xp: ArrayFunctions) -> Any:
+def _inverse(time: Scalar, xp: ArrayFunctions) -> Operand:
     """10 over a time, none of 0."""
     return xp.where(xp.greater(time, 0.0), 10.0 / xp.maximum(time, 1e-9), 0.0)
 
 
-def _decayed(error: Symbols, k: Mapping[str, Any], yaw_integral: Scalar, curve: Scalar, xp: ArrayFunctions) -> Any:
+def _decayed(
+    error: Symbols, k: Mapping[str, Operand], yaw_integral: Scalar, curve: Scalar, xp: ArrayFunctions
+) -> Operand:
     """By how much errors decay [deg/s], (3,): roll's and pitch's faster with more collective."""
     fast = _inverse(k["error_decay_time_cyclic"], xp) * table(curve, ERROR_DECAY[0], xp) * 0.08
     limit = xp.where(xp.greater(k["error_decay_limit_cyclic"], 0.0), k["error_decay_limit_cyclic"], _UNLIMITED)
@@ -188,7 +190,7 @@ def _decayed(error: Symbols, k: Mapping[str, Any], yaw_integral: Scalar, curve: 
 
 def _bled(
     error: Symbols, offset: Symbols, demand: Symbols, share: Symbols, collective: Scalar, dt: Scalar, xp: ArrayFunctions
-) -> tuple[Any, Any]:
+) -> tuple[Operand, Operand]:
     """While roll and pitch are demanded, what of the offset lies along the demand goes back into the error."""
     roll, pitch = demand[0], demand[1]
     square = roll * roll + pitch * pitch
@@ -208,7 +210,7 @@ def _flooded(
     curve: Scalar,
     quiet: Scalar,
     xp: ArrayFunctions,
-) -> tuple[Any, Any]:
+) -> tuple[Operand, Operand]:
     """While the collective rests, the error flows into the offset, without a step of the command."""
     side = xp.where(xp.greater(0.0, error), -1.0, 1.0) * xp.where(xp.greater(0.0, collective), -1.0, 1.0)
     wanted = side * table(curve, OFFSET_FLOOD, xp) * 0.08 * quiet
@@ -223,16 +225,16 @@ def _flooded(
 
 
 def _precompensated(
-    m: Mapping[str, Any],
-    after: dict[str, Any],
+    m: Mapping[str, Operand],
+    after: dict[str, Operand],
     demand: Symbols,
     mixed: Deflections,
     headspeed: Scalar,
-    k: Mapping[str, Any],
+    k: Mapping[str, Operand],
     sense: Scalar,
     dt: Scalar,
     xp: ArrayFunctions,
-) -> Any:
+) -> Operand:
     """Of the tail, against the torque of drag and of a rotor that speeds up."""
     after["speed"] = two_poles(m["speed"], (headspeed + sense * demand[2] / 6.0) / 3000.0, 20.0, dt, xp)
     change, after["speed_slope"] = slope(
