@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from swashplate.physics import drive_train, fuselage, rotor, stabilizer_bar, swashplate
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector, euler_rates, local_to_body
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
@@ -124,7 +124,7 @@ class CoaxialLoads(NamedTuple):
     lift: tuple[Scalar, Scalar]
 
 
-def _flap_response(par: Any) -> swashplate.FlapResponse:
+def _flap_response(par: Named) -> swashplate.FlapResponse:
     return swashplate.FlapResponse(*(getattr(par, name) for name in swashplate.FlapResponse._fields))
 
 
@@ -137,7 +137,7 @@ def _turning(omega: Scalar, full: Scalar, xp: Backend) -> Scalar:
 def loads(
     state: CoaxState,
     inputs: CoaxInputs,
-    par: Any,
+    par: Named,
     env: Environment,
     xp: Backend,
     *,
@@ -260,7 +260,7 @@ def loads(
 def derivatives(
     state: CoaxState,
     inputs: CoaxInputs,
-    par: Any,
+    par: Named,
     env: Environment,
     xp: Backend,
     *,
@@ -281,7 +281,7 @@ def derivatives(
 def specific_force(
     state: CoaxState,
     inputs: CoaxInputs,
-    par: Any,
+    par: Named,
     env: Environment,
     xp: Backend,
     *,

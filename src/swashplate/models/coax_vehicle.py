@@ -25,7 +25,7 @@ from swashplate.models.nesting import rebuild
 from swashplate.models.traits import Axis, Pose, RecordingFit, Traits
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics import rotor
-from swashplate.physics.backend import Backend, FloatBackend, Scalar
+from swashplate.physics.backend import Backend, FloatBackend, Named, Scalar
 from swashplate.physics.drive_train import steady_speed
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.frames import Euler
@@ -78,7 +78,7 @@ def pose(vehicle: Vehicle) -> Pose:
     return coaxial
 
 
-def hover(parameters: Any, voltage: Scalar, xp: Backend) -> tuple[dict[str, Scalar], tuple[Scalar, ...]]:
+def hover(parameters: Named, voltage: Scalar, xp: Backend) -> tuple[dict[str, Scalar], tuple[Scalar, ...]]:
     """Hover in closed form: both torques balance and both thrusts carry the weight.
 
     Returns:
@@ -96,7 +96,7 @@ def hover(parameters: Any, voltage: Scalar, xp: Backend) -> tuple[dict[str, Scal
     return {"omega_lower": omega_lower, "omega_upper": omega_upper}, (*motors, 0.0, 0.0)
 
 
-def settled(inputs: Any, parameters: Any, voltage: Scalar, attitude: Any, running: Scalar) -> dict[str, Scalar]:
+def settled(inputs: Named, parameters: Named, voltage: Scalar, attitude: Named, running: Scalar) -> dict[str, Scalar]:
     """Inner states in a slow flight: steady rotor speeds, the bar aligned with the fuselage."""
     speeds = {
         f"omega_{side}": steady_speed(

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from swashplate.physics import drive_train, fuselage, rotor
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.frames import Vector, local_to_body
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
@@ -53,12 +53,12 @@ class MultirotorLoads(NamedTuple):
     motors: MotorWarmth | None
 
 
-def place(par: Any, number: int) -> Vector:
+def place(par: Named, number: int) -> Vector:
     """A rotor's place from the centre of gravity [m], numbered from 1."""
     return Vector(*(getattr(par, f"rotor_{number}_{axis}") for axis in "xyz"))
 
 
-def steady_speed(par: Any, command: Scalar, voltage: Scalar) -> Scalar:
+def steady_speed(par: Named, command: Scalar, voltage: Scalar) -> Scalar:
     """Speed [rad/s] that a command holds: eq. 22 with a command that is a share of the battery's voltage."""
     nominal = par.voltage_nominal
     share = command * voltage / nominal
@@ -67,12 +67,12 @@ def steady_speed(par: Any, command: Scalar, voltage: Scalar) -> Scalar:
     )
 
 
-def faster_when_cold(par: Any, motors: MotorWarmth) -> Scalar:
+def faster_when_cold(par: Named, motors: MotorWarmth) -> Scalar:
     """Speed [rad/s] that motors add to `steady_speed` as long as they are not warm."""
     return par.o_cold * (1.0 - motors.warmth)
 
 
-def warming(par: Any, motors: MotorWarmth, thrust: Scalar) -> Scalar:
+def warming(par: Named, motors: MotorWarmth, thrust: Scalar) -> Scalar:
     """Rate of the warmth [1/s] towards the square of the thrust over the weight.
 
     Current is torque, torque goes with thrust, and its square heats the windings. Their resistance rises by 0.4 % a
@@ -83,7 +83,7 @@ def warming(par: Any, motors: MotorWarmth, thrust: Scalar) -> Scalar:
 
 
 def speed_rates(
-    par: Any, speeds: Any, commands: Any, voltage: Scalar, motors: MotorWarmth | None = None
+    par: Named, speeds: Any, commands: Named, voltage: Scalar, motors: MotorWarmth | None = None
 ) -> list[Scalar]:
     """Accelerations of the rotors [rad/s^2]: eq. 15, and slower for what all do alike.
 
@@ -101,7 +101,7 @@ def speed_rates(
     return [drive_train.drive_train_rate(common, one, par.tau_drive) + together for one in away]
 
 
-def shaft_power(par: Any, speeds: Any, density_ratio: Scalar) -> Scalar:
+def shaft_power(par: Named, speeds: Any, density_ratio: Scalar) -> Scalar:
     """Power that the rotors take in hover and near it [W]: torque times speed, all rotors."""
     return sum(
         getattr(par, f"gain_{i}") * rotor.drag_torque(par.k_torque, omega, density_ratio) * omega
@@ -109,7 +109,7 @@ def shaft_power(par: Any, speeds: Any, density_ratio: Scalar) -> Scalar:
     )
 
 
-def sag_rate(par: Any, sag: Scalar, speeds: Any, env: Environment, xp: Backend) -> Scalar:
+def sag_rate(par: Named, sag: Scalar, speeds: Any, env: Environment, xp: Backend) -> Scalar:
     """Rate of the lost voltage [V/s] towards R I, with the current I that the rotors' power asks of the terminals."""
     terminal = xp.maximum(env.voltage - sag, LEAST_VOLTAGE * env.voltage)
     power = shaft_power(par, speeds, env.air_density / par.air_density)
@@ -117,7 +117,7 @@ def sag_rate(par: Any, sag: Scalar, speeds: Any, env: Environment, xp: Backend) 
 
 
 def loads(
-    state: MultirotorState, inputs: Any, par: Any, env: Environment, xp: Backend, *, senses: tuple[float, ...]
+    state: MultirotorState, inputs: Named, par: Named, env: Environment, xp: Backend, *, senses: tuple[float, ...]
 ) -> MultirotorLoads:
     """Force [N] and moment [N m] on the body without gravity, and the rates of rotors and battery.
 
@@ -157,7 +157,7 @@ def loads(
 
 
 def derivatives(
-    state: MultirotorState, inputs: Any, par: Any, env: Environment, xp: Backend, *, senses: tuple[float, ...]
+    state: MultirotorState, inputs: Named, par: Named, env: Environment, xp: Backend, *, senses: tuple[float, ...]
 ) -> MultirotorState:
     """Time derivative of the whole state."""
     acting = loads(state, inputs, par, env, xp, senses=senses)
@@ -169,7 +169,7 @@ def derivatives(
 
 
 def specific_force(
-    state: MultirotorState, inputs: Any, par: Any, env: Environment, xp: Backend, *, senses: tuple[float, ...]
+    state: MultirotorState, inputs: Named, par: Named, env: Environment, xp: Backend, *, senses: tuple[float, ...]
 ) -> Vector:
     """What an accelerometer at the CG reads [m/s^2]: every force but gravity, per mass."""
     return loads(state, inputs, par, env, xp, senses=senses).force.scaled(1.0 / par.mass)

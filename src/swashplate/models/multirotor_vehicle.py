@@ -24,7 +24,7 @@ from swashplate.models.multirotor import (
 from swashplate.models.traits import Axis, Choice, Free, PhysicalEffect, Pose, RecordingFit, Traits
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics import rotor
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 
@@ -117,7 +117,7 @@ def _options(card: Card) -> tuple[tuple[float, ...], bool, bool]:
     return tuple(float(sense) for sense in senses), options["battery"] == "resistance", options["motors"] == "warming"
 
 
-def effectiveness(par: Any, senses: Sequence[float]) -> list[list[Scalar]]:
+def effectiveness(par: Named, senses: Sequence[float]) -> list[list[Scalar]]:
     """Lift and moments about x, y, z [N, N m] by each rotor's speed squared, as four rows."""
     gains = [getattr(par, f"gain_{i}") for i in range(1, len(senses) + 1)]
     lift = [gain * par.k_thrust for gain in gains]
@@ -146,14 +146,14 @@ def _least_norm(rows: list[list[Scalar]], wanted: Sequence[Scalar]) -> list[Scal
     return [sum(row[k] * value for row, value in zip(rows, solved, strict=True)) for k in range(len(rows[0]))]
 
 
-def _terminal(par: Any, speeds: Sequence[Scalar], voltage: Scalar, xp: Backend) -> Scalar:
+def _terminal(par: Named, speeds: Sequence[Scalar], voltage: Scalar, xp: Backend) -> Scalar:
     """Voltage at the terminals under a steady load: V = E - R P / (eta V), the larger root; half of E beyond."""
     lost = par.battery_resistance * shaft_power(par, speeds, 1.0) / par.drive_efficiency
     return 0.5 * (voltage + xp.sqrt(xp.maximum(voltage * voltage - 4.0 * lost, 0.0)))
 
 
 def hover(
-    par: Any, voltage: Scalar, xp: Backend, *, senses: tuple[float, ...], battery: bool, warming: bool
+    par: Named, voltage: Scalar, xp: Backend, *, senses: tuple[float, ...], battery: bool, warming: bool
 ) -> tuple[dict[str, Scalar], tuple[Scalar, ...]]:
     """Hover in closed form: level, thrusts carry the weight, moments vanish, with the least sum of speeds^4.
 
@@ -175,7 +175,7 @@ def hover(
 
 
 def settled(
-    inputs: Any, par: Any, voltage: Scalar, attitude: Any, running: Scalar, *, warming: bool
+    inputs: Named, par: Named, voltage: Scalar, attitude: Named, running: Scalar, *, warming: bool
 ) -> dict[str, Scalar]:
     """Inner states in a slow flight: the rotor speeds that the measured voltage holds, and motors that have carried
     the weight for `running` seconds."""
@@ -187,7 +187,7 @@ def settled(
     return speeds | motors._asdict()
 
 
-def axes(par: Any, senses: Sequence[float], *, warming: bool) -> tuple[Axis, ...]:
+def axes(par: Named, senses: Sequence[float], *, warming: bool) -> tuple[Axis, ...]:
     """Roll, pitch, yaw and heave with the rotors that make them, from where these are and how they turn."""
     names = [f"motor_{i}" for i in range(1, len(senses) + 1)]
     rows = np.asarray(effectiveness(par, senses), dtype=np.float64)

@@ -21,7 +21,7 @@ from typing import Any
 from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter
 from swashplate.models.vehicle import Derivatives, Vehicle
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
 
@@ -193,7 +193,7 @@ def _suited(vehicle: Vehicle) -> None:
 
 
 @lru_cache(maxsize=64)
-def _wider(parameters: Any, names: tuple[str, ...]) -> Any:
+def _wider(parameters: Named, names: tuple[str, ...]) -> Any:
     """A tuple type with more fields; one for the same names, so that compiled code is shared."""
     return namedtuple(parameters.__name__, (*parameters._fields, *names))
 
@@ -201,7 +201,7 @@ def _wider(parameters: Any, names: tuple[str, ...]) -> Any:
 _Rows = tuple[tuple[str, tuple[str, ...]], ...]
 
 
-def residual(state: Any, inputs: Any, par: Any, *, names: tuple[str, ...], rows: _Rows) -> tuple[Scalar, ...]:
+def residual(state: Named, inputs: Named, par: Named, *, names: tuple[str, ...], rows: _Rows) -> tuple[Scalar, ...]:
     """The accelerations of u, v, w [m/s^2] and p, q, r [rad/s^2] that the residual adds."""
     away = {name: value - getattr(par, f"{_AT}{name}") for name, value in zip(names, inputs, strict=True)}
     columns = {name: getattr(state.body, name) for name in MOTION} | away
@@ -213,7 +213,7 @@ def residual(state: Any, inputs: Any, par: Any, *, names: tuple[str, ...], rows:
 
 
 def _derivatives(
-    state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any,
+    state: Named, inputs: Named, par: Named, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any,
     rows: _Rows,
 ) -> Any:  # fmt: skip
     """Time derivative of the whole state: the equations' own, and the residual's accelerations."""
@@ -224,7 +224,7 @@ def _derivatives(
 
 
 def _specific_force(
-    state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any,
+    state: Named, inputs: Named, par: Named, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any,
     rows: _Rows,
 ) -> Vector:  # fmt: skip
     """What an accelerometer at the centre of gravity reads [m/s^2]: the residual's force is one that it feels."""

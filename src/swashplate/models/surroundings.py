@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from swashplate.errors import CardError, ControllerError
 from swashplate.models.card import Card
+from swashplate.physics.backend import Named
 from swashplate.physics.environment import LABORATORY_GRAVITY, SEA_LEVEL_DENSITY, Environment
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def environment_of(vehicle: _Carded, environment: Environment | None = None, *, 
     return given
 
 
-def _own(vehicle: _Carded, name: str, usual: float, parameters: Any) -> Any:
+def _own(vehicle: _Carded, name: str, usual: float, parameters: Named) -> Any:
     if name not in vehicle.parameter_names:
         return usual
     return vehicle.card.values()[name] if parameters is None else getattr(parameters, name)

@@ -16,7 +16,7 @@ from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.surroundings import environment_of
 from swashplate.models.traits import Choice, Role, Traits
 from swashplate.models.usual_axes import usual_axes
-from swashplate.physics.backend import Backend, FloatBackend
+from swashplate.physics.backend import Backend, FloatBackend, Named
 from swashplate.physics.environment import Environment
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.public import resolve
@@ -45,9 +45,9 @@ class Vehicle:
     """
 
     card: Card
-    state: Any
-    inputs: Any
-    parameters: Any
+    state: Named
+    inputs: Named
+    parameters: Named
     state_names: tuple[str, ...]
     state_units: tuple[str, ...]
     input_names: tuple[str, ...]
@@ -109,7 +109,7 @@ class Vehicle:
         return self.parameters(*(numbers[name] for name in self.parameter_names))
 
     def rates(
-        self, x: Any, u: Any, parameters: Any, environment: Environment | None = None, xp: Backend = _FLOATS
+        self, x: Any, u: Any, parameters: Named, environment: Environment | None = None, xp: Backend = _FLOATS
     ) -> list[Any]:
         """Derivatives of the flat state row `x` under the flat input row `u`, as a list in the order of the states.
 

@@ -15,6 +15,9 @@ import numpy as np
 Scalar = Any
 """A number: `float`, an array, or a CasADi expression."""
 
+Named = Any
+"""A named tuple of such numbers: parameters, inputs or outputs, with the names that its model has."""
+
 
 class Backend(Protocol):
     """The operations of an equation.

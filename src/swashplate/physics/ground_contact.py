@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.frames import Vector, body_to_local, local_to_body
 from swashplate.physics.rigid_body import RigidBody
 
@@ -20,7 +20,7 @@ class Skids(NamedTuple):
     friction: Scalar
 
     @staticmethod
-    def of(par: Any) -> Skids:
+    def of(par: Named) -> Skids:
         """Those of a card's parameters."""
         names = ("length", "width", "depth", "stiffness", "damping", "friction")
         return Skids(*(getattr(par, f"skid_{name}") for name in names))

@@ -19,7 +19,7 @@ from swashplate.errors import SwashError
 from swashplate.models.catalogue import from_card
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend
+from swashplate.physics.backend import Backend, Named
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
 from swashplate.physics.ground_contact import Grip, Skids, skid_loads
@@ -114,7 +114,7 @@ def at_rest(vehicle: Vehicle, environment: Environment) -> NDArray[np.float64]:
 
 
 def _derivatives(
-    free: Callable[..., Any], skids: Skids, state: Standing, inputs: object, par: Any, env: Environment, xp: Backend
+    free: Callable[..., Any], skids: Skids, state: Standing, inputs: object, par: Named, env: Environment, xp: Backend
 ) -> Any:
     force, moment, bending = skid_loads(state.body, skids, xp, state.grip)
     inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz, getattr(par, "inertia_xz", None))
@@ -127,7 +127,7 @@ def _derivatives(
 
 
 def _specific_force(
-    free: Callable[..., Any], skids: Skids, state: Standing, inputs: object, par: Any, env: Environment, xp: Backend
+    free: Callable[..., Any], skids: Skids, state: Standing, inputs: object, par: Named, env: Environment, xp: Backend
 ) -> Vector:
     force, _, _ = skid_loads(state.body, skids, xp, state.grip)
     felt: Vector = free(_own(state), inputs, par, env, xp)

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 from swashplate.errors import SwashError
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.drive_train import steady_speed
 from swashplate.physics.stabilizer_bar import phase_lag
 from swashplate.simulation.trim import Trim
@@ -138,7 +138,7 @@ def decoupler(
     )
 
 
-def estimated_lag(law: Any, motor_lower: Scalar, voltage: Scalar) -> Scalar:
+def estimated_lag(law: Named, motor_lower: Scalar, voltage: Scalar) -> Scalar:
     """The phase lag that the law believes in [rad] (eqs 21, 22)."""
     omega = steady_speed(
         motor_lower, voltage, k=law.k_drive, o=law.o_drive, k_voltage=law.k_voltage, nominal=law.voltage_nominal
@@ -147,7 +147,7 @@ def estimated_lag(law: Any, motor_lower: Scalar, voltage: Scalar) -> Scalar:
 
 
 def decouple(
-    law: Any, roll: Scalar, pitch: Scalar, *, u: Scalar, v: Scalar, motor_lower: Scalar, voltage: Scalar, xp: Backend
+    law: Named, roll: Scalar, pitch: Scalar, *, u: Scalar, v: Scalar, motor_lower: Scalar, voltage: Scalar, xp: Backend
 ) -> tuple[Scalar, Scalar]:
     """Servo commands without limits for wanted (roll, pitch), each -1 to 1 (eqs 19, 20, solved).
 

@@ -8,10 +8,10 @@ by that of the drive train with the measured battery voltage (eq. 22).
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.rigid_body import RigidBody
 
 _LEAST_VERTICAL = 0.5
@@ -84,7 +84,7 @@ def coaxial_rotors(vehicle: Vehicle, *, gravity: float, battery: bool = True) ->
     return CoaxialRotors(**given, weight=card["mass"] * gravity, k_voltage=card["k_drive_voltage"] if battery else 0.0)
 
 
-def motors_for(thrust: Scalar, torque: Scalar, voltage: Scalar, rotors: Any, xp: Backend) -> Motors:
+def motors_for(thrust: Scalar, torque: Scalar, voltage: Scalar, rotors: Named, xp: Backend) -> Motors:
     """Steady motor commands for a thrust [N] and a yaw torque [N m, nose right], without limits.
 
     From T = kT_lw Om_lw^2 + kT_up Om_up^2 and N = kQ_up Om_up^2 - kQ_lw Om_lw^2 (eqs 3, 4) and eq. 22.
@@ -100,7 +100,7 @@ def motors_for(thrust: Scalar, torque: Scalar, voltage: Scalar, rotors: Any, xp:
     )
 
 
-def thrust_and_torque(motors: Motors, voltage: Scalar, rotors: Any, xp: Backend) -> tuple[Scalar, Scalar]:
+def thrust_and_torque(motors: Motors, voltage: Scalar, rotors: Named, xp: Backend) -> tuple[Scalar, Scalar]:
     """Thrust [N] and yaw torque [N m] that motor commands hold (the forward direction of `motors_for`)."""
     r = rotors
     gained = r.k_voltage * (voltage - r.voltage_nominal)
@@ -121,8 +121,8 @@ def height_yaw_step(
     *,
     z: Scalar,
     psi: Scalar,
-    gains: Any,
-    rotors: Any,
+    gains: Named,
+    rotors: Named,
     dt: Scalar,
     xp: Backend,
 ) -> tuple[HeightYawMemory, Motors]:

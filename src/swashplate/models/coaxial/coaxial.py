@@ -15,7 +15,7 @@ from swashplate.models.coaxial.coaxial_parameters import one_rotor
 from swashplate.models.conventional import drive
 from swashplate.models.conventional.main_rotor import Contribution, MainRotor, main_rotor
 from swashplate.physics import coaxial_wake, fuselage, ground_contact, ground_effect
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.coaxial_wake import Induced, WakeShares
 from swashplate.physics.engine import EngineLag, RotorSpeed
 from swashplate.physics.environment import Environment
@@ -100,7 +100,7 @@ class TwinRotorLoads(NamedTuple):
         return Contribution(force, moment)
 
 
-def blade_pitches(sticks: Any, sense: float) -> tuple[tuple[Scalar, Scalar, Scalar], tuple[Scalar, Scalar, Scalar]]:
+def blade_pitches(sticks: Named, sense: float) -> tuple[tuple[Scalar, Scalar, Scalar], tuple[Scalar, Scalar, Scalar]]:
     """(theta0, A1, B1) at the upper and the lower swashplate [rad]; theta0d turns the nose right for either sense.
 
     Args:
@@ -118,10 +118,10 @@ def blade_pitches(sticks: Any, sense: float) -> tuple[tuple[Scalar, Scalar, Scal
 def _rotors(
     state: CoaxialState,
     air: Vector,
-    sticks: Any,
+    sticks: Named,
     omega: Scalar,
     blowing: Scalar,
-    par: Any,
+    par: Named,
     density: Scalar,
     xp: Backend,
     options: CoaxialOptions,
@@ -165,7 +165,7 @@ def _rotors(
 
 
 def loads(
-    state: CoaxialState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: CoaxialOptions
+    state: CoaxialState, inputs: Named, par: Named, env: Environment, xp: Backend, *, options: CoaxialOptions
 ) -> TwinRotorLoads:
     """Forces and moments on the fuselage by contributor, without gravity, and the rates of everything that moves."""
     body, density, switches = state.body, env.air_density, options.upper
@@ -220,7 +220,7 @@ def loads(
     )
 
 
-def stops(par: Any, count: int) -> list[tuple[Scalar, Scalar]]:
+def stops(par: Named, count: int) -> list[tuple[Scalar, Scalar]]:
     """Lowest and highest theta0, B1, A1, theta0d and, of six commands, B1d and A1d [rad]."""
     cyclic = (-par.cyclic_limit, par.cyclic_limit)
     ends = [
@@ -238,7 +238,7 @@ def commands_of(options: CoaxialOptions) -> type[FourCommands] | type[SixCommand
 
 
 def derivatives(
-    state: CoaxialState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: CoaxialOptions
+    state: CoaxialState, inputs: Named, par: Named, env: Environment, xp: Backend, *, options: CoaxialOptions
 ) -> CoaxialState:
     """Time derivative of the whole state."""
     acting = loads(state, inputs, par, env, xp, options=options)
@@ -263,7 +263,7 @@ def derivatives(
 
 
 def specific_force(
-    state: CoaxialState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: CoaxialOptions
+    state: CoaxialState, inputs: Named, par: Named, env: Environment, xp: Backend, *, options: CoaxialOptions
 ) -> Vector:
     """What an accelerometer at the CG reads [m/s^2]: every force but gravity, per mass."""
     return loads(state, inputs, par, env, xp, options=options).total().force.scaled(1.0 / par.mass)

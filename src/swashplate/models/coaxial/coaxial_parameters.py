@@ -14,6 +14,7 @@ from swashplate.models.conventional.helicopter_parameters import MEANING as SING
 from swashplate.models.conventional.helicopter_parameters import NOT_NEGATIVE as SINGLE_NOT_NEGATIVE
 from swashplate.models.conventional.helicopter_parameters import POSITIVE as SINGLE_POSITIVE
 from swashplate.models.conventional.helicopter_parameters import UNITS as SINGLE_UNITS
+from swashplate.physics.backend import Named
 
 _OWN: Mapping[str, tuple[str, str]] = {
     "hub_height_upper": ("m", "upper hub above the CG"),
@@ -98,7 +99,7 @@ OneRotor = NamedTuple("OneRotor", [(name, Any) for name in (*_ROTOR, *_EACH)])  
 """The numbers of one of the rotors, by the names that `main_rotor` reads; shafts are upright, blades even."""
 
 
-def one_rotor(par: Any, hub_height: Any) -> Any:
+def one_rotor(par: Named, hub_height: Any) -> Any:
     """The numbers of the rotor at this height."""
     numbers = [getattr(par, name) for name in _ROTOR]
     return OneRotor._make((*numbers, hub_height, 0.0, 1.0))

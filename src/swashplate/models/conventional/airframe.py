@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from swashplate.models.conventional.main_rotor import Contribution
 from swashplate.physics import fuselage, tail_rotor, tail_surfaces
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.frames import Vector
 
 
@@ -27,7 +27,7 @@ def airframe(
     wake: Scalar,
     omega: Scalar,
     awake: tuple[Scalar, Scalar],
-    par: Any,
+    par: Named,
     density: Scalar,
     xp: Backend,
     sense: float,

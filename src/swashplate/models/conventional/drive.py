@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from swashplate.physics import actuators, engine
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.engine import EngineLag, RotorSpeed
 
 
-def late(states: Any, commands: Any, delay: Scalar) -> tuple[Any, Any]:
+def late(states: Named, commands: Named, delay: Scalar) -> tuple[Any, Any]:
     """Rates of the delays' states, and what comes out of them.
 
     Args:
@@ -25,7 +25,9 @@ def late(states: Any, commands: Any, delay: Scalar) -> tuple[Any, Any]:
     return type(states)(*(rate for rate, _ in rates), *(change for _, change in rates)), out
 
 
-def servo_rates(positions: Any, commands: Any, stops: Sequence[tuple[Scalar, Scalar]], par: Any, xp: Backend) -> Any:
+def servo_rates(
+    positions: Named, commands: Named, stops: Sequence[tuple[Scalar, Scalar]], par: Named, xp: Backend
+) -> Any:
     """Rates of servos [rad/s] towards their commands, within the card's speed and each one's stops."""
     return type(positions)(
         *(
@@ -38,7 +40,7 @@ def servo_rates(positions: Any, commands: Any, stops: Sequence[tuple[Scalar, Sca
 
 
 def shaft_rates(
-    rotor: RotorSpeed, lag: EngineLag | None, load: Scalar, throttle: Scalar, par: Any, xp: Backend
+    rotor: RotorSpeed, lag: EngineLag | None, load: Scalar, throttle: Scalar, par: Named, xp: Backend
 ) -> tuple[RotorSpeed, EngineLag | None]:
     """Rates of rotor speed, governor and the engine's lag (None without one) under a load at the shaft [N m]."""
     share = throttle * engine.wanted_share(rotor, wanted=par.rotor_speed, gain=par.governor_gain, xp=xp)

@@ -7,14 +7,14 @@ turns clockwise from above is the mirror image: lateral quantities go in and com
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from swashplate.models.conventional import drive
 from swashplate.models.conventional.airframe import airframe
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
 from swashplate.models.conventional.main_rotor import Contribution, MainRotor, main_rotor
 from swashplate.physics import bell_hiller, ground_contact
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.bell_hiller import Bar
 from swashplate.physics.engine import EngineLag, RotorSpeed
 from swashplate.physics.environment import Environment
@@ -122,7 +122,7 @@ CONTRIBUTORS = ("main_rotor", "tail_rotor", "tailplane", "fin", "fuselage", "gro
 
 
 def loads(
-    state: HelicopterState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: HelicopterOptions
+    state: HelicopterState, inputs: Named, par: Named, env: Environment, xp: Backend, *, options: HelicopterOptions
 ) -> HelicopterLoads:
     """Forces and moments on the fuselage by contributor, without gravity, and the rates of everything that moves."""
     body = state.body
@@ -235,7 +235,7 @@ def _sum(acting: HelicopterLoads) -> Contribution:
 
 
 def derivatives(
-    state: HelicopterState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: HelicopterOptions
+    state: HelicopterState, inputs: Named, par: Named, env: Environment, xp: Backend, *, options: HelicopterOptions
 ) -> HelicopterState:
     """Time derivative of the whole state (Bhandari et al. 2005, eqs 1 to 6, with the components of `physics`)."""
     acting = loads(state, inputs, par, env, xp, options=options)
@@ -257,7 +257,7 @@ def derivatives(
 
 
 def specific_force(
-    state: HelicopterState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: HelicopterOptions
+    state: HelicopterState, inputs: Named, par: Named, env: Environment, xp: Backend, *, options: HelicopterOptions
 ) -> Vector:
     """What an accelerometer at the CG reads [m/s^2]: every force but gravity, per mass."""
     return _sum(loads(state, inputs, par, env, xp, options=options)).force.scaled(1.0 / par.mass)

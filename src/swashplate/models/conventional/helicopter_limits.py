@@ -10,7 +10,7 @@ from swashplate.arrays import Array
 from swashplate.models.conventional.helicopter import HelicopterLoads, HelicopterState, loads
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import FloatBackend
+from swashplate.physics.backend import FloatBackend, Named
 from swashplate.physics.environment import Environment
 from swashplate.physics.flapping import Flapping
 from swashplate.physics.frames import Vector, local_to_body
@@ -51,7 +51,7 @@ def doubts_by_kind(vehicle: Vehicle, x: Array, u: Array, environment: Environmen
 
 
 def rotor_doubts(
-    force: Vector, air: Vector, induced: float, omega: float, disc: Flapping, par: Any, environment: Environment
+    force: Vector, air: Vector, induced: float, omega: float, disc: Flapping, par: Named, environment: Environment
 ) -> dict[str, str]:
     """What of a rotor's equations does not hold, in words by kind; nothing of a rotor that hardly turns.
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
 from swashplate.physics import blade_element, flapping, ground_effect, inflow
-from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.flapping import Flapping
 from swashplate.physics.frames import Vector
 from swashplate.physics.inflow import Inflow
@@ -38,7 +38,7 @@ def main_rotor(
     induced: Inflow | None,
     blades: tuple[Scalar, Scalar, Scalar],
     omega: Scalar,
-    par: Any,
+    par: Named,
     density: Scalar,
     xp: Backend,
     options: HelicopterOptions,
@@ -194,7 +194,7 @@ def _coned(
     seen: blade_element.Disc,
     blade: blade_element.Span,
     held: flapping.Hinge,
-    par: Any,
+    par: Named,
     flaps: Scalar | None,
     options: HelicopterOptions,
 ) -> blade_element.Disc:
@@ -212,6 +212,6 @@ def _coned(
 
 
 def _near_ground(
-    height: Scalar, mu2: Scalar, lam0: Scalar, par: Any, options: HelicopterOptions, xp: Backend
+    height: Scalar, mu2: Scalar, lam0: Scalar, par: Named, options: HelicopterOptions, xp: Backend
 ) -> Scalar:
     return ground_effect.induced_share(height, mu2, lam0, radius=par.rotor_radius, form=options.ground_effect, xp=xp)

@@ -21,7 +21,7 @@ from swashplate.models.card import Card
 from swashplate.models.traits import Traits
 from swashplate.models.usual_axes import usual_axes
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend
+from swashplate.physics.backend import Backend, Named
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local, euler_rates
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
@@ -157,7 +157,7 @@ def named_states(state: LinearState) -> dict[str, Any]:
     return {name: value for part in parts for name, value in part.items()}
 
 
-def _rates(state: LinearState, inputs: Any, par: Any, structure: Structure) -> dict[str, Any]:
+def _rates(state: LinearState, inputs: Named, par: Named, structure: Structure) -> dict[str, Any]:
     """A (x - x0) + B (u - u0), by state."""
     here = named_states(state) | inputs._asdict()
     away = {name: here[name] - getattr(par, f"trim_{name}") for name in (*structure.states, *structure.inputs)}
@@ -168,7 +168,7 @@ def _rates(state: LinearState, inputs: Any, par: Any, structure: Structure) -> d
 
 
 def derivatives(
-    state: LinearState, inputs: Any, par: Any, env: Environment, xp: Backend, *, structure: Structure
+    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, *, structure: Structure
 ) -> LinearState:
     """Time derivative of the whole state; wind, air and voltage are not in such a model."""
     del env
@@ -185,7 +185,7 @@ def derivatives(
 
 
 def specific_force(
-    state: LinearState, inputs: Any, par: Any, env: Environment, xp: Backend, *, structure: Structure
+    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, *, structure: Structure
 ) -> Vector:
     """What accelerometers at the centre of gravity read [m/s^2]: dV/dt + omega x V0 - g, to first order like the model.
 

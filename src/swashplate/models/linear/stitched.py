@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from swashplate.models.linear.card_vehicle import NEEDED, LinearState, entry_nam
 from swashplate.models.traits import Traits
 from swashplate.models.usual_axes import usual_axes
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend, FloatBackend, Scalar
+from swashplate.physics.backend import Backend, FloatBackend, Named, Scalar
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import BODY_UNITS, Inertia, RigidBody, gravity, rigid_body_rates
@@ -292,12 +292,12 @@ class Between(NamedTuple):
     gradients: tuple[Scalar, ...]
     derivatives: tuple[Scalar, ...]
 
-    def trim(self, par: Any, name: str) -> Scalar:
+    def trim(self, par: Named, name: str) -> Scalar:
         cubic = sum(share * getattr(par, f"trim_{name}_{k}") for k, share in enumerate(self.values))
         return cubic + sum(share * getattr(par, f"gradient_{name}_{k}") for k, share in enumerate(self.gradients))
 
 
-def between(speed: Scalar, par: Any, n: int, xp: Backend) -> Between:
+def between(speed: Scalar, par: Named, n: int, xp: Backend) -> Between:
     """Shares of cubic Hermite (trims) and linear interpolation (derivatives) at a speed between the points' [m/s]."""
     knots = [getattr(par, f"trim_u_{k}") for k in range(n)]
     values: list[Scalar] = [1.0] + [0.0] * (n - 1)
@@ -317,7 +317,7 @@ def between(speed: Scalar, par: Any, n: int, xp: Backend) -> Between:
 
 
 def _acting(
-    state: LinearState, inputs: Any, par: Any, env: Environment, xp: Backend, own: Stitches
+    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, own: Stitches
 ) -> tuple[Vector, Vector, dict[str, Scalar]]:
     """Specific force [m/s^2], angular acceleration [rad/s^2] and the inner states' rates."""
     body = state.body
@@ -340,7 +340,7 @@ def _acting(
 
 
 def derivatives(
-    state: LinearState, inputs: Any, par: Any, env: Environment, xp: Backend, *, own: Stitches
+    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, *, own: Stitches
 ) -> LinearState:
     """Time derivative of the whole state."""
     felt, turned, rates = _acting(state, inputs, par, env, xp, own)
@@ -353,7 +353,7 @@ def derivatives(
 
 
 def specific_force(
-    state: LinearState, inputs: Any, par: Any, env: Environment, xp: Backend, *, own: Stitches
+    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, *, own: Stitches
 ) -> Vector:
     """What accelerometers at the centre of gravity read [m/s^2]."""
     return _acting(state, inputs, par, env, xp, own)[0]
