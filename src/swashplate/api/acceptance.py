@@ -59,7 +59,7 @@ class Acceptance(Shown):
         """Whether every line that is judged passed."""
         return not self.problems
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         beside = {}
         if self.truth is not None:

@@ -143,7 +143,7 @@ class AutopilotGains(Shown):
             return write_text(file, parameter_file(dict(self.parameters), title=self.title))
         return write_text(file, px4_file(dict(self.parameters), title=self.title))
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         return {
             "autopilot": self.autopilot,

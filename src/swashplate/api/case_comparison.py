@@ -26,7 +26,7 @@ class CaseComparison(Shown):
     names: tuple[str, ...]
     parts: CaseParts
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """The numbers as JSON types."""
         told = {"remarks": list(self.parts.told)}
         return {"what": self.what, "cases": list(self.names), **_plain(self.parts.document), **told}

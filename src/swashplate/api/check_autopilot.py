@@ -72,7 +72,7 @@ class AutopilotCheck(Shown):
         """Whether the parameters are right and the autopilot can be armed."""
         return not self.problems
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         return asdict(self) | {"passed": self.passed}
 

@@ -42,7 +42,7 @@ class ControllerCheck(Shown):
         """Why the loop does not stand, or what could not be found; empty for a controller that may fly."""
         return self.found.problems
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         return _document(self.found, self.controller) | {"late": self.late}
 

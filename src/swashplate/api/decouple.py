@@ -137,7 +137,7 @@ class DecouplingDesign(Shown):
         """One step as C99; needs the extra `model`."""
         return controller_code(self.controller, precision=precision)
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         document: dict[str, Any] = {
             "vehicle": self.vehicle.name,

@@ -81,7 +81,7 @@ class AxesDecoupling(Shown):
             for name, ratios in reached.items()
         }
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         made = self.made.get("filter")
         matrices = {"problem": self.problem} if made is None else _matrices(made.system, self.keep)

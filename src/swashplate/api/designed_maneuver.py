@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -177,7 +176,7 @@ class DesignedManeuver(Shown):
         written.append(write_text(file.with_suffix(".txt"), self.card() + "\n"))
         return tuple(written)
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         return {
             "vehicle": self.vehicle.name,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from swashplate.api.controllers import flown_by
 from swashplate.control.laws.hold import hover_hold
@@ -47,7 +47,7 @@ class SimulatedFlight(Shown):
     flight: Flight
     remarks: tuple[str, ...] = ()
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Every state and input at the start, at the end, and how far it went [SI units]."""
         channels = (*self.vehicle.state_names, *self.vehicle.input_names)
         units = (*self.vehicle.state_units, *self.vehicle.input_units)

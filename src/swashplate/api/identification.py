@@ -59,7 +59,7 @@ class Identification(ReportFolder):
         """The vehicle with the identified numbers."""
         return self.fit.model
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON, without time histories."""
         validation = self.validation and self.validation.to_document()
         return {"fit": self.fit.to_document(comparisons=False), "validation": validation}

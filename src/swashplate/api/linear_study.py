@@ -66,12 +66,12 @@ class LinearStudy(ReportFolder):
         logs = (*(self.fit.data if self.fit else ()), *(self.verification.data if self.verification else ()))
         return (*own, *refused, *dict.fromkeys(damaged(logs)))
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         verification = self.verification and self.verification.to_document()
         if self.fit is None:
             return dict(verification or {})
-        document = {"fit": self.fit.to_document(comparisons=False), "verification": verification}
+        document: dict[str, object] = {"fit": self.fit.to_document(comparisons=False), "verification": verification}
         if self.material.time_fit is not None:
             return document
         tried = [{"form": t.form.text, "J": t.cost, "unsound": t.unsound} for t in self.material.trials]

@@ -86,7 +86,7 @@ class MonteCarlo(Shown):
         """Write the worst flight: .nc (nothing lost) or .csv."""
         return save_flight(self.worst, path)
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """The summary as what becomes JSON."""
         return {
             "kind": "monte-carlo",

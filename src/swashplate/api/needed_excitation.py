@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from swashplate.documents import read
 from swashplate.errors import SwashError
@@ -61,7 +61,7 @@ class NeededExcitation(Saved):
             cells.append((one.channel, unit.shown_unit, *numbers, "yes" if one.moved >= one.needed else "NO"))
         return ("channel", "unit", "error, rms", "moved, rms", "needed, rms", "enough"), cells
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         return {
             "fit": self.fit,

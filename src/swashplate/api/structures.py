@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from swashplate.models.linear.composition import PREFIX
 from swashplate.models.linear.linear_vehicle import structure_of
@@ -28,7 +27,7 @@ class Structures(Saved):
     ready: dict[str, str]
     parts: dict[str, str]
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         return {"ready": self.ready, "parts": self.parts}
 
     def __repr__(self) -> str:

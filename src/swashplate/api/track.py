@@ -76,7 +76,7 @@ class Tracking(ReportFolder):
             f"'{e.text}' has coefficients that the log does not separate." for e in self.followed if e.final is None
         )
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         return {
             "source": self.source,

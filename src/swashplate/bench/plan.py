@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -56,7 +55,7 @@ class MeasurementPlan(Saved):
         """Seconds of one pass."""
         return sum(record.duration for record in self.records)
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Records and aims as JSON types."""
         records = [
             {"record": r.name, "procedures": r.procedures, "seconds": r.duration, "points": r.words}

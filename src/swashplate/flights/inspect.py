@@ -84,7 +84,7 @@ class Inspection(Shown):
     vehicle: str = ""
     signs: tuple[str, ...] = ()
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """The same as plain JSON types (NaN becomes None)."""
 
         def plain(value: Any) -> Any:

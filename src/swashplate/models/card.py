@@ -189,7 +189,7 @@ class Card:
         """The card as the text of a TOML file."""
         return tomli_w.dumps(self.to_document())
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """What its file says."""
         parameters = {
             name: {

@@ -72,7 +72,7 @@ class Derivatives(Shown):
             rows.append(row)
         return head, rows
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Values, units, contributions and bounds as JSON types."""
         return {"tables": [self._table(at, table) for at, table in zip(self.trims, self.tables, strict=True)]}
 

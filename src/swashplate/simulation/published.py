@@ -108,7 +108,7 @@ class PublishedComparison(Saved):
         ]
         return ["with, one after another", "mean", "within 10 %"], steps
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Numbers and words as JSON types."""
         off = [self.differences(step.table) for step in self.steps]
         values = {

@@ -120,7 +120,7 @@ class TrimCurve(Shown):
             columns["power [W]"] = [float(power or 0.0) for power in powers]
         return columns
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Trims, units and remarks as JSON types."""
         return {
             "trims": [

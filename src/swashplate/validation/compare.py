@@ -39,7 +39,7 @@ class ModelComparison(Shown):
             for name in outputs
         }
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Fits and warnings as JSON types."""
         warnings = {name: list(v.warnings) for name, v in self.found.items() if v.warnings}
         return {"kind": "comparison", "fit": self.fits(), "warnings": warnings}

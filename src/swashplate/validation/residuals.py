@@ -99,7 +99,7 @@ class Residuals(Shown):
         ]
         return f"INCOMPLETE: inputs still explain what the model leaves: {'; '.join(lines)}."
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """The verdict and the largest correlation of each pair as JSON types."""
         pairs = [
             {"output": c.output, "input": c.input, "largest": c.worst[1], "lag_s": c.worst[0], "limit": c.limit}

@@ -158,7 +158,7 @@ class Validation(Shown):
         texts = [in_brief(self.bands, horizon, drawn=drawn) for horizon in horizons] + [widened_words(self.bands)]
         return [text for text in texts if text]
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Numbers and words as JSON types (no time histories)."""
         return {
             "kind": "validation",

@@ -118,7 +118,7 @@ class Verification(Shown):
     def __getitem__(self, output: str) -> OutputVerification:
         return next(o for o in self.outputs if o.output == output)
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Numbers and words as JSON types (no time histories)."""
         return {
             "kind": "verification",

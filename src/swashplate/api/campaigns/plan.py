@@ -74,7 +74,7 @@ class CampaignPlan:
             "portions": [list(asdict(task.portion).values()) for task in self.tasks],
         }
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """As what becomes JSON."""
         timed = {"first_seconds": self.first_seconds, "task_seconds": self.task_seconds, "task_bytes": self.task_bytes}
         return {"kind": "campaign-plan", "of": self.of, "rows": self.rows, "tasks": len(self.tasks), **timed}

@@ -132,7 +132,7 @@ class Campaign(Shown):
             told += f"; `swash campaign resume {self.folder}` goes on"
         return told + (f"; at work: {self.at_work}" if self.at_work else "")
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """The summary as what becomes JSON."""
         return {
             "kind": "campaign-results",

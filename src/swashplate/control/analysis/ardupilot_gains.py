@@ -130,7 +130,7 @@ class Suggestion(Shown):
             if {"P", "I", "D", "FF"} & set(short(gains))
         }
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Numbers and words as JSON types."""
 
         def read(f: LoopFigures) -> dict[str, Any]:

@@ -108,7 +108,7 @@ class Spread:
         rows |= {f"{name}, largest [{unit}]": factor * self.values[name] for name, (unit, factor) in SHOWN.items()}
         return {name: _percentiles(values, self.percentiles) for name, values in rows.items()}
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """The summary as what becomes JSON; angles in degrees where their names say so."""
         limits = asdict(self.limits)
         return {

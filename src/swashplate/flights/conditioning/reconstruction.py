@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -120,7 +119,7 @@ class Reconstruction(Shown):
         scale = {n: e.value if e.significant and abs(e.value) < 0.5 else 0.0 for n, e in self.scales.items()}
         return correct_sensors(flight, biases=bias, scales=scale)
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """As JSON types: values and standard errors by channel."""
         return {
             "biases": {name: [e.value, e.sigma] for name, e in self.biases.items()},

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from swashplate.atomic import write_text
 from swashplate.errors import ManeuverError
@@ -40,7 +39,7 @@ class PlannedManeuver(Shown):
             written.append(write_text(file.with_suffix(".param"), self.chirp.parameter_file()))
         return tuple(written)
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""
         return {
             "maneuver": vars(self.maneuver),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -103,7 +103,7 @@ class Line:
     read: Handling | ResponseMargins | None
     problem: str = ""
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Numbers and words as JSON types: each number with its error."""
         numbers = {f.name: list(astuple(getattr(self.read, f.name))) for f in fields(self.read)} if self.read else {}
         return {"response": self.response, "from": self.source, **numbers, "problem": self.problem}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -154,7 +153,7 @@ class StructureSearch:
             table.append((c.name, f"{c.cost:.1f}", f"{max(c.fit.costs):.0f}", str(c.parameters), vague, seen, modes))
         return table if self.judged else [(*row[:5], *row[6:]) for row in table]
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as JSON types."""
         return {
             "picked": self.pick.name,

@@ -178,7 +178,7 @@ class FrequencyResponse(Shown):
         """
         return FrequencyResponse(**response_file.load(Path(path)))
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Summary and numbers as JSON types."""
         pairs = []
         for output in self.outputs:

@@ -114,7 +114,7 @@ class Desk:
         opened.load(opened.read.with_remedy(remedy))
         return opened
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """Every log as the page lists it, and what may be dropped."""
         with self._lock:
             logs = list(self._logs.values())

@@ -93,10 +93,10 @@ class PageJob:
                 self._state = {"state": "cancelled"}
         return {}
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """How it is going, or what came of it."""
         with self._lock:
-            state = dict(self._state, number=self._number)
+            state: dict[str, object] = dict(self._state, number=self._number)
         if state["state"] == "running":
             state["seconds"] = time.monotonic() - self._begun
         return state

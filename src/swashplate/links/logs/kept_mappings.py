@@ -85,7 +85,7 @@ class MappedTable:
             kept_at = f"Kept in {self.path}: logs with these columns are read so. Correct it there, or give --mapping."
         return "\n".join(["columns:", *lines, "", self.text, kept_at])
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """As plain JSON types."""
         return {
             "columns": [asdict(row) for row in self.rows],

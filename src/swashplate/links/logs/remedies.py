@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 _UNIT = re.compile(r"--unit (?P<name>\w+)=(?P<unit>[^\s,;()]+)(?: \(and (?P<more>[\w, ]+?) alike\))?")
 _DROP = "--drop-bad-stamps"
@@ -29,7 +28,7 @@ class Remedy:
         given = [f"--unit {name}={unit}" for name, unit in self.units.items()]
         return " ".join([*given, *([_DROP] if self.drop_bad_stamps else [])])
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """As the page has it."""
         return {"words": self.words, "units": dict(self.units), "drop_bad_stamps": self.drop_bad_stamps}
 

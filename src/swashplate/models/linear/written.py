@@ -72,7 +72,7 @@ class WrittenStructure(Saved):
 
     model: StateSpaceModel
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, object]:
         """All of it as JSON types."""
         m = self.model
         return {
