@@ -56,11 +56,11 @@ def test_every_line_passes_under_the_real_firmware(name: str, tmp_path: Path, mo
     spent: list[float] = []
 
     def timed(*given: Any, **more: Any) -> None:
-        begun = time.thread_time()
+        begun = time.process_time()  # what reads MAVLink beside it counts too
         try:
             serve(*given, **more)
         finally:
-            spent.append(time.thread_time() - begun)
+            spent.append(time.process_time() - begun)
 
     monkeypatch.setattr(accepting, "serve", timed)
     place = Path(os.environ.get("SWASHPLATE_PROOF", str(tmp_path))) / "firmware" / name

@@ -127,6 +127,7 @@ def accept_helicopter(asked: Accept, vehicle: Vehicle, say: Say) -> Acceptance:
         plant = Plant(aircraft, mapping, Surroundings(around), engine=link_engine(lambda text: say(text)))
         plant.prepare()
         session = ArduPilotSession(plant, Sensing(plant), Notices(lambda text: say(text)))
+        session.prepare()
         _write_files(folder, files, expected | gains, shown, defaults, called)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
             radio.bind(("127.0.0.1", 0))  # left to itself, the first packet would open a port to every machine

@@ -101,6 +101,7 @@ def serve_ardupilot(asked: Link) -> Linked:
     with listen_udp(asked.listen, asked.port) as bound:
         _tell_where("UDP", bound.getsockname(), asked.listen, plant)
         session = ArduPilotSession(plant, linked_sensing(asked, plant), notices)
+        session.prepare()
         saved: tuple[Path, ...] = ()
         try:
             serve(bound, session, idle_exit=asked.idle_exit)

@@ -17,7 +17,7 @@ from swashplate.export.traced import trace_vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.stepping import motion_row
+from swashplate.simulation.stepping import NativeFrame, motion_row
 from swashplate.simulation.trim import Trim
 
 _OPTIONS = ("-O1",)
@@ -33,6 +33,9 @@ class CompiledEngine:
     Args:
         moved: a vehicle of `tumbling`.
         environment: its air and gravity; wind and voltage come with each frame.
+
+    Attributes:
+        native: its C.
 
     Raises:
         ExportError: without a compiler, or where it refuses the source.
@@ -51,9 +54,9 @@ class CompiledEngine:
         self._state, self._inputs = row, inputs
         self._around = np.array([v.start for v in model.surroundings])
         self._told, numbers = np.zeros(row.size + 5), np.array([v.start for v in model.parameters])
-        self._rows = (self._state, self._inputs, self._around, numbers, np.array([float(environment.gravity)]))
-        self._given = [row.ctypes.data_as(_POINTER) for row in self._rows]
-        self._answer = self._told.ctypes.data_as(_POINTER)
+        rows = (self._state, self._inputs, self._around, numbers, np.array([float(environment.gravity)]), self._told)
+        self.native = NativeFrame(ctypes.cast(self._frame, ctypes.c_void_p).value or 0, rows)
+        *self._given, self._answer = (row.ctypes.data_as(_POINTER) for row in rows)
 
     def place(self, row: Array) -> None:
         self._state[:] = row

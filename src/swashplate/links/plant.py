@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,12 +14,14 @@ from swashplate.errors import DivergenceError
 from swashplate.links.betaflight.motors import MotorMapping
 from swashplate.links.betaflight.servo_outputs import SwashServoMapping
 from swashplate.links.recorder import Recorder
+from swashplate.links.servo import FLOATS
 from swashplate.links.servos import ServoMapping
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.simulation.standing import at_rest
-from swashplate.simulation.stepping import MakeEngine, Motion, Stepping, at_standstill
+from swashplate.simulation.stepping import MakeEngine, Motion, NativeFrame, Stepping, at_standstill
 
 if TYPE_CHECKING:
     from swashplate.links.estimating import Estimating
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
 _SPEEDS = ("u", "v", "w", "p", "q", "r")
 _ALOFT = 0.02
 """m above where it stands: what estimates in flight counts from here."""
-_FASTEST = 500.0
+FASTEST = 500.0
 """m/s and rad/s: nothing of ours moves so fast in one piece."""
 
 
@@ -99,6 +102,16 @@ class Plant:
         return self._held
 
     @property
+    def native(self) -> NativeFrame | None:
+        """The C that moves it, where nothing else looks at every step; None otherwise."""
+        return None if self._around.sag or self.estimating is not None else self._stepping.native
+
+    @property
+    def due(self) -> float:
+        """When the next sample is recorded [s]."""
+        return math.inf if self._recorder is None else self._next
+
+    @property
     def environment(self) -> Environment:
         return self._around.environment
 
@@ -122,16 +135,7 @@ class Plant:
         if self.estimating is not None and self.time >= self._estimated + self.estimating.dt - 1e-9:
             self._estimate(self.estimating, np.asarray(inputs))
         if not self.broken:
-            try:
-                moved = self._stepping.advance(inputs, duration)
-            except DivergenceError as error:
-                self._break(f"{error.state} left the finite numbers", self._held.states)
-            else:
-                self._held = moved
-                if moved.body.z > 0.0:
-                    self._break("it went over and its centre of gravity touched the ground", moved.states)
-                elif max(map(abs, moved.body[3:6] + moved.body[9:12])) > _FASTEST:
-                    self._break("it moves faster than any small helicopter can", moved.states)
+            self._follow(lambda: self._stepping.advance(inputs, duration))
         self.time += duration
         if self._around.sag:
             low = 0.5 * self.environment.voltage
@@ -141,6 +145,27 @@ class Plant:
             if self._recorder is not None:
                 self._recorder.add(self.time, [*self._held.states, *inputs, *self._stepping.surroundings])
         return self._held
+
+    def was_flown(self, time: float, throttle: float) -> None:
+        """C has moved it by `native`, until a time [s] with an engine's throttle there."""
+        native, engine = self.native, self.mapping.engine
+        assert native is not None
+        self.time = time
+        if engine is not None:
+            engine.throttle = throttle
+        self._follow(lambda: self._stepping.motion(native.rows[-1].tolist()))
+
+    def _follow(self, move: Callable[[], Motion]) -> None:
+        try:
+            moved = move()
+        except DivergenceError as error:
+            self._break(f"{error.state} left the finite numbers", self._held.states)
+            return
+        self._held = moved
+        if moved.body.z > 0.0:
+            self._break("it went over and its centre of gravity touched the ground", moved.states)
+        elif max(map(abs, moved.body[3:6] + moved.body[9:12])) > FASTEST:
+            self._break("it moves faster than any small helicopter can", moved.states)
 
     def _estimate(self, estimating: Estimating, inputs: Array) -> None:
         elapsed, self._estimated = self.time - self._estimated, self.time
@@ -154,12 +179,12 @@ class Plant:
         self.voltage = voltage
         self._stepping.surround(voltage=voltage)
 
-    def rotor_speeds(self, held: Motion) -> tuple[float, float]:
+    def rotor_speeds(self, held: Motion, xp: Backend = FLOATS) -> tuple[Scalar, Scalar]:
         """Of main and tail rotor, or of both main rotors [rad/s]; of a multirotor twice the mean."""
         if self._propellers:
-            mean = sum(max(0.0, held.states[k]) for k in self._propellers) / len(self._propellers)
+            mean = sum(xp.maximum(0.0, held.states[k]) for k in self._propellers) / len(self._propellers)
             return mean, mean
-        speeds = [max(0.0, held.states[k]) for k in self._rotors]
+        speeds = [xp.maximum(0.0, held.states[k]) for k in self._rotors]
         if len(speeds) == 2:
             return speeds[0], speeds[1]
         (main,) = speeds

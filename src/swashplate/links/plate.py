@@ -9,7 +9,8 @@ import numpy as np
 
 from swashplate.links import swashplates
 from swashplate.links.mapping_table import MappingTable
-from swashplate.links.servo import CENTRE, HALF
+from swashplate.links.servo import CENTRE, FLOATS, HALF
+from swashplate.physics.backend import Backend, Scalar
 
 
 class Plate:
@@ -38,9 +39,9 @@ class Plate:
         self.cyclic_deg = swash.pair("cyclic_deg")
         self._cyclic = np.radians(self.cyclic_deg).tolist()
 
-    def pitches(self, pulses: Sequence[float]) -> tuple[float, float, float]:
+    def pitches(self, pulses: Sequence[Scalar], xp: Backend = FLOATS) -> tuple[Scalar, Scalar, Scalar]:
         """Collective, longitudinal (forward) and lateral (right) cyclic pitch [rad] for pulses [us] by output."""
-        throws = [s.throw(pulses[s.channel - 1]) for s in self.servos]
+        throws = [s.throw(pulses[s.channel - 1], xp) for s in self.servos]
         collective, roll, pitch = (sum(map(mul, row, throws)) for row in self._inverse)
         first, last, least, most = self._collective
         side, ahead = self._cyclic

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
 
 from swashplate.links.plant import Plant
-from swashplate.physics.backend import FloatBackend
+from swashplate.links.servo import FLOATS
+from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.frames import Vector, local_to_body
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.stepping import Motion
 
-_FLOATS = FloatBackend()
 FARTHEST = 100.0
 """m: what a rangefinder says that sees nothing."""
+_LEAST_VOLTAGE = 1e-3
+_LEAST_DOWN = 0.1
+"""Of the body's z axis, pointing down, below which it sees nothing."""
 
 
 class Readings(NamedTuple):
@@ -69,49 +74,71 @@ class Sensing:
         self._random = np.random.default_rng(self._seed)
         self._bias = self._random.standard_normal(6)
 
+    @property
+    def noisy(self) -> bool:
+        """Whether what it reads differs from what is."""
+        return self._unit is not None
+
     def read(self, moved: Motion) -> Readings:
         """Readings of a motion at the plant's time."""
+        return self.sensed(moved, self._plant.time, self._plant.voltage, self._drawn(), FLOATS)
+
+    def sensed(
+        self, moved: Motion, time: Scalar, voltage: Scalar, noise: Sequence[Scalar] | None, xp: Backend
+    ) -> Readings:
+        """Readings of a motion: a function of nothing else, so that it can be traced.
+
+        Args:
+            moved: the motion. time: [s]. voltage: of the battery [V].
+            noise: added to gyros and accelerometers, 6 numbers; None for none.
+            xp: the operations.
+        """
         plant, body = self._plant, moved.body
         wind = self._wind
         air = body.velocity
         if any(wind):
-            air = air + local_to_body(wind, body.attitude, _FLOATS).scaled(-1.0)
-        gyro, force = self._shaken(body.rates, moved.force)
-        down = math.cos(body.phi) * math.cos(body.theta)
-        seen = min(FARTHEST, max(0.0, -body.z) / down) if down > 0.1 else FARTHEST
-        rotors = plant.rotor_speeds(moved)
-        voltage, current = self._battery(rotors)
+            air = air + local_to_body(wind, body.attitude, xp).scaled(-1.0)
+        gyro, force = body.rates, moved.force
+        if noise is not None:
+            gyro, force = (Vector(*map(add, v, n)) for v, n in ((gyro, noise[:3]), (force, noise[3:])))
+        down = xp.cos(body.phi) * xp.cos(body.theta)
+        height = xp.minimum(FARTHEST, xp.maximum(0.0, -body.z) / xp.maximum(down, _LEAST_DOWN))
+        rotors = plant.rotor_speeds(moved, xp)
+        voltage, current = self._battery(rotors, voltage, xp)
         return Readings(
-            plant.time,
+            time,
             gyro,
             force,
             Vector(body.x, body.y, body.z + plant.standing_depth),
             moved.velocity,
-            (body.phi, body.theta, math.remainder(body.psi, 2.0 * math.pi)),
-            seen,
-            max(0.0, air.x),
+            (_within_half_a_turn(body.phi, xp), body.theta, _within_half_a_turn(body.psi, xp)),
+            xp.where(down > _LEAST_DOWN, height, FARTHEST),
+            xp.maximum(0.0, air.x),
             wind,
-            (math.atan2(air.y, air.x), math.hypot(air.x, air.y)),
+            (xp.atan2(air.y, air.x), xp.sqrt(air.x * air.x + air.y * air.y)),
             (rotors[0] * 30.0 / math.pi, rotors[1] * 30.0 / math.pi),
             voltage,
             current,
         )
 
-    def _shaken(self, rates: Vector, force: Vector) -> tuple[Vector, Vector]:
+    def _drawn(self) -> list[float] | None:
         unit = self._unit
         if unit is None:
-            return rates, force
-        n, b = self._random.standard_normal(6).tolist(), self._bias.tolist()
-        gyro = Vector(*(r + unit.rate_noise * n[i] + unit.rate_bias * b[i] for i, r in enumerate(rates)))
-        felt = Vector(*(f + unit.force_noise * n[i] + unit.force_bias * b[i] for i, f in enumerate(force, start=3)))
-        return gyro, felt
+            return None
+        noise, bias = np.repeat(((unit.rate_noise, unit.force_noise), (unit.rate_bias, unit.force_bias)), 3, axis=1)
+        return list((noise * self._random.standard_normal(6) + bias * self._bias).tolist())
 
-    def _battery(self, rotors: tuple[float, float]) -> tuple[float | None, float | None]:
+    def _battery(
+        self, rotors: tuple[Scalar, Scalar], voltage: Scalar, xp: Backend
+    ) -> tuple[Scalar | None, Scalar | None]:
         """Voltage, and the current of the rotors' shaft power without losses; for electric vehicles only."""
         numbers = self._plant.numbers
         if "k_torque_lower" not in numbers:
             return None, None
         lower, upper = rotors
         power = numbers["k_torque_lower"] * lower**3 + numbers["k_torque_upper"] * upper**3
-        voltage = self._plant.voltage
-        return voltage, power / voltage if voltage > 0.0 else 0.0
+        return voltage, xp.where(voltage > 0.0, power, 0.0) / xp.maximum(voltage, _LEAST_VOLTAGE)
+
+
+def _within_half_a_turn(angle: Scalar, xp: Backend) -> Scalar:
+    return xp.atan2(xp.sin(angle), xp.cos(angle))

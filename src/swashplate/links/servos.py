@@ -13,7 +13,9 @@ from swashplate.errors import LinkError
 from swashplate.files import is_file
 from swashplate.links.mapping_table import MappingTable
 from swashplate.links.plate import Plate
+from swashplate.links.servo import FLOATS
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Backend, Scalar
 
 
 class Engine:
@@ -24,6 +26,7 @@ class Engine:
 
     Attributes:
         servo: the output. full: share of its travel that is the whole engine. spool: from rest to that [s].
+        throttle: now, 0 to 1.
     """
 
     def __init__(self, throttle: MappingTable, servos: MappingTable, table: MappingTable) -> None:
@@ -36,13 +39,13 @@ class Engine:
 
     def restart(self) -> None:
         """Engine off."""
-        self._running = 0.0
+        self.throttle: Scalar = 0.0
 
-    def running(self, pulses: Sequence[float], duration: float) -> float:
+    def running(self, pulses: Sequence[Scalar], duration: Scalar, xp: Backend) -> Scalar:
         """The throttle, 0 to 1, after pulses [us] by output were held for `duration` [s]."""
-        asked = min(1.0, self.servo.share(pulses[self.servo.channel - 1]) / self.full)
-        self._running = min(asked, self._running + duration / self.spool)
-        return self._running
+        asked = xp.minimum(1.0, self.servo.share(pulses[self.servo.channel - 1], xp) / self.full)
+        self.throttle = xp.minimum(asked, self.throttle + duration / self.spool)
+        return self.throttle
 
 
 class HelicopterMapping:
@@ -76,11 +79,11 @@ class HelicopterMapping:
         """Engine off."""
         self.engine.restart()
 
-    def inputs(self, pulses: Sequence[float], duration: float) -> list[float]:
+    def inputs(self, pulses: Sequence[Scalar], duration: Scalar, xp: Backend = FLOATS) -> list[Scalar]:
         """theta0, B1, A1, theta0T [rad] and throttle for pulses [us] by output, held for `duration` [s]."""
         low, high = self._tail_pitch
-        tail = 0.5 * (low + high) + 0.5 * (high - low) * self.tail.travel(pulses[self.tail.channel - 1])
-        return [*self._plate.pitches(pulses), tail, self.engine.running(pulses, duration)]
+        tail = 0.5 * (low + high) + 0.5 * (high - low) * self.tail.travel(pulses[self.tail.channel - 1], xp)
+        return [*self._plate.pitches(pulses, xp), tail, self.engine.running(pulses, duration, xp)]
 
 
 class TwinMapping:
@@ -116,9 +119,9 @@ class TwinMapping:
         """Engine off."""
         self.engine.restart()
 
-    def inputs(self, pulses: Sequence[float], duration: float) -> list[float]:
+    def inputs(self, pulses: Sequence[Scalar], duration: Scalar, xp: Backend = FLOATS) -> list[Scalar]:
         """The vehicle's inputs [rad, 1] for pulses [us] by output, held for `duration` [s]."""
-        u, d = self.upper.pitches(pulses), self.lower.pitches(pulses)
+        u, d = self.upper.pitches(pulses, xp), self.lower.pitches(pulses, xp)
         mean, half = ([0.5 * (a + sign * b) for a, b in zip(u, d, strict=True)] for sign in (1.0, -1.0))
         known = {
             "theta0": mean[0],
@@ -127,13 +130,15 @@ class TwinMapping:
             "theta0d": self._sense * half[0],
             "B1d": half[1],
             "A1d": half[2],
-            "throttle": self.engine.running(pulses, duration),
+            "throttle": self.engine.running(pulses, duration, xp),
         }
         return [known[name] for name in self._names]
 
 
 class CoaxialMapping:
     """Two motors and two servos of a coaxial helicopter. Attributes as `HelicopterMapping`, and its outputs."""
+
+    engine = None
 
     def __init__(self, table: MappingTable, vehicle: Vehicle) -> None:
         motors, cyclic = table.part("motors"), table.part("cyclic")
@@ -151,15 +156,16 @@ class CoaxialMapping:
     def restart(self) -> None:
         """Nothing is carried over."""
 
-    def inputs(self, pulses: Sequence[float], duration: float) -> list[float]:
+    def inputs(self, pulses: Sequence[Scalar], duration: Scalar, xp: Backend = FLOATS) -> list[Scalar]:
         """motor_lower, motor_upper (0 to 1) and servo_roll, servo_pitch (-1 to 1) for pulses [us] by output.
 
         An output at its low end holds the rotor still: less would ask the drive train of the card for a negative speed.
         """
         motors = [
-            max(stopped, s.share(pulses[s.channel - 1])) for s, stopped in zip(self.motors, self.stopped, strict=True)
+            xp.maximum(stopped, s.share(pulses[s.channel - 1], xp))
+            for s, stopped in zip(self.motors, self.stopped, strict=True)
         ]
-        servos = [k * s.travel(pulses[s.channel - 1]) for s, k in zip(self.servos, self.travel, strict=True)]
+        servos = [k * s.travel(pulses[s.channel - 1], xp) for s, k in zip(self.servos, self.travel, strict=True)]
         # Autopilots count nose up as positive pitch, the CoaX nose down.
         return [*motors, servos[0], -servos[1]]
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import ipaddress
+import os
 import socket
+import struct
 
 from swashplate.errors import LinkError
 
@@ -41,6 +43,19 @@ def listen_tcp(address: str, port: int) -> socket.socket:
     made = _bound(socket.SOCK_STREAM, address, port)
     made.listen(1)
     return made
+
+
+def wait_at_most(bound: socket.socket, seconds: float) -> None:
+    """Let a socket wait for data for so long, by the system where it can: C that reads it waits as long then.
+
+    What is over is a TimeoutError or a BlockingIOError.
+    """
+    if os.name == "posix":
+        whole, parts = divmod(round(1e6 * seconds), 1_000_000)
+        bound.settimeout(None)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", whole, parts))
+    else:
+        bound.settimeout(seconds)
 
 
 def _bound(kind: socket.SocketKind, address: str, port: int) -> socket.socket:

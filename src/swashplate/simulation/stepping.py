@@ -63,6 +63,18 @@ class SteppingEngine(Protocol):
         """
 
 
+class NativeFrame(NamedTuple):
+    """What moves a vehicle, for C that calls it.
+
+    Attributes:
+        function: address of `frame_code`'s function.
+        rows: of doubles that it is given: states, inputs, surroundings, parameters, gravity; and what it tells.
+    """
+
+    function: int
+    rows: tuple[Array, Array, Array, Array, Array, Array]
+
+
 MakeEngine = Callable[[Vehicle, Environment], SteppingEngine]
 """From a vehicle of `tumbling` and its constant air to what moves it."""
 
@@ -89,6 +101,11 @@ class Stepping:
         self.place(state)
 
     @property
+    def native(self) -> NativeFrame | None:
+        """What moves it, for C that calls it; None where it is no C."""
+        return getattr(self._engine, "native", None)
+
+    @property
     def surroundings(self) -> Array:
         """Wind and voltage now, in the order of `SURROUNDINGS`."""
         return self._around.copy()
@@ -110,9 +127,17 @@ class Stepping:
         Raises:
             DivergenceError: where a state is no longer finite; the vehicle stays where it last was.
         """
-        steps = max(1, math.ceil(duration / LONGEST_STEP - 1e-9))
+        steps = steps_of(duration)
         held = [low if v < low else min(v, high) for v, (low, high) in zip(inputs, self._limits, strict=True)]
-        told, n = self._engine.advance(held, self._around, duration / steps, steps), self._n
+        return self.motion(self._engine.advance(held, self._around, duration / steps, steps))
+
+    def motion(self, told: list[float]) -> Motion:
+        """The motion that an engine told.
+
+        Raises:
+            DivergenceError: as `advance`.
+        """
+        n = self._n
         if not math.isfinite(sum(told)) and (wild := [k for k, v in enumerate(told) if not math.isfinite(v)]):
             self.place(np.array(self._last))
             name = self.vehicle.state_names[wild[0] if wild[0] < n else _SPEEDS.start + (wild[0] - n) % 3]
@@ -122,6 +147,11 @@ class Stepping:
         self._last = told[:n]
         body, velocity, force = told[: len(RigidBody._fields)], told[n : n + 3], told[n + 3 :]
         return Motion(RigidBody._make(body), Vector._make(velocity), Vector._make(force), self._last)
+
+
+def steps_of(duration: float) -> int:
+    """Runge-Kutta steps in so long [s]."""
+    return max(1, math.ceil(duration / LONGEST_STEP - 1e-9))
 
 
 class VirtualEngine:

@@ -8,9 +8,11 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import pytest
 
+import swashplate as sp
 from heli_autopilot import servo_packet
 from link_bench import QUICK, Bench, bench
 from swashplate.errors import LinkError
@@ -28,9 +30,11 @@ def coax() -> Bench:
     return made
 
 
-def forgotten(at: Bench) -> Bench:
+def forgotten(at: Bench, *, prepared: bool = True) -> Bench:
     """The link as if it had just been opened: nobody owns it."""
     at.session.__init__(at.plant, at.session._sensing, at.session._notices)  # type: ignore[misc]
+    if prepared:
+        at.session.prepare()
     at.said.clear()
     at.session._notices.counts.clear()
     return at
@@ -67,9 +71,12 @@ class Client:
     def tell(self, data: bytes) -> None:
         self.socket.sendto(data, ("127.0.0.1", self.port))
 
-    def ask(self, data: bytes) -> dict[str, object]:
+    def answer(self, data: bytes) -> bytes:
         self.tell(data)
-        return dict(json.loads(self.socket.recv(4096)))
+        return self.socket.recv(4096)
+
+    def ask(self, data: bytes) -> dict[str, object]:
+        return dict(json.loads(self.answer(data)))
 
 
 def test_lockstep_with_losses_and_duplicates(coax: Bench) -> None:
@@ -88,6 +95,34 @@ def test_lockstep_with_losses_and_duplicates(coax: Bench) -> None:
         client.socket.settimeout(0.05)
         with pytest.raises(TimeoutError):
             client.socket.recv(100)  # nothing more than one answer a question was sent
+
+
+@pytest.mark.skipif(QUICK is None, reason="C is compared with Python")
+def test_c_answers_as_python_does(tmp_path: Path) -> None:
+    """To the byte, ordinary packets and others, in flight, over a wreck and in what is recorded."""
+    at, told = bench("raptor50", record=tmp_path / "flight.nc", engine=QUICK), []
+    for name, value in (("z", -3.0), ("phi", 3.0), ("p", 2.0)):  # aloft, turning onto its back: it falls
+        at.plant._rest[at.plant.vehicle.index(name)] = value
+    for prepared in (False, True):
+        forgotten(at, prepared=prepared)
+        answers = []
+        with served(at) as port, Client(port) as client:
+            for count in range(400):
+                if count in (40, 90):
+                    client.tell(servo_packet(400, count, [9000] * 16))  # no servo's pulse
+                    client.tell(servo_packet(400, count - 8, [1500] * 16))  # late
+                skipped = 2 if count > 160 else 0
+                rate = 405 if count > 180 else 400
+                pulses = [1460 + count % 50, 1460, 1460 - count % 30, 1500, 0, 0, 0, 1660]
+                answers.append(client.answer(servo_packet(rate, count + skipped, pulses)))
+        assert (at.session._lockstep is not None) is prepared
+        assert at.plant.broken
+        assert sum("the vehicle broke" in words for words in at.said) == 1
+        told.append((answers, at.said[-5:]))
+    assert told[0] == told[1]
+    assert at.recorder is not None
+    first, second = (sp.read(file).values("phi") for file in at.recorder.finish())
+    assert first.tobytes() == second.tobytes()
 
 
 def test_restarts_of_either_side(coax: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ line break stands before and behind. Rotor speeds stand in a section `rpm`, as v
 from __future__ import annotations
 
 from swashplate.links.sensing import Readings
+from swashplate.physics.backend import Scalar
 
 _FORM = (
     '\n{"timestamp":%.9f,"imu":{"gyro":[%.9g,%.9g,%.9g],"accel_body":[%.9g,%.9g,%.9g]},"position":[%.9g,%.9g,%.9g],'
@@ -19,20 +20,17 @@ _BATTERY = ',"battery":{"voltage":%.6g,"current":%.6g}'
 
 def line(readings: Readings) -> bytes:
     """The answer to one servo packet."""
-    r = readings
-    text = _FORM % (
-        r.time,
-        *r.gyro,
-        *r.force,
-        *r.place,
-        *r.attitude,
-        *r.velocity,
-        r.range,
-        r.airspeed,
-        *r.wind,
-        *r.vane,
-        *r.rotors,
-    )
-    if r.voltage is not None:
-        text += _BATTERY % (r.voltage, r.current)
-    return (text + "}\n").encode("ascii")
+    values = in_order(readings)
+    return (form(len(values)) % values).encode("ascii")
+
+
+def form(count: int) -> str:
+    """The line with blanks, of `printf` here and in C, for so many numbers."""
+    return f"{_FORM}{'' if count == _FORM.count('%') else _BATTERY}}}\n"
+
+
+def in_order(r: Readings) -> tuple[Scalar, ...]:
+    """The numbers of the line."""
+    battery = () if r.voltage is None else (r.voltage, r.current)
+    moved = (r.time, *r.gyro, *r.force, *r.place, *r.attitude, *r.velocity)
+    return (*moved, r.range, r.airspeed, *r.wind, *r.vane, *r.rotors, *battery)

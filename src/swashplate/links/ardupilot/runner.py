@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from swashplate.links.ardupilot.packets import LONGEST
+from swashplate.links.sockets import wait_at_most
 
 PORT = 9002
 _LOOK_UP = 0.2
@@ -19,6 +20,9 @@ class Answering(Protocol):
 
     def handle(self, data: bytes, sender: tuple[str, int], now: float) -> bytes | None:
         """The answer, or None where there is none."""
+
+    def carry_on(self, bound: socket.socket) -> tuple[bytes, tuple[str, int]] | None:
+        """Answer what comes without further ado; returns what it leaves to `handle`, and its sender."""
 
 
 def serve(
@@ -36,21 +40,23 @@ def serve(
         idle_exit: end after so many seconds without a datagram that was answered; None waits for ever.
         go_on: asked now and then whether to go on.
     """
-    bound.settimeout(_LOOK_UP)
+    wait_at_most(bound, _LOOK_UP)
     heard = looked = time.monotonic()
+    left: tuple[bytes, tuple[str, int]] | None = None
     while True:
         try:
-            data, sender = bound.recvfrom(LONGEST + 1)
-        except TimeoutError:
+            data, sender = left or bound.recvfrom(LONGEST + 1)
+        except (TimeoutError, BlockingIOError):
             data = None
         except ConnectionError:
             continue  # an answer found nobody: the autopilot has gone, and will be back or not
-        now = time.monotonic()
+        now, left = time.monotonic(), None
         if data is not None:
             answer = session.handle(data, sender, now)
             if answer is not None:
-                heard = now
                 _answer(bound, answer, sender)
+                left = session.carry_on(bound)
+                heard = now = time.monotonic()
         if now - looked >= _LOOK_UP or data is None:
             looked = now
             if not go_on() or (idle_exit is not None and now - heard >= idle_exit):

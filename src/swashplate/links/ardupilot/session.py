@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import socket
+import time
 from typing import NamedTuple
 
 from swashplate.links.ardupilot.answer import line
 from swashplate.links.ardupilot.frames import QUIET, SILENT, Address, Frames, PacketAction, place
+from swashplate.links.ardupilot.lockstep import Lockstep, lockstep
 from swashplate.links.ardupilot.packets import Refusal, ServoPacket, parse
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant
@@ -40,6 +44,11 @@ class ArduPilotSession:
         self._answer = b""
         self._exchanges = self._restarts = self._takeovers = 0
         self._said_broken = False
+        self._lockstep: Lockstep | None = None
+
+    def prepare(self) -> None:
+        """Make what flies ordinary frames without Python, where that can be."""
+        self._lockstep = lockstep(self.plant, self._sensing, self._notices.always)
 
     @property
     def progress(self) -> LinkProgress:
@@ -89,6 +98,23 @@ class ArduPilotSession:
             missed = packet.frame_count - before.last - 1
             self._notices.tell("skip", f"{missed} frames before {packet.frame_count} never came; the flight goes on.")
         return self._fly(packet)
+
+    def carry_on(self, bound: socket.socket, until: float = math.inf) -> tuple[bytes, Address] | None:
+        """Answer ordinary frames that come to a socket until the physics' time is so late [s], or something else comes.
+
+        Returns:
+            The datagram that is left to `handle`, and its sender.
+        """
+        frames, sender = self._frames, self._frames.sender
+        if self._lockstep is None or sender is None or self.plant.broken:
+            return None
+        until = min(until, self.plant.due)
+        flown = self._lockstep.fly(bound, sender, frames.last, self._rate, until)
+        if flown:
+            self._frames = Frames(sender, frames.last + flown, time.monotonic())
+            self._exchanges += flown
+            self._answer = self._lockstep.answer
+        return self._lockstep.left
 
     def _start(self, packet: ServoPacket, sender: Address, before: Frames, now: float) -> None:
         where = f"{_at(sender)}, {len(packet.pulses)} outputs, {packet.frame_rate} Hz"

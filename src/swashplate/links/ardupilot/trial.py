@@ -6,6 +6,7 @@ Mode numbers: ArduCopter/mode.h. Texts of the sweeps: ArduCopter/mode_systemid.c
 from __future__ import annotations
 
 import math
+import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -333,6 +334,10 @@ class Piloted:
             plant = self._session.plant
             self._pilot.look(plant.time, plant.moved, plant.rotor_speeds(plant.moved)[0])
         return answer
+
+    def carry_on(self, bound: socket.socket) -> tuple[bytes, tuple[str, int]] | None:
+        """The session's, until the pilot is due."""
+        return self._session.carry_on(bound, self._pilot.due)
 
 
 class Background:

@@ -54,7 +54,7 @@ class TrialPilot:
         depth: of the ground below the origin of the motion [m].
         hands: what they do. interlock: whether the switch on channel 8 is up.
         height: to keep [m]. place: to keep, north and east [m].
-        seen: every look.
+        seen: every look. due: when the next one is [s].
     """
 
     send: Callable[[bytes], object]
@@ -69,7 +69,7 @@ class TrialPilot:
     place: tuple[float, float] = (0.0, 0.0)
     seen: list[Seen] = field(default_factory=list)
     _lift: float = 0.0
-    _due: float = 0.0
+    due: float = 0.0
 
     def take_off(self) -> None:
         """Take the sticks where the vehicle stands; the collective begins a little below hover."""
@@ -79,9 +79,9 @@ class TrialPilot:
 
     def look(self, time: float, moved: Motion, rotor: float) -> None:
         """Called after every step of the physics."""
-        if time < self._due - 1e-9 and time > self._due - 1.0:
+        if time < self.due - 1e-9 and time > self.due - 1.0:
             return
-        self._due = time + PERIOD
+        self.due = time + PERIOD
         body, v = moved.body, moved.velocity
         x, y, z, phi, theta, psi = map(float, (body.x, body.y, body.z, body.phi, body.theta, body.psi))
         now = Seen(time, x, y, z + self.depth, phi, theta, psi, rotor)

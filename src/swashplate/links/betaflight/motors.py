@@ -22,6 +22,8 @@ class MotorMapping:
         LinkError: for a vehicle without motors, or with more than Betaflight has.
     """
 
+    engine = None
+
     def __init__(self, vehicle: Vehicle) -> None:
         numbers = vehicle.card.values()
         count = sum(name.startswith("motor_") for name in vehicle.input_names)

@@ -38,6 +38,7 @@ class SwashServoMapping:
     """
 
     motors = 1
+    engine = None
 
     def __init__(self, vehicle: Vehicle, hover: Trim, *, swash: str = "120") -> None:
         if swash not in _WHOLE:
