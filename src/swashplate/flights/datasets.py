@@ -169,8 +169,9 @@ def find(name: str, file: str, *, registry: Mapping[str, Dataset] = REGISTRY) ->
 
 
 def listing(*, registry: Mapping[str, Dataset] = REGISTRY) -> tuple[DatasetFile, ...]:
-    """Every registered file: data set, name, where it is found (or None), description."""
-    return tuple(
+    """Every file: data set, name, where it is found (or None), description; first those that come with the package."""
+    shipped = tuple(DatasetFile(example_logs.NAME, one.file, one.path, one.words) for one in example_logs.EXAMPLES)
+    return shipped + tuple(
         DatasetFile(name, file, find(name, file, registry=registry), entry.description)
         for name, dataset in registry.items()
         for file, entry in dataset.files.items()
@@ -185,6 +186,8 @@ def fetch(name: str, *, registry: Mapping[str, Dataset] = REGISTRY) -> tuple[Pat
     Raises:
         DatasetError: where the data set is unknown, the network fails, or the hash differs.
     """
+    if name == example_logs.NAME:
+        return tuple(one.path for one in example_logs.EXAMPLES)
     import pooch
 
     paths = []

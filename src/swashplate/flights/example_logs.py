@@ -46,7 +46,7 @@ EXAMPLES = (
     ExampleLog(
         "coax_flight.bin",
         "Coaxial helicopter",
-        "A CoaX of 0.3 kg under ArduPilot, with a yaw sweep: model, margins and gains of its yaw.",
+        "A CoaX of 0.3 kg under ArduPilot, with a yaw sweep: linear model, margins and gains of its yaw.",
     ),
 )
 

@@ -75,7 +75,9 @@ def test_the_environment_and_the_folder_beside_are_searched(cache: Path, monkeyp
 
 
 def test_listing_says_what_is_here(cache: Path) -> None:
-    (row,) = datasets.listing(registry=_registry())
+    *shipped, row = datasets.listing(registry=_registry())
+    assert [one.found for one in shipped] == list(datasets.fetch("examples"))
+    assert all(datasets.locate(f"{one.name}/{one.file}").is_file() for one in shipped)
     assert (row.name, row.file, row.found, row.description) == ("toy", "log.csv", None, "two samples")
 
 

@@ -191,12 +191,8 @@ def uniform_table(flight: Flight, wanted: Sequence[str], *, who: str) -> tuple[A
     source = flight.provenance.source or "flight"
     missing = [name for name in wanted if name not in flight]
     if missing:
-        asked = did_you_mean(missing[0], flight.channels)
         raise FlightError(
-            f"lacks what {who} needs.",
-            where=source,
-            channel=", ".join(missing),
-            hint=f"{asked or _TO_DO} It has {listed(flight.channels)}.",
+            f"lacks what {who} needs.", where=source, channel=", ".join(missing), hint=_instead(flight, missing)
         )
     table = flight.array(wanted)
     time = flight.time(wanted[0])
@@ -215,6 +211,17 @@ def uniform_table(flight: Flight, wanted: Sequence[str], *, who: str) -> tuple[A
         if not np.all(np.isfinite(table[:, column])):
             raise FlightError("holds values that are not finite.", where=source, channel=name)
     return time, table
+
+
+def _instead(flight: Flight, missing: Sequence[str]) -> str:
+    """What to do about a flight that lacks channels."""
+    axes = [name for name in flight.channels if name.startswith("mixer_")]
+    if axes and any(name.startswith(("motor_", "servo_")) for name in missing):
+        return (
+            f"It has what an autopilot asked of its mixer ({', '.join(axes)}), not what each motor and servo got. Such "
+            "a log gives a linear model: `swash respond LOG --out DIR`, then `swash identify --responses DIR`."
+        )
+    return f"{did_you_mean(missing[0], flight.channels) or _TO_DO} It has {listed(flight.channels)}."
 
 
 def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: str) -> Record:

@@ -86,6 +86,7 @@ def _holed() -> np.ndarray:
     [
         ([], "there is no flight"),
         ([_flight(psi=None, servo_roll=None)], "a.mat: servo_roll, psi: lacks what 'coax' needs"),
+        ([_flight(servo_roll=None, mixer_roll=TIME)], "asked of its mixer (mixer_roll), not what each motor and servo"),
         ([_flight(theta=_holed())], "a.mat: theta: holds values that are not finite"),
         ([_flight(theta=1.5 * np.sin(TIME))], "a.mat: theta: pitches to 86 degrees (1.20 to 5.08 s)"),
         ([_flight(TIME + 0.004 * np.sin(40.0 * TIME))], "a.mat: time steps vary from"),
