@@ -182,9 +182,9 @@ def test_what_is_held_widens_the_bounds_and_is_correlated(aircraft: Vehicle) -> 
     alone = evaluate(virtual_bench(aircraft, records, seed=1), exact)
     for name in ("linkage_lower", "hub_stiffness_lower"):
         assert bench.model.card.parameters[name].sigma > 3.0 * alone.model.card.parameters[name].sigma
-    told = [c.words for result in alone.details.results for c in result.checks]
+    told = [c.text for result in alone.details.results for c in result.checks]
     assert any("k_thrust_lower = " in words and "no bound: taken as exact, 1 % of it moves" in words for words in told)
-    told = [c.words for result in bench.details.results for c in result.checks]
+    told = [c.text for result in bench.details.results for c in result.checks]
     assert any("hub_height_lower = " in words and "+-" in words for words in told)
     # A thrust factor that is too large makes the same force a smaller tilt; a hub too high leaves too little flapping.
     assert bench.model.card.correlations["k_thrust_lower"]["linkage_lower"] < -0.9

@@ -9,8 +9,8 @@ from swashplate.bench.result import Bench
 
 def doubts(bench: Bench) -> tuple[str, ...]:
     """What the checks of a bench object to, each thing once."""
-    words = [check.words for result in bench.details.results for check in result.checks if not check.good]
-    words += [check.words for check in bench.details.disagreements if not check.good]
+    words = [check.text for result in bench.details.results for check in result.checks if not check.good]
+    words += [check.text for check in bench.details.disagreements if not check.good]
     return tuple(dict.fromkeys(words))
 
 

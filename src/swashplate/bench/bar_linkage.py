@@ -32,8 +32,8 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """The bar held at up to 0.2 rad about both axes, at hover."""
     angles = [(axis, sign * a) for axis in ("bar_alpha", "bar_beta") for a in (0.1, 0.2) for sign in (1.0, -1.0)]
     settings = [{**hover, axis: angle} for axis, angle in angles]
-    words = "hover; bar held at +-0.1 and +-0.2 rad about x, then about y; back through the same points"
-    return [points("bar_linkage", (NAME,), [hover, *settings, *settings[::-1], hover], settle=1.0, words=words)]
+    about = "hover; bar held at +-0.1 and +-0.2 rad about x, then about y; back through the same points"
+    return [points("bar_linkage", (NAME,), [hover, *settings, *settings[::-1], hover], settle=1.0, about=about)]
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:

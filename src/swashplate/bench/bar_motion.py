@@ -36,8 +36,8 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     for name, harmonics in (("phi", (3, 8, 14, 29, 55)), ("theta", (4, 9, 16, 31, 58))):
         waves = [np.sin(2.0 * np.pi * k / seconds * time + 2.4 * k * k) for k in harmonics]
         driving[name] = 0.05 * np.sum(waves, axis=0)
-    words = "in flight, by motion capture: fuselage and bar over a minute, roll and pitch to 6 deg, 0.05 to 1 Hz"
-    return [RecordSchedule("bar_motion", (NAME,), driving, np.ones(time.size), rate, bar="free", words=words)]
+    about = "in flight, by motion capture: fuselage and bar over a minute, roll and pitch to 6 deg, 0.05 to 1 Hz"
+    return [RecordSchedule("bar_motion", (NAME,), driving, np.ones(time.size), rate, bar="free", about=about)]
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:

@@ -1,4 +1,4 @@
-"""What can spoil a steady measurement, and whether it did: unsettled points, drift, vibration, ground, structure.
+"""What can spoil a steady measurement, and whether it did: moving points, drift, vibration, ground, structure.
 
 A sensor's bias and steady drift are unknowns of every fit. What they cannot take up shows in the residuals: air that
 comes back bends them, a warm motor or a drifting sensor spreads repeats, vibration spreads samples. The one thing that
@@ -32,11 +32,11 @@ def check_settled(points: SteadyPoints, channel: str) -> BenchCheck:
     """Whether a channel still moved while the points were measured."""
     if channel not in points.moving:
         return BenchCheck(f"{points.where}: came averaged; whether {channel} was steady at its points cannot be told.")
-    late = int(np.sum(np.abs(points.moving[channel]) > stats.norm.isf(_SURE / 2.0 / max(len(points), 1))))
-    if not late:
+    moving = int(np.sum(np.abs(points.moving[channel]) > stats.norm.isf(_SURE / 2.0 / max(len(points), 1))))
+    if not moving:
         return BenchCheck(f"{points.where}: {channel} was steady at every point.")
     return BenchCheck(
-        f"{points.where}: {channel} still moved during {late} of {len(points)} points: the rotors had not settled, "
+        f"{points.where}: {channel} still moved during {moving} of {len(points)} points: the rotors had not settled, "
         "the supply sagged, or air came back from walls and floor. Wait longer before each point.",
         good=False,
     )
@@ -84,8 +84,8 @@ def check_drift(value: float, sigma: float, *, span: float, what: str) -> BenchC
         what: channel and unit.
     """
     sure = abs(value) > 3.0 * sigma
-    words = f"drifted by {value:.2g} a minute" if sure else "did not drift noticeably"
-    return BenchCheck(f"{what} {words} over {span:.0f} s" + ("; the fit takes a steady drift out." if sure else "."))
+    drifting = f"drifted by {value:.2g} a minute" if sure else "did not drift noticeably"
+    return BenchCheck(f"{what} {drifting} over {span:.0f} s" + ("; the fit takes a steady drift out." if sure else "."))
 
 
 def check_line_drift(points: SteadyPoints, line: SteadyLine, place: int, *, what: str) -> BenchCheck:
@@ -110,22 +110,22 @@ def check_vibration(points: SteadyPoints, channel: str) -> BenchCheck:
     turning = np.max([points[name] for name in speeds], axis=0) > _TURNING if speeds else np.ones(len(points), bool)
     scatter, span = points.scatter[channel], float(np.ptp(points[channel]))
     shaken = float(np.median(scatter[turning])) if turning.any() else float(np.median(scatter))
-    words = f"{points.where}: {channel} scatters by {shaken:.2g} within a point"
+    text = f"{points.where}: {channel} scatters by {shaken:.2g} within a point"
     if turning.any() and not turning.all():
-        words += f" ({np.median(scatter[~turning]):.2g} with the rotors off: the rest is vibration)"
+        text += f" ({np.median(scatter[~turning]):.2g} with the rotors off: the rest is vibration)"
     for name in speeds:
         per_second = points[name][turning] / (2.0 * np.pi)
         alias = np.abs(per_second - points.rate * np.round(per_second / points.rate))
         near = (alias * points.hold < 1.0) & (points[name][turning] > _TURNING)
         if near.any():
             return BenchCheck(
-                f"{words}; at {points[name][turning][near][0]:.0f} rad/s {name} is so near a multiple of the sample "
+                f"{text}; at {points[name][turning][near][0]:.0f} rad/s {name} is so near a multiple of the sample "
                 "rate that its vibration looks like a steady load. Sample at another rate.",
                 good=False,
             )
     good = shaken <= _SHAKEN * span
     return BenchCheck(
-        words + ("." if good else ": as much as what is measured. Balance the rotors, damp the mount."), good
+        text + ("." if good else ": as much as what is measured. Balance the rotors, damp the mount."), good
     )
 
 

@@ -33,16 +33,16 @@ _AMPLITUDE = 0.06
 
 def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Four periods of a multisine on each motor around 0.55, the other at hover; the first period settles."""
-    rate, made = 100.0, []
+    rate, records = 100.0, []
     time = np.arange(round(4 * PERIOD * rate)) / rate
     phases = -np.pi * np.arange(len(HARMONICS)) * np.arange(1, len(HARMONICS) + 1) / len(HARMONICS)  # Schroeder 1970
     wave = sum(np.cos(2.0 * np.pi * k / PERIOD * time + phase) for k, phase in zip(HARMONICS, phases, strict=True))
     wave = _AMPLITUDE * wave / np.abs(wave).max()
     for rotor, other in (("upper", "lower"), ("lower", "upper")):
         driving = {f"motor_{rotor}": 0.55 + wave, f"motor_{other}": np.full(time.size, hover[f"motor_{other}"])}
-        words = f"multisine on the {rotor} motor, 0.1 to 2.1 Hz, +-0.06 around 0.55, 4 periods of 10 s"
-        made.append(RecordSchedule(f"multisine_{rotor}", (NAME,), driving, np.ones(time.size), rate, words=words))
-    return made
+        about = f"multisine on the {rotor} motor, 0.1 to 2.1 Hz, +-0.06 around 0.55, 4 periods of 10 s"
+        records.append(RecordSchedule(f"multisine_{rotor}", (NAME,), driving, np.ones(time.size), rate, about=about))
+    return records
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:

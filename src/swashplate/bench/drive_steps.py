@@ -32,13 +32,13 @@ _BOUNDS = (0.01, 2.0)
 
 def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Steps of each motor between 0.5 and 0.65, 2 s each, the other at hover."""
-    made = []
+    records = []
     for rotor, other in (("upper", "lower"), ("lower", "upper")):
         held = {f"motor_{other}": hover[f"motor_{other}"]}
         steps = [{**held, f"motor_{rotor}": u} for u in (0.5, 0.65) * 5]
-        words = f"{rotor} motor 0.50, 0.65, five times, 2 s each; {other} at hover"
-        made.append(points(f"steps_{rotor}", (NAME,), steps, settle=0.0, hold=2.0, words=words))
-    return made
+        about = f"{rotor} motor 0.50, 0.65, five times, 2 s each; {other} at hover"
+        records.append(points(f"steps_{rotor}", (NAME,), steps, settle=0.0, hold=2.0, about=about))
+    return records
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
@@ -96,9 +96,9 @@ def _check_both_ways(where: str, rotor: str, fit: LagFit, levels: Array, dt: flo
     begins = np.searchsorted(stretch, np.arange(1, levels.shape[1]))
     window = round(2.0 * fit.tau / dt)
     rising = np.diff(fit.linear) > 0.0
-    late = np.array([fit.residuals[b : b + window].mean() for b in begins]) * np.where(rising, 1.0, -1.0)
+    residual_after = np.array([fit.residuals[b : b + window].mean() for b in begins]) * np.where(rising, 1.0, -1.0)
     size = float(np.mean(np.abs(np.diff(fit.linear))))
-    up, down = late[rising].mean(), late[~rising].mean()
+    up, down = residual_after[rising].mean(), residual_after[~rising].mean()
     differs = abs(up - down) > 0.02 * size
     return BenchCheck(
         f"{where}: the {rotor} rotor's residuals after steps up and down differ by {100 * (up - down) / size:+.1f} % "

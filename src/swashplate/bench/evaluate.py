@@ -91,12 +91,12 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     Args:
         hover: `motor_lower` and `motor_upper` at hover.
     """
-    made: list[RecordSchedule] = []
+    records: list[RecordSchedule] = []
     for module in _MODULES:
         planned: Callable[[Mapping[str, float]], list[RecordSchedule]] | None = getattr(module, "schedules", None)
         if planned is not None:
-            made += planned(hover)
-    return made
+            records += planned(hover)
+    return records
 
 
 def hover_commands(card: Mapping[str, float], gravity: float = 9.81) -> dict[str, float]:
@@ -139,12 +139,12 @@ def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
                 where=", ".join(record.name for record in chosen),
                 hint="`swash bench plan` says what to vary.",
             ) from None
-        result, told = joint.add(estimated)
+        result, checks = joint.add(estimated)
         results.append(result)
-        disagreements += told
+        disagreements += checks
         numbers = {**numbers, **joint.values}
     card, covariance = _card(published, joint, results), joint.among(joint.measured)
-    doubts = [check.words for result in results for check in (*result.checks, *disagreements) if not check.good]
+    doubts = [check.text for result in results for check in (*result.checks, *disagreements) if not check.good]
     return Result(
         method="bench",
         solution=vehicle.with_card(card),
@@ -249,10 +249,10 @@ def _refuse_impossible(card: Card, name: str, value: float, files: str) -> None:
 def _correlations(names: Sequence[str], covariance: Array) -> dict[str, dict[str, float]]:
     """Correlations worth keeping, by the first and the second name."""
     sigma = np.sqrt(np.diag(covariance))
-    made: dict[str, dict[str, float]] = {}
+    correlations: dict[str, dict[str, float]] = {}
     for i, first in enumerate(names):
         for j in range(i + 1, len(names)):
             value = float(covariance[i, j] / (sigma[i] * sigma[j]))
             if abs(value) > _WORTH_KEEPING:
-                made.setdefault(first, {})[names[j]] = round(value, 9)
-    return made
+                correlations.setdefault(first, {})[names[j]] = round(value, 9)
+    return correlations

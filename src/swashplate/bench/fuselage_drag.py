@@ -32,13 +32,13 @@ _STANDING = 30.0  # rad/s
 
 def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """The fan from the front and from the right at 0 to 4 m/s."""
-    made = []
-    for axis, words in (("airspeed_x", "front"), ("airspeed_y", "right")):
+    records = []
+    for axis, side in (("airspeed_x", "front"), ("airspeed_y", "right")):
         speeds = (0.0, 1.0, 2.0, 3.0, 4.0)
         settings = [{axis: v} for v in (*speeds, *speeds[::-1]) * 2]
-        text = f"rotors off; fan from the {words} at 0, 1, 2, 3, 4 m/s, up and down, twice"
-        made.append(points(f"fan_{words}", (NAME,), settings, settle=1.0, hold=4.0, words=text))
-    return made
+        text = f"rotors off; fan from the {side} at 0, 1, 2, 3, 4 m/s, up and down, twice"
+        records.append(points(f"fan_{side}", (NAME,), settings, settle=1.0, hold=4.0, about=text))
+    return records
 
 
 def _refuse_across(record: BenchRecord, speed: str, force: str, drag: float, pushed: Array) -> None:

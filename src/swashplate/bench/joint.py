@@ -65,17 +65,17 @@ class Joint:
         )
         checks = (*result.checks, *self._taken_as_known(leant, result))
         across = slopes @ self.covariance
-        own = result.covariance + across @ slopes.T
+        block = result.covariance + across @ slopes.T
         twice = [(name, place) for place, name in enumerate(result.names) if name in self.names]
         before = len(self.names)
         values = np.array([*(self.values[name] for name in self.names), *result.values])
-        covariance = np.block([[self.covariance, across.T], [across, own]]) if self.names else own
-        told = []
+        covariance = np.block([[self.covariance, across.T], [across, block]]) if self.names else block
+        comparisons = []
         for name, place in twice:
             values, covariance, apart = _equal(values, covariance, self.names.index(name), before + place)
             first = self.sources[name][0].procedure
-            words = f"{name}: {result.procedure} and {first} are {apart:+.1f} sigmas apart."
-            told.append(BenchCheck(words, good=abs(apart) < 3.0))
+            text = f"{name}: {result.procedure} and {first} are {apart:+.1f} sigmas apart."
+            comparisons.append(BenchCheck(text, good=abs(apart) < 3.0))
         again = [before + place for _, place in twice]
         kept = [i for i in range(values.size) if i not in again]
         self.names = [[*self.names, *result.names][i] for i in kept]
@@ -84,7 +84,7 @@ class Joint:
         completed = replace(result, findings=findings, checks=checks)
         for name in result.names:
             self.sources.setdefault(name, []).append(completed)
-        return completed, told
+        return completed, comparisons
 
     def _hold(self, name: str) -> None:
         """Take a published number with its bound into the covariance."""
@@ -92,8 +92,8 @@ class Joint:
             return
         card = self._published
         row = np.array([card.covariance([name, other])[0, 1] if other in self.held else 0.0 for other in self.names])
-        own = np.array([[card.covariance([name])[0, 0]]])
-        self.covariance = np.block([[self.covariance, row[:, None]], [row[None], own]]) if self.names else own
+        variance = np.array([[card.covariance([name])[0, 0]]])
+        self.covariance = np.block([[self.covariance, row[:, None]], [row[None], variance]]) if self.names else variance
         self.names.append(name)
         self.held.append(name)
         self.values[name] = card.parameters[name].value
@@ -104,20 +104,20 @@ class Joint:
 
     def _taken_as_known(self, leant: Mapping[str, None], result: BenchResult) -> list[BenchCheck]:
         """What was held, with its bound or for want of one as exact: then what a percent of it would do."""
-        words = []
+        held = []
         for name in leant:
             if name in self.names:
                 place = self.names.index(name)
                 sigma = float(np.sqrt(self.covariance[place, place]))
-                words.append(f"{name} = {self.values[name]:.4g} +- {sigma:.2g}")
+                held.append(f"{name} = {self.values[name]:.4g} +- {sigma:.2g}")
             else:
                 value = self._published.parameters[name].value
-                moved = np.abs(np.asarray(result.leans_on.get(name, ())) * value / result.values)
+                percent = np.abs(np.asarray(result.leans_on.get(name, ())) * value / result.values)
                 would = ""
-                if moved.size:
-                    would = f", 1 % of it moves {result.names[int(moved.argmax())]} by {moved.max():.2g} %"
-                words.append(f"{name} = {value:.4g} (its card gives no bound: taken as exact{would})")
-        return [BenchCheck(f"Held: {', '.join(words)}.")] if words else []
+                if percent.size:
+                    would = f", 1 % of it moves {result.names[int(percent.argmax())]} by {percent.max():.2g} %"
+                held.append(f"{name} = {value:.4g} (its card gives no bound: taken as exact{would})")
+        return [BenchCheck(f"Held: {', '.join(held)}.")] if held else []
 
 
 def _equal(values: Array, covariance: Array, first: int, second: int) -> tuple[Array, Array, float]:

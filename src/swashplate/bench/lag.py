@@ -99,10 +99,10 @@ def fit_lag(
     spread = float(np.sqrt(residuals @ residuals / (measured.size - jacobian.shape[1])))
     scale = np.linalg.norm(jacobian, axis=0) / spread
     sensitivities = (jacobian / (scale * spread)).T[:, :, None]
-    plain = np.linalg.inv(sensitivities[:, :, 0] @ sensitivities[:, :, 0].T)
+    information = np.linalg.inv(sensitivities[:, :, 0] @ sensitivities[:, :, 0].T)
     corrected = accuracy.corrected_covariance(
-        plain,
-        np.zeros_like(plain),
+        information,
+        np.zeros_like(information),
         [residuals[:, None] / spread],
         [sensitivities],
         lags=round(_CORRELATED / dt),

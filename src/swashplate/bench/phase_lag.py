@@ -37,8 +37,8 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
         for u in (0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75)
         for s in (0.4, -0.4, -0.4, 0.4)
     ]
-    words = "lower motor 0.45 to 0.75 in steps of 0.05; at each the pitch servo at 0.4, -0.4, -0.4, 0.4; upper at hover"
-    return [points("phase_lag", (NAME,), settings, settle=1.2, words=words)]
+    about = "lower motor 0.45 to 0.75 in steps of 0.05; at each the pitch servo at 0.4, -0.4, -0.4, 0.4; upper at hover"
+    return [points("phase_lag", (NAME,), settings, settle=1.2, about=about)]
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:

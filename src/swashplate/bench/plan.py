@@ -58,14 +58,14 @@ class MeasurementPlan(Saved):
     def to_document(self) -> dict[str, object]:
         """Records and aims as JSON types."""
         records = [
-            {"record": r.name, "procedures": r.procedures, "seconds": r.duration, "points": r.words}
+            {"record": r.name, "procedures": r.procedures, "seconds": r.duration, "points": r.about}
             for r in self.records
         ]
         return {"records": records, "parameters": [vars(aim) for aim in self.aims]}
 
     def __repr__(self) -> str:
         lines = [f"MeasurementPlan: {len(self.records)} records, {self.duration / 60.0:.0f} min a pass"]
-        lines += [f"  {r.name}: {', '.join(r.procedures)}, {r.duration:.0f} s, {r.words}" for r in self.records]
+        lines += [f"  {r.name}: {', '.join(r.procedures)}, {r.duration:.0f} s, {r.about}" for r in self.records]
         passes = ((a, "too many" if a.repeats is None else str(a.repeats)) for a in self.aims)
         lines += [f"  {a.name:22s} {a.value:12.5g} +- {a.sigma:8.2g} {a.unit}, passes: {n}" for a, n in passes]
         return "\n".join(lines)
@@ -83,15 +83,15 @@ def planned(vehicle: Vehicle, only: Sequence[str] = ()) -> list[RecordSchedule]:
             "there is no such procedure.", channel=", ".join(unknown), hint=f"Known are {', '.join(PROCEDURES)}."
         )
     refuse_other_inputs(vehicle)
-    made = schedules(hover_commands(vehicle.card.values()))
-    unplanned = set(only) - {name for record in made for name in record.procedures}
+    records = schedules(hover_commands(vehicle.card.values()))
+    unplanned = set(only) - {name for record in records for name in record.procedures}
     if unplanned:
         raise BenchError(
             "is for records that exist; it has no plan.",
             channel=", ".join(sorted(unplanned)),
             hint="Evaluate them with `swash bench RECORDS`.",
         )
-    return [record for record in made if not only or set(only) & set(record.procedures)]
+    return [record for record in records if not only or set(only) & set(record.procedures)]
 
 
 def plan(

@@ -191,9 +191,9 @@ def _columns(heads: str, lines: Sequence[str], *, where: str, first: int) -> dic
     try:
         table = np.loadtxt(io.StringIO("\n".join(rows)), delimiter=",", ndmin=2, dtype=np.float64)
     except ValueError as error:
-        words = " ".join(str(error).split())[:160]
+        message = " ".join(str(error).split())[:160]
         raise BenchError(
-            f"does not read as a table of numbers from line {first} on: {words}.",
+            f"does not read as a table of numbers from line {first} on: {message}.",
             where=where,
             hint="Correct the cell; decimals are written with a point, cells are separated by commas.",
         ) from None

@@ -146,9 +146,9 @@ def _files(place: str | Path) -> Sequence[Path]:
 def _of_data_set(name: str) -> Iterator[Path]:
     files = [file for file, entry in REGISTRY[name].files.items() if entry.kind == "bench"]
     for file in files:
-        found = find(name, file)
-        if found is None:
+        record = find(name, file)
+        if record is None:
             raise BenchError(
                 "is not on this machine.", where=f"{name}/{file}", hint=f"Get it with `swash data fetch {name}`."
             )
-        yield found
+        yield record

@@ -147,11 +147,11 @@ def refuse_exchanged(record: BenchRecord, card: Mapping[str, float]) -> None:
         expected = card[f"k_drive_{rotor}"] * record[f"motor_{rotor}"][running] + card[f"o_drive_{rotor}"] + above
         return float(np.median(np.abs(record[channel][running] - expected)))
 
-    told = off("upper", "omega_upper") + off("lower", "omega_lower")
+    as_named = off("upper", "omega_upper") + off("lower", "omega_lower")
     turned = off("upper", "omega_lower") + off("lower", "omega_upper")
-    if told > _CLEAR and turned < told / 3.0:
+    if as_named > _CLEAR and turned < as_named / 3.0:
         raise BenchError(
-            f"the rotors' speeds are {told:.0f} rad/s from their speed maps in sum, exchanged {turned:.0f}.",
+            f"the rotors' speeds are {as_named:.0f} rad/s from their speed maps in sum, exchanged {turned:.0f}.",
             where=record.name,
             channel="omega_upper, omega_lower",
             hint="Exchange the rotors' columns.",
@@ -170,10 +170,10 @@ def refuse_idle(record: BenchRecord, rotor: str, card: Mapping[str, float]) -> N
         BenchError: naming the rotor.
     """
     expected = card[f"k_drive_{rotor}"] * float(np.std(record[f"motor_{rotor}"]))
-    moved = float(np.std(record[f"omega_{rotor}"]))
-    if moved < _FOLLOWS * expected:
+    spread = float(np.std(record[f"omega_{rotor}"]))
+    if spread < _FOLLOWS * expected:
         raise BenchError(
-            f"moves by {moved:.2g} rad/s (standard deviation) where motor_{rotor} should move it by {expected:.2g}: "
+            f"moves by {spread:.2g} rad/s (standard spread) where motor_{rotor} should move it by {expected:.2g}: "
             "the motor did not reach its speeds.",
             where=record.name,
             channel=f"omega_{rotor}",

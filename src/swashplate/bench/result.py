@@ -19,7 +19,7 @@ from swashplate.models.vehicle import Vehicle
 class BenchCheck:
     """One thing that could spoil a measurement, and what was found of it."""
 
-    words: str
+    text: str
     good: bool = True
 
 

@@ -30,12 +30,12 @@ _STEP = 0.1
 
 def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Steps of each servo between -0.4 and 0.4, 0.8 s each, at hover."""
-    made = []
+    records = []
     for axis in ("pitch", "roll"):
         steps = [hover, *({**hover, f"servo_{axis}": s} for s in (0.4, -0.4) * 10)]
-        words = f"hover; {axis} servo 0.4, -0.4, ten times, 0.8 s each"
-        made.append(points(f"servo_steps_{axis}", (NAME,), steps, settle=0.0, hold=0.8, words=words))
-    return made
+        about = f"hover; {axis} servo 0.4, -0.4, ten times, 0.8 s each"
+        records.append(points(f"servo_steps_{axis}", (NAME,), steps, settle=0.0, hold=0.8, about=about))
+    return records
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:

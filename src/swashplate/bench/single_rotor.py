@@ -36,13 +36,13 @@ COLUMNS = ("point", "omega_lower", "omega_upper", "motor_lower", "motor_upper", 
 
 def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Each rotor alone, its motor up and down."""
-    made = []
+    records = []
     for rotor, other in (("upper", "lower"), ("lower", "upper")):
         levels = (0.4, 0.5, 0.6, 0.7)
         sweep = [{f"motor_{rotor}": u} for u in (0.0, *levels, *levels[::-1], 0.0)]
-        words = f"{other} rotor taken off; {rotor} motor off, 0.4 to 0.7 and back, off"
-        made.append(points(f"single_{rotor}", (NAME,), sweep, settle=1.5, removed=other, words=words))
-    return made
+        about = f"{other} rotor taken off; {rotor} motor off, 0.4 to 0.7 and back, off"
+        records.append(points(f"single_{rotor}", (NAME,), sweep, settle=1.5, removed=other, about=about))
+    return records
 
 
 _LOADS = (("thrust", "Fz", "N s^2/rad^2", {"upper": -1.0, "lower": -1.0}),

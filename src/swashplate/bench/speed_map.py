@@ -37,15 +37,15 @@ BEND = 0.25
 
 def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Sweeps of each motor up and down while the other holds hover; thrust and torque come from the same records."""
-    made = []
+    records = []
     for rotor, other in (("upper", "lower"), ("lower", "upper")):
         held = {f"motor_{other}": hover[f"motor_{other}"]}
         sweep = [{**held, f"motor_{rotor}": u} for u in (*LEVELS[1:], *LEVELS[:0:-1])]
-        words = f"{rotor} motor 0.30 to 0.85 in steps of 0.05, up and down; {other} at hover; both off first and last"
-        made.append(
-            points(f"sweep_{rotor}", (NAME, "thrust"), [{f"motor_{rotor}": 0.0}, *sweep, {}], settle=1.5, words=words)
+        about = f"{rotor} motor 0.30 to 0.85 in steps of 0.05, up and down; {other} at hover; both off first and last"
+        records.append(
+            points(f"sweep_{rotor}", (NAME, "thrust"), [{f"motor_{rotor}": 0.0}, *sweep, {}], settle=1.5, about=about)
         )
-    return made
+    return records
 
 
 def linear_part(command: Array, speed: Array, *, where: str = "", rotor: str = "") -> tuple[Mask, list[str]]:
@@ -196,11 +196,11 @@ def _check_supply(record: BenchRecord, *, known: bool) -> BenchCheck:
     )
 
 
-def _check_other(record: BenchRecord, rotor: str, moved: float) -> BenchCheck:
+def _check_other(record: BenchRecord, rotor: str, speed_range: float) -> BenchCheck:
     """Whether the other rotor held its speed."""
     if _is_sweep(record, _OTHER[rotor]):
         return BenchCheck(f"{record.name}: both motors were swept together; a supply that sags bends the map.")
-    return BenchCheck(f"{record.name}: the {_OTHER[rotor]} rotor held its speed within {moved:.1f} rad/s.")
+    return BenchCheck(f"{record.name}: the {_OTHER[rotor]} rotor held its speed within {speed_range:.1f} rad/s.")
 
 
 def _is_sweep(record: BenchRecord, rotor: str) -> bool:

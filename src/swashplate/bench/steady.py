@@ -162,8 +162,8 @@ def nuisance(points: SteadyPoints) -> list[Array]:
 def stacked(blocks: Sequence[Sequence[Array]]) -> list[Array]:
     """Columns that belong to one record each, padded with zeros for the others."""
     sizes = [len(block[0]) for block in blocks]
-    made = []
+    columns = []
     for place, block in enumerate(blocks):
         before, after = sum(sizes[:place]), sum(sizes[place + 1 :])
-        made += [np.r_[np.zeros(before), column, np.zeros(after)] for column in block]
-    return made
+        columns += [np.r_[np.zeros(before), column, np.zeros(after)] for column in block]
+    return columns

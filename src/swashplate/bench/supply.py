@@ -31,8 +31,8 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """The supply from 10.5 to 12.5 V and back at hover's commands."""
     levels = np.linspace(10.5, 12.5, 9)
     settings = [{**hover, "voltage": float(v)} for v in (*levels, *levels[::-1])]
-    words = "commands of hover; supply 10.5 to 12.5 V in steps of 0.25 V and back"
-    return [points("supply", (NAME,), settings, settle=1.5, words=words)]
+    about = "commands of hover; supply 10.5 to 12.5 V in steps of 0.25 V and back"
+    return [points("supply", (NAME,), settings, settle=1.5, about=about)]
 
 
 def fit_supply(voltage: Array, speed: Array, *, where: str = "") -> SteadyLine:
@@ -63,10 +63,10 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     checks, curves, findings = [], [], []
     for record in records:
         steady = steady_points(record, COLUMNS[1:])
-        moved = max(np.ptp(steady["motor_lower"]), np.ptp(steady["motor_upper"]))
-        if moved > 1e-3 or np.ptp(steady["voltage"]) < 0.5:
+        command_range = max(np.ptp(steady["motor_lower"]), np.ptp(steady["motor_upper"]))
+        if command_range > 1e-3 or np.ptp(steady["voltage"]) < 0.5:
             raise BenchError(
-                f"motor commands move by {moved:.3g} and the supply by {np.ptp(steady['voltage']):.2g} V.",
+                f"motor commands move by {command_range:.3g} and the supply by {np.ptp(steady['voltage']):.2g} V.",
                 where=record.name,
                 hint="Hold the commands and vary the supply by a volt or more.",
             )

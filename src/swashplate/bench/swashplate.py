@@ -29,8 +29,8 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Servos through +-0.75 (6 degrees) on both axes, at hover."""
     levels = (0.15, 0.3, 0.45, 0.6, 0.75)
     settings = [{**hover, axis: sign * s} for axis in ("servo_pitch", "servo_roll") for s in levels for sign in (1, -1)]
-    words = "hover; pitch then roll servo at +-0.15 to +-0.75 in steps of 0.15; back through the same points"
-    return [points("swashplate", (NAME,), [hover, *settings, *settings[::-1], hover], settle=1.0, words=words)]
+    about = "hover; pitch then roll servo at +-0.15 to +-0.75 in steps of 0.15; back through the same points"
+    return [points("swashplate", (NAME,), [hover, *settings, *settings[::-1], hover], settle=1.0, about=about)]
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:

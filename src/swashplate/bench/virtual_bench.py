@@ -98,7 +98,7 @@ class RecordSchedule:
         rate: samples per second.
         bar: "held" (level, or where a magnet holds it) or "free".
         removed: the rotor that is taken off ("" for none).
-        words: the points in words, for the plan.
+        about: the points in words, for the plan.
     """
 
     name: str
@@ -108,7 +108,7 @@ class RecordSchedule:
     rate: float
     bar: str = "held"
     removed: str = ""
-    words: str = ""
+    about: str = ""
 
     @property
     def duration(self) -> float:
@@ -124,7 +124,7 @@ def points(
     hold: float = 2.0,
     rate: float = 100.0,
     removed: str = "",
-    words: str = "",
+    about: str = "",
 ) -> RecordSchedule:
     """A schedule of steady points, one after the other.
 
@@ -137,7 +137,7 @@ def points(
     driving = {key: np.repeat([setting.get(key, 0.0) for setting in settings], way + held) for key in names}
     counted = np.repeat(np.arange(1.0, len(settings) + 1.0), way + held)
     number = counted * np.tile(np.r_[np.zeros(way), np.ones(held)], len(settings))
-    return RecordSchedule(name, tuple(procedures), driving, number, rate, removed=removed, words=words)
+    return RecordSchedule(name, tuple(procedures), driving, number, rate, removed=removed, about=about)
 
 
 @dataclass(frozen=True)
@@ -182,8 +182,8 @@ def _graphs(plan: _Held) -> tuple[Any, Any]:
         return [column[i] for i in range(column.shape[0])]
 
     acting = _acting(plan, entries(x), entries(w), entries(p), xp)
-    moved = [rate for part in (acting.lower, acting.bar, acting.drive) for rate in part]
-    rates = casadi.Function("rates", [x, w, p], [casadi.vertcat(*moved)])
+    rates_of = [rate for part in (acting.lower, acting.bar, acting.drive) for rate in part]
+    rates = casadi.Function("rates", [x, w, p], [casadi.vertcat(*rates_of)])
     loads_of = casadi.Function("loads", [x, w, p], [casadi.vertcat(*acting.force, *acting.moment)])
     glides = casadi.DM([float(name in ("phi", "theta")) for name in DRIVING])
     end = w + glides * (then - w)
@@ -245,10 +245,10 @@ def _driving_rows(vehicle: Vehicle, schedule: RecordSchedule) -> Array:
 
 def _motors(vehicle: Vehicle, schedule: RecordSchedule, rows: Array, setup: Setup, rng: np.random.Generator) -> Array:
     """The commands that reach the drive trains: dead zone, saturation, scatter; no motor turns backwards."""
-    card, made = vehicle.card.values(), rows.copy()
+    card, standing = vehicle.card.values(), rows.copy()
     above = card["k_drive_voltage"] * (rows[:, DRIVING.index("voltage")] - card["voltage_nominal"])
-    moved = np.any(np.diff(rows, axis=0, prepend=rows[:1]) != 0.0, axis=1)
-    changes = np.cumsum(moved | (np.diff(schedule.point, prepend=0.0) < 0.0))  # a point set twice is two points
+    changed = np.any(np.diff(rows, axis=0, prepend=rows[:1]) != 0.0, axis=1)
+    changes = np.cumsum(changed | (np.diff(schedule.point, prepend=0.0) < 0.0))  # a point set twice is two points
     visits = changes if schedule.point.max() > 1 else np.zeros_like(changes)
     for name in ("lower", "upper"):
         place = DRIVING.index(f"motor_{name}")
@@ -256,8 +256,8 @@ def _motors(vehicle: Vehicle, schedule: RecordSchedule, rows: Array, setup: Setu
         scatter = setup.speed_scatter / k * rng.standard_normal(visits.max() + 1)[visits]
         command = np.minimum(rows[:, place], setup.saturation) + scatter
         stopped = (rows[:, place] < setup.dead_zone) | (schedule.removed == name)
-        made[:, place] = np.where(stopped, standstill, np.maximum(command, standstill))
-    return made
+        standing[:, place] = np.where(stopped, standstill, np.maximum(command, standstill))
+    return standing
 
 
 def _parameter_row(vehicle: Vehicle, schedule: RecordSchedule, setup: Setup) -> Array:

@@ -78,10 +78,10 @@ def read_linear(path: str | Path) -> Linear:
 
 
 def _lines(document: dict[str, Any], name: str, path: str | Path) -> list[Any]:
-    found = document.get(name) or []
-    if not isinstance(found, list):
-        raise ExportError(f"is {str(found)[:40]}, expected a list of texts.", where=path, channel=name)
-    return found
+    lines = document.get(name) or []
+    if not isinstance(lines, list):
+        raise ExportError(f"is {str(lines)[:40]}, expected a list of texts.", where=path, channel=name)
+    return lines
 
 
 def read_control(path: str | Path, *, pade: int | None = None) -> Any:

@@ -76,9 +76,9 @@ def operations_of(function: Any) -> int:
     """Instructions of the trace but reading inputs, writing outputs and constants; loops count by their rounds."""
     import casadi
 
-    moved = {casadi.OP_INPUT, casadi.OP_OUTPUT, casadi.OP_CONST}
+    copied = {casadi.OP_INPUT, casadi.OP_OUTPUT, casadi.OP_CONST}
     scalar = function.expand()
-    return sum(scalar.instruction_id(i) not in moved for i in range(scalar.n_instructions()))
+    return sum(scalar.instruction_id(i) not in copied for i in range(scalar.n_instructions()))
 
 
 def _heading(controller: Controller, traced: TracedStep, precision: Precision) -> str:
@@ -116,7 +116,7 @@ def _ending(traced: TracedStep, precision: Precision) -> str:
     suffix = "f" if precision == "float" else ""
     # Dots keep them floating numbers; 17 digits bring a double back as it was.
     start = ",\n  ".join(f"{value!r}{suffix}" for value in traced.start)
-    whole = int(f.sz_iw())
+    integers = int(f.sz_iw())
     return f"""
 const {precision} swash_memory[{n}] = {{
   {start}
@@ -124,7 +124,7 @@ const {precision} swash_memory[{n}] = {{
 
 void swash_step_in({precision} memory[{n}], const {precision} measured[{len(traced.measured)}],
                    const {precision} reference[8], {precision} command[{m}], {precision} work[SWASH_WORK]) {{
-  int iw[{max(whole, 1)}];
+  int iw[{max(integers, 1)}];
   const {precision} *arg[{max(int(f.sz_arg()), 3)}];
   {precision} *res[{max(int(f.sz_res()), 1)}];
   int i;

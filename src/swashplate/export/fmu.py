@@ -35,23 +35,23 @@ class FmuVariable:
 def entries(model: Traced, *, step: float) -> list[FmuVariable]:
     """Every variable in the order of the value references in runtime/fmu2.c; `step` is the internal one [s]."""
     n = len(model.states)
-    made = [FmuVariable(v.name, v, "output", "continuous", "exact") for v in model.states]
-    made += [
+    variables = [FmuVariable(v.name, v, "output", "continuous", "exact") for v in model.states]
+    variables += [
         FmuVariable(f"der({v.name})", Variable(v.name, _per_second(v.unit)), "local", "continuous", "calculated", i + 1)
         for i, v in enumerate(model.states)
     ]
     taken = {v.name for v in model.states}
     for v in (*model.inputs, *model.surroundings):
-        made.append(FmuVariable(v.name, v, "input", "continuous"))
+        variables.append(FmuVariable(v.name, v, "input", "continuous"))
         taken.add(v.name)
-    made += [FmuVariable(f"parameters.{v.name}", v, "parameter", "tunable", "exact") for v in model.parameters]
+    variables += [FmuVariable(f"parameters.{v.name}", v, "parameter", "tunable", "exact") for v in model.parameters]
     for v in model.outputs:
         name = f"{v.name}_measured" if v.name in taken else v.name
-        made.append(FmuVariable(name, v, "output", "continuous", "calculated"))
+        variables.append(FmuVariable(name, v, "output", "continuous", "calculated"))
     longest = Variable("step_size", "s", step, meaning="longest internal step of the Runge-Kutta integration")
-    made.append(FmuVariable(longest.name, longest, "parameter", "tunable", "exact"))
-    assert [e.derivative for e in made[n : 2 * n]] == list(range(1, n + 1))
-    return made
+    variables.append(FmuVariable(longest.name, longest, "parameter", "tunable", "exact"))
+    assert [e.derivative for e in variables[n : 2 * n]] == list(range(1, n + 1))
+    return variables
 
 
 def description(model: Traced, *, guid: str, version: str, sources: tuple[str, ...], step: float) -> bytes:
@@ -250,8 +250,8 @@ def _binary(texts: Mapping[str, str], sources: tuple[str, ...]) -> bytes:
         for name, text in texts.items():
             (here / name).write_text(text, encoding="utf-8")
         # Hidden: two FMUs of one name in one process must not see each other's functions.
-        made = shared_library([here / name for name in sources], here / "fmu.so", options=["-fvisibility=hidden"])
-        return made.read_bytes()
+        library = shared_library([here / name for name in sources], here / "fmu.so", options=["-fvisibility=hidden"])
+        return library.read_bytes()
 
 
 def _packed(content: Mapping[str, bytes]) -> bytes:

@@ -214,22 +214,24 @@ def export_model(
         known = logged_delays(flying) if delays else input_delays(flying)
         late = None if delays is False else known or None
         if delays is False and any(known.values()):
-            told = ", ".join(f"{name} {1e3 * d:.3g} ms" for name, d in known.items() if d)
-            left_out = f"Left out: the identified delays of the inputs ({told})."
+            listed = ", ".join(f"{name} {1e3 * d:.3g} ms" for name, d in known.items() if d)
+            left_out = f"Left out: the identified delays of the inputs ({listed})."
         about = trim or find_trim(flying)
     called = identifier(name)
-    made = FORMATS[form](ExportRequest(model, called, about, late, precision, controller, tuple(draws), origin, flight))
-    return replace(made, notes=(*made.notes, left_out)) if left_out else made
+    written = FORMATS[form](
+        ExportRequest(model, called, about, late, precision, controller, tuple(draws), origin, flight)
+    )
+    return replace(written, notes=(*written.notes, left_out)) if left_out else written
 
 
 def _without_delays(model: Model, name: str) -> tuple[Linear, str]:
     """A linear model's matrices alone, and what was left out."""
     if isinstance(model, Linear):
-        plain, known = model, dict(model.delays)
+        undelayed, known = model, dict(model.delays)
     else:
         structure = structure_of(model)
-        plain = of_state_space(replace(structure, delays={}), name=name)
+        undelayed = of_state_space(replace(structure, delays={}), name=name)
         known = {key: float(expression(structure.numbers())) for key, expression in structure.delays.items()}
-    late = {name: delay for name, delay in known.items() if delay}
-    told = ", ".join(f"{name} {1e3 * delay:.3g} ms" for name, delay in late.items())
-    return replace(plain, delays={}), f"Left out: the model's delays ({told})." if late else ""
+    left = {name: delay for name, delay in known.items() if delay}
+    listed = ", ".join(f"{name} {1e3 * delay:.3g} ms" for name, delay in left.items())
+    return replace(undelayed, delays={}), f"Left out: the model's delays ({listed})." if left else ""

@@ -118,9 +118,9 @@ def _numbers(variables: Mapping[str, Any], key: str, shape: tuple[int, int], pat
 def _cells(texts: Iterable[str]) -> Any:
     """A column of text as a cell array."""
     listed = list(texts)
-    made = np.empty((len(listed), 1), dtype=object)
-    made[:, 0] = listed
-    return made
+    cells = np.empty((len(listed), 1), dtype=object)
+    cells[:, 0] = listed
+    return cells
 
 
 def _column(numbers: Iterable[float]) -> Any:

@@ -145,12 +145,12 @@ def _used(text: str, names: Sequence[str]) -> str:
 
 def _equations(model: Traced, precision: Precision) -> dict[str, str]:
     """The bodies of `fixed` and `moving`."""
-    made = stages(model, real=f"{model.name}_real", precision=precision)
+    staged = stages(model, real=f"{model.name}_real", precision=precision)
     return {
-        "FIXED": _used(made.fixed, (*_GIVEN[1:], "c")),
-        "MOVING": _used(made.moving, (*_GIVEN, "c", "root", "known")),
-        "N_CONSTANTS": str(max(1, made.constants)),
-        "N_ROOTS": str(max(1, made.roots)),
+        "FIXED": _used(staged.fixed, (*_GIVEN[1:], "c")),
+        "MOVING": _used(staged.moving, (*_GIVEN, "c", "root", "known")),
+        "N_CONSTANTS": str(max(1, staged.constants)),
+        "N_ROOTS": str(max(1, staged.roots)),
     }
 
 
@@ -165,17 +165,17 @@ def _functions(model: Traced, precision: Precision) -> dict[str, str]:
 
 
 def _enums(model: Traced) -> str:
-    made = []
+    enums = []
     for kind, variables in _variables(model).items():
         if not variables:
             continue
         lines = []
         for place, v in enumerate(variables):
             limits = f", {v.limits[0]:.6g} to {v.limits[1]:.6g}" if v.limits else ""
-            told = words(f"[{v.unit or '?'}{limits}] {v.meaning}")
-            lines.append(f"  {model.name}_{kind}_{v.name}{' = 0' if place == 0 else ''}, /* {told} */")
-        made.append(f"enum {model.name}_{kind} {{\n" + "\n".join(lines).replace(", /*", ", /*") + "\n};")
-    return "\n\n".join(_without_last_comma(text) for text in made)
+            meaning = words(f"[{v.unit or '?'}{limits}] {v.meaning}")
+            lines.append(f"  {model.name}_{kind}_{v.name}{' = 0' if place == 0 else ''}, /* {meaning} */")
+        enums.append(f"enum {model.name}_{kind} {{\n" + "\n".join(lines).replace(", /*", ", /*") + "\n};")
+    return "\n\n".join(_without_last_comma(text) for text in enums)
 
 
 def _without_last_comma(enum: str) -> str:

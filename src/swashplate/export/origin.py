@@ -22,15 +22,15 @@ def origin_of(model: Vehicle | StateSpaceModel | Linear) -> tuple[str, ...]:
         return (program, f"Card {card_digest(model)} of {model.name}: {model.card.title}.", _data(model))
     given = model.structure if isinstance(model, Vehicle) else model
     if isinstance(given, StateSpaceModel):
-        told = repr((sorted(given.numbers().items()), sorted(map(repr, given.elements))))
+        content = repr((sorted(given.numbers().items()), sorted(map(repr, given.elements))))
         fitted = sum(parameter.cramer_rao == parameter.cramer_rao for parameter in given.parameters.values())
         data = f"Data: {fitted} of {len(given.parameters)} numbers are fitted, the file does not say to what."
-        return (program, f"Model file {_digest(told)}: {given.title}.", data if fitted else "Data: none was fitted.")
+        return (program, f"Model file {_digest(content)}: {given.title}.", data if fitted else "Data: none was fitted.")
     assert isinstance(given, Linear)
     if given.origin:
         return given.origin
-    told = repr([getattr(given, name).tolist() for name in "ABCD"])
-    return (program, f"Matrices {_digest(told)}: {given.title}.", "Data: the matrices' own file says nothing.")
+    content = repr([getattr(given, name).tolist() for name in "ABCD"])
+    return (program, f"Matrices {_digest(content)}: {given.title}.", "Data: the matrices' own file says nothing.")
 
 
 def card_digest(model: Vehicle) -> str:
@@ -38,8 +38,8 @@ def card_digest(model: Vehicle) -> str:
     return _digest(repr((sorted(model.card.values().items()), sorted(map(repr, dict(model.card.options).items())))))
 
 
-def _digest(told: str) -> str:
-    return hashlib.sha256(told.encode()).hexdigest()[:12]
+def _digest(content: str) -> str:
+    return hashlib.sha256(content.encode()).hexdigest()[:12]
 
 
 def _data(model: Vehicle) -> str:

@@ -42,10 +42,10 @@ class CompiledEngine:
         MissingLibraryError: without CasADi.
     """
 
-    def __init__(self, moved: Vehicle, environment: Environment) -> None:
-        row, inputs = np.zeros(len(moved.state_names)), np.zeros(len(moved.input_names))
-        start = Trim(row, inputs, moved.state_names, moved.input_names, environment, 0.0, 0.0, 0.0, 0.0)
-        model = trace_vehicle(moved, start, name="body", jacobians=False)
+    def __init__(self, vehicle: Vehicle, environment: Environment) -> None:
+        row, inputs = np.zeros(len(vehicle.state_names)), np.zeros(len(vehicle.input_names))
+        start = Trim(row, inputs, vehicle.state_names, vehicle.input_names, environment, 0.0, 0.0, 0.0, 0.0)
+        model = trace_vehicle(vehicle, start, name="body", jacobians=False)
         self._frame = loaded(frame_code(model, _told(row.size)), options=_OPTIONS).body_frame
         self._frame.argtypes = [_POINTER] * 5 + [ctypes.c_double, ctypes.c_int, _POINTER]
         self._frame.restype = None
@@ -63,8 +63,8 @@ class CompiledEngine:
 
     def advance(self, inputs: Sequence[float], around: Array, step: float, steps: int) -> list[float]:
         self._inputs[:] = inputs
-        for own, given in self._moving:
-            self._around[own] = around[given]
+        for row, given in self._moving:
+            self._around[row] = around[given]
         self._frame(*self._given, step, steps, self._answer)
         return self._told.tolist()
 

@@ -129,9 +129,9 @@ def trace_vehicle(
 
     hiding = _Remembering(casadi)
     slopes = [casadi.jacobian(rates(hiding), by) for by in (x, u)] if jacobians else []
-    plain = CasadiBackend()
-    right = rates(plain)
-    force = casadi.vertcat(*vehicle.specific_force(state, inputs, parameters, environment, plain))
+    backend = CasadiBackend()
+    right = rates(backend)
+    force = casadi.vertcat(*vehicle.specific_force(state, inputs, parameters, environment, backend))
     used = [i for i, does in enumerate(casadi.which_depends(casadi.vertcat(right, force), s, 1)) if does]
 
     rest = s[used] if used else casadi.SX(0, 1)
@@ -203,19 +203,19 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
             Variable(c, model.units.get(a, ""), meaning=_meaning(a)) for c, a in zip(called, names, strict=True)
         )
 
-    late = {i: sorted({model.delay(o, i) for o in model.outputs}) for i in model.inputs}
-    if torn := [name for name, times in late.items() if len(times) > 1]:
-        told = ", ".join(
+    delays_by_input = {i: sorted({model.delay(o, i) for o in model.outputs}) for i in model.inputs}
+    if torn := [name for name, times in delays_by_input.items() if len(times) > 1]:
+        listed = ", ".join(
             f"{o}/{i} {1e3 * model.delay(o, i):.3g} ms" for i in torn for o in model.outputs if model.delay(o, i)
         )
         raise ExportError(
-            f"has delays that differ between outputs ({told}); equations in C and FMU hold one of each input.",
+            f"has delays that differ between outputs ({listed}); equations in C and FMU hold one of each input.",
             where=model.name,
             channel="delays",
             hint="Give the file one delay per input, or leave all of them out (--no-delays); --format matlab and "
             "control hold them.",
         )
-    delays = tuple(times[0] for times in late.values() if times)
+    delays = tuple(times[0] for times in delays_by_input.values() if times)
     return Traced(
         name=name,
         title=model.title,

@@ -107,9 +107,9 @@ def newton(residual: Callable[[Scalar], tuple[Scalar, Scalar]], start: Scalar, *
         steps: how many steps; choose it so that the last two no longer move the answer.
         xp: the operations.
     """
-    own = getattr(xp, "newton", None)  # a back end that can end a loop early may do so
-    if own is not None:
-        return own(residual, start, steps=steps)
+    solver = getattr(xp, "newton", None)  # a back end that can end a loop early may do so
+    if solver is not None:
+        return solver(residual, start, steps=steps)
     x = start
     for step in range(steps):
         if step == steps - _DIFFERENTIATED:

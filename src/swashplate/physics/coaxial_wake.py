@@ -41,7 +41,7 @@ def upstream_share(separation: Scalar, radius: Scalar) -> Scalar:
 
 
 def wake_shares(
-    axial: Scalar, across2: Scalar, own: Induced, *, separation: Scalar, radius: Scalar, form: str, xp: Backend
+    axial: Scalar, across2: Scalar, induced: Induced, *, separation: Scalar, radius: Scalar, form: str, xp: Backend
 ) -> WakeShares:
     """How much of each rotor's induced velocity the other one feels, as a mean over its disc.
 
@@ -71,11 +71,11 @@ def wake_shares(
         return WakeShares(share, share)
     ahead = upstream_share(separation, radius) if form == "vortex-tube" else 0.0
     gain = 2.0 - ahead
-    both = own.induced_upper + own.induced_lower
+    both = induced.induced_upper + induced.induced_lower
     through, size = axial + both, xp.abs(both) + _TINY
     skew = xp.abs(through) / xp.sqrt(through * through + across2 + _TINY) + _TINY
     covered = skew * xp.sqrt(skew)
-    v = xp.maximum(own.induced_upper, _TINY)
+    v = xp.maximum(induced.induced_upper, _TINY)
     climb = xp.maximum(axial, -0.5 * v)
     at_disc, behind = climb + v, climb + gain * v
     area = xp.sqrt((across2 + at_disc * at_disc) / (across2 + behind * behind))

@@ -182,8 +182,8 @@ def wake_follows(excess: Scalar, v2: Scalar, xp: Backend) -> Scalar:
     Without it K_R above 1 is a negative damping that grows with the springs over the centrifugal force: a stopped rotor
     would shake itself to pieces in still air.
     """
-    late = xp.maximum(0.0, wake_lateness(excess, v2) - 1.0)
-    return 1.0 / xp.sqrt(1.0 + late * late)
+    lateness = xp.maximum(0.0, wake_lateness(excess, v2) - 1.0)
+    return 1.0 / xp.sqrt(1.0 + lateness * lateness)
 
 
 def precession_torque(disc: Flapping, p: Scalar, q: Scalar, *, inertia: Scalar, omega: Scalar) -> Scalar:

@@ -65,8 +65,8 @@ def momentum_inflow(free: Scalar, loss: Scalar, mu_z: Scalar, mu2: Scalar, xp: B
 def wake_skew(lam0: Scalar, mu_x: Scalar, mu_y: Scalar, mu_z: Scalar, xp: Backend) -> tuple[Scalar, Scalar]:
     """tan(chi/2) of the wake's skew angle chi as a vector in the disc: ahead and right, smooth through hover."""
     through = xp.abs(lam0 - mu_z)
-    whole = xp.sqrt(mu_x * mu_x + mu_y * mu_y + through * through + _TINY)
-    return mu_x / (whole + through), mu_y / (whole + through)
+    speed = xp.sqrt(mu_x * mu_x + mu_y * mu_y + through * through + _TINY)
+    return mu_x / (speed + through), mu_y / (speed + through)
 
 
 def glauert_gradient(lam0: Scalar, skew: tuple[Scalar, Scalar]) -> Inflow:

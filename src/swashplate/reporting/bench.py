@@ -46,7 +46,7 @@ def compose_bench(bench: Bench) -> Report:
     kept = f"Published, for want of a record: {listed(bench.details.kept, most=30)}." if bench.details.kept else "None."
     card: tuple[Section, ...] = (_card(bench),) if bench.names else ()
     keeping = (("Kept", kept, "caution" if bench.details.kept else "good"),) if bench.names else ()
-    agreement = " ".join(c.words for c in bench.details.disagreements) or "No parameter was measured in two ways."
+    agreement = " ".join(c.text for c in bench.details.disagreements) or "No parameter was measured in two ways."
     summary = (
         ("Records", f"{counted(len(files), 'file')}: {listed(files, most=5)}.", "plain"),
         ("Measured", measured, "plain"),
@@ -116,12 +116,12 @@ def _procedure(result: BenchResult, bench: Bench) -> Section:
     if rows:
         blocks.append(tabulate(f"{result.title}: result", ("quantity", "unit", "value", "σ"), rows))
     blocks += [tabulate(rows.title, rows.columns, rows.rows) for rows in result.tables]
-    doubts = [check.words for check in result.checks if not check.good]
+    doubts = [check.text for check in result.checks if not check.good]
     if doubts:
         blocks += [Text(text, tone="caution") for text in doubts]
     if result.left_out:
         blocks.append(Points(result.left_out, title="Points left out"))
-    blocks.append(Points(tuple(c.words for c in result.checks if c.good), title="Checked"))
+    blocks.append(Points(tuple(c.text for c in result.checks if c.good), title="Checked"))
     return Section(result.procedure, result.title, tuple(blocks), folded=True)
 
 

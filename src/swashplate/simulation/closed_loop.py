@@ -91,10 +91,10 @@ def simulate_closed_loop(
     at_start = dict(zip(vehicle.state_names, x0, strict=True))
     wanted = _table(REFERENCES, reference or {}, n, [at_start.get(name, 0.0) for name in REFERENCES])
     added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
-    late = steps_late(flown_delays(vehicle, controller, delays=delays), rate)
+    steps_behind = steps_late(flown_delays(vehicle, controller, delays=delays), rate)
     law = controller.law(vehicle)
     first = np.zeros(len(vehicle.input_names))
-    if late.any() or law.feels:
+    if steps_behind.any() or law.feels:
         first = _inputs_before(vehicle, start, surroundings)
     every = round(every)
     steering = Steering(
@@ -104,7 +104,7 @@ def simulate_closed_loop(
         wanted[:, :, None],
         added[:, :, None],
         limits_of(vehicle),
-        late[:, None],
+        steps_behind[:, None],
         first,
         controller.draws(-(-n // every))[:, :, None],
     )

@@ -141,7 +141,7 @@ def simulate_closed_loops(
     further = np.broadcast_to(np.asarray(delay, dtype=np.float64), (size,))
     if not np.all(further >= 0.0):
         raise SwashError("is negative or no number.", channel="delay")
-    late = steps_late(flown_delays(vehicle, controller, delays=delays)[:, None] + further, rate)
+    steps_behind = steps_late(flown_delays(vehicle, controller, delays=delays)[:, None] + further, rate)
     sigma = np.zeros(len(vehicle.state_names))
     for name, value in (noise or {}).items():
         sigma[vehicle.index(name)] = value
@@ -164,7 +164,7 @@ def simulate_closed_loops(
                 wanted[:, :, None],
                 added[:, :, None],
                 limits_of(vehicle, bits),
-                late[:, members],
+                steps_behind[:, members],
                 begin.inputs,
                 np.stack([controller.draws(samples, seed + int(i)) for i in members], axis=2),
                 _noise(sigma, samples, members, seed) if np.any(sigma) else None,

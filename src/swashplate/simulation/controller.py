@@ -112,12 +112,12 @@ def law_of_step(step: Step, vehicle: Vehicle, memory: int, gains: int, *, drawn:
     casadi = require_casadi()
     measured = (*vehicle.state_names, "voltage", *draw_names(drawn))
     sizes = {"memory": memory + gains, "measured": len(measured), "reference": len(REFERENCES)}
-    carried, told, asked = (casadi.SX.sym(name, size) for name, size in sizes.items())
+    carried, heard, asked = (casadi.SX.sym(name, size) for name, size in sizes.items())
     row = symbols(carried)
     try:
-        after, commands = step(row[:memory], symbols(told), symbols(asked), row[memory:], SymbolArrays())
+        after, commands = step(row[:memory], symbols(heard), symbols(asked), row[memory:], SymbolArrays())
         results = casadi.vertcat(expressions(after), carried[memory:], expressions(commands))
     except Exception as error:  # whatever a step of another package does with numbers that are none
         raise untraced(error, "step", getattr(step, "__name__", "step")) from error
-    function = casadi.Function("swash_traced", [carried, told, asked], [casadi.densify(results)], {"cse": True})
+    function = casadi.Function("swash_traced", [carried, heard, asked], [casadi.densify(results)], {"cse": True})
     return LawGraph(function, measured, told_names(vehicle, drawn), memory + gains, drawn, fixed=gains)

@@ -95,9 +95,9 @@ def model_error(name: str, *, without: str = "") -> ModelError:
         SwashError: where there is no such derivative.
     """
     kind = kind_of(name)
-    told = [value for vehicle, value in MEASURED[kind].items() if vehicle != without]
-    sigma = float(np.sqrt(np.mean(np.square(told)))) if told else float("nan")
-    return ModelError(kind, sigma, len(told))
+    errors = [value for vehicle, value in MEASURED[kind].items() if vehicle != without]
+    sigma = float(np.sqrt(np.mean(np.square(errors)))) if errors else float("nan")
+    return ModelError(kind, sigma, len(errors))
 
 
 def kind_of(name: str) -> str:
@@ -140,8 +140,8 @@ class CardSpread:
     @property
     def words(self) -> str:
         """What the bounds hold, and what they do not."""
-        told = {one.kind: one for one in self.model.values()}
-        parts = ", ".join(f"{kind} {100.0 * one.sigma:.0f} % of {one.vehicles}" for kind, one in told.items())
+        errors = {one.kind: one for one in self.model.values()}
+        parts = ", ".join(f"{kind} {100.0 * one.sigma:.0f} % of {one.vehicles}" for kind, one in errors.items())
         return (
             f"5 % and 95 % bounds: of {self.draws} samples of the card ({self.refused} could not be trimmed), and of "
             f"what such a model misses beside published helicopters (standard deviation, told by how many: {parts}). "

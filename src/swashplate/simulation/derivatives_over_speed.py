@@ -77,10 +77,10 @@ class Derivatives(Shown):
         return {"tables": [self._table(at, table) for at, table in zip(self.trims, self.tables, strict=True)]}
 
     def _table(self, at: Trim, table: DerivativeTable) -> dict[str, Any]:
-        told: dict[str, Any] = {"speed": at.speed}
+        document: dict[str, Any] = {"speed": at.speed}
         wide = self.bounds
         if wide is not None:
-            told |= {"modes": wide.modes(), "draws": wide.draws, "refused": wide.refused, "words": wide.words}
+            document |= {"modes": wide.modes(), "draws": wide.draws, "refused": wide.refused, "words": wide.words}
         entries = {}
         for name in table.names():
             entries[name] = {
@@ -94,7 +94,7 @@ class Derivatives(Shown):
                 entries[name] |= {"5 %": low * factor, "95 %": high * factor}
                 entries[name] |= {"5 % by card": card_low * factor, "95 % by card": card_high * factor}
                 entries[name] |= {"model error": error.sigma, "model error of": error.kind}
-        return {**told, "derivatives": entries}
+        return {**document, "derivatives": entries}
 
     def __repr__(self) -> str:
         lines = [f"Derivatives of {self.vehicle.card.title}"]

@@ -99,14 +99,14 @@ def held_late(A: Array, B: Array, dt: float, delays: Sequence[float]) -> tuple[A
         F; what the command of so many whole samples ago does, and what the one before it does until that arrives, both
         (n, m); those numbers of whole samples.
     """
-    whole = [int(np.floor(d / dt + _SAMPLE)) for d in delays]
-    rest = [d - k * dt if d - k * dt > _SAMPLE * dt else 0.0 for d, k in zip(delays, whole, strict=True)]
+    samples = [int(np.floor(d / dt + _SAMPLE)) for d in delays]
+    rest = [d - k * dt if d - k * dt > _SAMPLE * dt else 0.0 for d, k in zip(delays, samples, strict=True)]
     F, G = zero_order_hold(A, B, dt)
     now = G.copy()
-    for late in {r for r in rest if r}:
-        columns = [j for j, r in enumerate(rest) if r == late]
-        now[:, columns] = zero_order_hold(A, B[:, columns], dt - late)[1]
-    return F, now, G - now, tuple(whole)
+    for part in {r for r in rest if r}:
+        columns = [j for j, r in enumerate(rest) if r == part]
+        now[:, columns] = zero_order_hold(A, B[:, columns], dt - part)[1]
+    return F, now, G - now, tuple(samples)
 
 
 def with_late_inputs(

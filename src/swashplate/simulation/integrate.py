@@ -41,10 +41,10 @@ def fastest_mode(vehicle: Vehicle, x: Array, u: Array, environment: Environment)
         return np.array([float(value) for value in by_state])
 
     step = 1e-6 * np.maximum(1.0, np.abs(x))
-    moved = np.diag(step)
+    steps_apart = np.diag(step)
     try:
         with np.errstate(all="ignore"):
-            slopes = [(rates(x + d) - rates(x - d)) / (2.0 * h) for d, h in zip(moved, step, strict=True)]
+            slopes = [(rates(x + d) - rates(x - d)) / (2.0 * h) for d, h in zip(steps_apart, step, strict=True)]
     except (ArithmeticError, ValueError):  # plain floats divide by zero, or take a root, where a graph gives NaN
         return complex(math.nan)
     matrix = np.array(slopes).T

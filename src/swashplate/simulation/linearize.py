@@ -126,8 +126,8 @@ class LinearModel(Shown):
         """H(j omega) at frequencies [rad/s] with the identified delays, shape (n, n_states, n_inputs)."""
         s: Complex = np.asarray(1j * np.asarray(omega)[:, None, None], dtype=np.complex128)
         x = np.linalg.solve(s * np.eye(len(self.states)) - self.A, self.B[None] + 0j)
-        late = [[self.delays.get(f"{o}/{i}", self.delays.get(i, 0.0)) for i in self.inputs] for o in self.outputs]
-        return np.asarray((self.C @ x + self.D) * np.exp(-s * np.array(late)), dtype=np.complex128)
+        delays = [[self.delays.get(f"{o}/{i}", self.delays.get(i, 0.0)) for i in self.inputs] for o in self.outputs]
+        return np.asarray((self.C @ x + self.D) * np.exp(-s * np.array(delays)), dtype=np.complex128)
 
     def to_control(self, *, pade: int | None = None) -> Any:
         """The model as a `control.StateSpace` of python-control with named signals.

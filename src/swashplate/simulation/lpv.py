@@ -127,11 +127,11 @@ def simulate_lpv(
             raise SwashError(f"scheme '{scheme}' needs a schedule.", hint="Pass over=schedule(vehicle, speeds).")
         if scheme == "stitched":
             begins = start.states() | dict(zip(PAPER_STATES, began.tolist(), strict=True))
-            flown = _stitched(over)
+            stitched = _stitched(over)
             states = simulate(
-                flown,
+                stitched,
                 dict(zip(PAPER_INPUTS, u.T, strict=True)),
-                start={name: begins[name] for name in flown.state_names},
+                start={name: begins[name] for name in stitched.state_names},
                 rate=rate,
                 environment=surroundings,
             ).array(PAPER_STATES)
@@ -198,8 +198,8 @@ def _printed_block(equations: Equations) -> Callable[..., list[Array]]:
     follow = -inverse @ casadi.horzcat(J[8:, :8], J[8:, 10:])
     A, B = J[:8, :8] + J[:8, 8:10] @ follow[:, :8], J[:8, 10:] + J[:8, 8:10] @ follow[:, 8:]
     after = _linear_step(A, B @ (command - u0) - A @ x0, ten[:8], dt)
-    told = casadi.densify(casadi.vertcat(after, ten[8:] - inverse @ value[8:]))
-    return runnable(casadi.Function("printed", [ten, command, fixed], [told], {"cse": True}).mapaccum("lpv", _BLOCK))
+    results = casadi.densify(casadi.vertcat(after, ten[8:] - inverse @ value[8:]))
+    return runnable(casadi.Function("printed", [ten, command, fixed], [results], {"cse": True}).mapaccum("lpv", _BLOCK))
 
 
 def _stitched(over: Schedule) -> Vehicle:

@@ -220,8 +220,8 @@ def _assumptions(vehicle: Vehicle, primed: bool) -> Iterable[Assumption]:
     for name, values, new_trim in _SWITCHES:
         for value in values:
             if getattr(options, name, value) != value:
-                words = f"--set {name}={str(value).lower()}"
-                yield Assumption(words, option=(name, value), new_trim=new_trim)
+                switch = f"--set {name}={str(value).lower()}"
+                yield Assumption(switch, option=(name, value), new_trim=new_trim)
     for name, new_trim in _ZEROS:
         if card.get(name):
             yield Assumption(f"--set {name}=0", zero=name, new_trim=new_trim)

@@ -73,12 +73,12 @@ def acting_rows(
         raise CardError(
             told.problem, where=told.where, hint="Give one delay per input as `delays`, or 0 for none."
         ) from None
-    late = steps_late(np.array(list(complete_delays(vehicle, known).values())), rate)
-    if not late.any():
+    steps_behind = steps_late(np.array(list(complete_delays(vehicle, known).values())), rate)
+    if not steps_behind.any():
         return rows
     before = _inputs_before(vehicle, rows, start, environment)
     acting = rows.copy()
-    for i, steps in enumerate(np.minimum(late, len(rows))):
+    for i, steps in enumerate(np.minimum(steps_behind, len(rows))):
         if steps:
             acting[:, i] = np.concatenate([np.broadcast_to(before[i], rows[:steps, i].shape), rows[:-steps, i]])
     return acting
@@ -120,8 +120,8 @@ def simulated_flight(
         simulated=True,
         vehicle=vehicle.name,
     )
-    flown = Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate", **details)
-    return monitored(flown, vehicle)
+    flight = Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate", **details)
+    return monitored(flight, vehicle)
 
 
 def unflown(vehicle: Vehicle, *, details: Mapping[str, Any]) -> Flight:
@@ -132,7 +132,7 @@ def unflown(vehicle: Vehicle, *, details: Mapping[str, Any]) -> Flight:
 
 def monitored(flight: Flight, vehicle: Vehicle) -> Flight:
     """A flight that says in its notes where it leaves what the vehicle's numbers and equations hold for."""
-    said = tuple(words for words in envelope(vehicle, flight) if words not in flight.provenance.notes)
+    said = tuple(doubt for doubt in envelope(vehicle, flight) if doubt not in flight.provenance.notes)
     if not said:
         return flight
     return replace(flight, provenance=replace(flight.provenance, notes=(*flight.provenance.notes, *said)))

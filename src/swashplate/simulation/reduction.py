@@ -259,10 +259,10 @@ def _omission(
 
     values = np.linalg.eigvals(A)
     _, order = linear_sum_assignment(np.abs(nominal[:, None] - values[None, :]))
-    moved = float(np.max(np.abs(values[order] - nominal) / np.abs(nominal)))
+    change = float(np.max(np.abs(values[order] - nominal) / np.abs(nominal)))
     changed = np.abs(_responses(A, B, model) - response)
     relative = float(np.max(np.linalg.norm(changed, axis=0) / np.linalg.norm(response, axis=0)))
-    return Omission(name, value, moved, relative)
+    return Omission(name, value, change, relative)
 
 
 def _responses(A: Array, B: Array, model: LinearModel) -> Complex:

@@ -154,15 +154,15 @@ def _motion(flight: Flight, camera: MotionCapture, random: np.random.Generator) 
     quaternion *= np.concatenate([[1.0], np.cumprod(np.where(continuous == 0.0, 1.0, continuous) * flips)])[:, None]
 
     jitter = np.clip(camera.stamp_jitter * random.standard_normal(n), -0.4 / camera.rate, 0.4 / camera.rate)
-    seen = np.ones(n, dtype=bool)
+    kept = np.ones(n, dtype=bool)
     starts = np.flatnonzero(random.random(n) < camera.gaps_per_minute / 60.0 / camera.rate)
     for start, length in zip(starts, random.exponential(camera.gap_length, starts.size), strict=True):
-        seen[start : start + max(1, round(length * camera.rate))] = False
-    seen[[0, -1]] = True
+        kept[start : start + max(1, round(length * camera.rate))] = False
+    kept[[0, -1]] = True
     channels = dict(
-        zip((*POSITION, *QUATERNION), np.column_stack([position, np.roll(quaternion, 1, axis=1)])[seen].T, strict=True)
+        zip((*POSITION, *QUATERNION), np.column_stack([position, np.roll(quaternion, 1, axis=1)])[kept].T, strict=True)
     )
-    return stream((true_time + jitter)[seen], channels)
+    return stream((true_time + jitter)[kept], channels)
 
 
 def _inertial(flight: Flight, vehicle: Vehicle, unit: InertialUnit, random: np.random.Generator) -> xr.Dataset:

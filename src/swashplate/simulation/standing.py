@@ -121,7 +121,7 @@ def _derivatives(
     still = state.body._replace(u=0.0, v=0.0, w=0.0, p=0.0, q=0.0, r=0.0)
     pushed = rigid_body_rates(still, force, moment, inertia, xp)
     rates = free(_own(state), inputs, par, env, xp)
-    body = RigidBody(*(own + gained for own, gained in zip(rates.body, pushed, strict=True)))
+    body = RigidBody(*(rate + gained for rate, gained in zip(rates.body, pushed, strict=True)))
     assert bending is not None  # a grip was given
     return Standing(body, rates._replace(body=None), bending)
 

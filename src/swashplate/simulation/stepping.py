@@ -131,21 +131,21 @@ class Stepping:
         held = [low if v < low else min(v, high) for v, (low, high) in zip(inputs, self._limits, strict=True)]
         return self.motion(self._engine.advance(held, self._around, duration / steps, steps))
 
-    def motion(self, told: list[float]) -> Motion:
+    def motion(self, row: list[float]) -> Motion:
         """The motion that an engine told.
 
         Raises:
             DivergenceError: as `advance`.
         """
         n = self._n
-        if not math.isfinite(sum(told)) and (wild := [k for k, v in enumerate(told) if not math.isfinite(v)]):
+        if not math.isfinite(sum(row)) and (wild := [k for k, v in enumerate(row) if not math.isfinite(v)]):
             self.place(np.array(self._last))
             name = self.vehicle.state_names[wild[0] if wild[0] < n else _SPEEDS.start + (wild[0] - n) % 3]
             raise DivergenceError("left the finite numbers.", time=float("nan"), state=name)
         for angle in _COUNTED:
-            told[angle] = counted_on(told[angle], self._last[angle])
-        self._last = told[:n]
-        body, velocity, force = told[: len(RigidBody._fields)], told[n : n + 3], told[n + 3 :]
+            row[angle] = counted_on(row[angle], self._last[angle])
+        self._last = row[:n]
+        body, velocity, force = row[: len(RigidBody._fields)], row[n : n + 3], row[n + 3 :]
         return Motion(RigidBody._make(body), Vector._make(velocity), Vector._make(force), self._last)
 
 
@@ -157,10 +157,10 @@ def steps_of(duration: float) -> int:
 class VirtualEngine:
     """Steps by CasADi's virtual machine: where there is no compiler."""
 
-    def __init__(self, moved: Vehicle, environment: Environment) -> None:
-        equations = equations_of(moved)
+    def __init__(self, vehicle: Vehicle, environment: Environment) -> None:
+        equations = equations_of(vehicle)
         self._step, self._rates = rk4_graph(equations), unrolled_rates(equations)
-        self._parameters = parameter_row(moved, environment)
+        self._parameters = parameter_row(vehicle, environment)
         self._gravity = float(environment.gravity)
 
     def place(self, row: Array) -> None:

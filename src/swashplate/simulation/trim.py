@@ -211,7 +211,7 @@ def _near_there(vehicle: Vehicle, state: Array, inputs: Array, surroundings: Env
     """What of the equations does not hold where the search for a trim ended: stalled blades carry no more."""
     if not np.all(np.isfinite([*state, *inputs])):
         return ""
-    return "".join(f"Near there {words}. " for words in doubts(vehicle, state, inputs, surroundings))
+    return "".join(f"Near there {doubt}. " for doubt in doubts(vehicle, state, inputs, surroundings))
 
 
 _CLEAR = 10.0
@@ -291,12 +291,12 @@ def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
     for name, unit, value, (low, high) in kinds:
         if not low <= value <= high:
             limit = high if value > high else low
-            told = [
+            exceeded = [
                 f"{np.degrees(v):.1f} deg" if unit == "rad" else f"{v:.3g} {unit}".removesuffix(" 1")
                 for v in (value, limit)
             ]
             raise TrimError(
-                f"{where} needs {name} = {told[0]}, but its limit is {told[1]}.",
+                f"{where} needs {name} = {exceeded[0]}, but its limit is {exceeded[1]}.",
                 where=vehicle.card.where,
                 channel=name,
                 hint=_hint(battery=battery, too_low=value < low),

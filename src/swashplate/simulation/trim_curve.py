@@ -69,9 +69,9 @@ class TrimCurve(Shown):
     def remarks(self) -> tuple[str, ...]:
         """Where the vehicle's equations do not hold, and where the power is none that its engine gives."""
         return tuple(
-            f"At {at.speed:g} m/s {words}."
+            f"At {at.speed:g} m/s {doubt}."
             for at in self.trims
-            for words in (*doubts(self.vehicle, at.state, at.inputs, at.environment), *self._power_verdict(at))
+            for doubt in (*doubts(self.vehicle, at.state, at.inputs, at.environment), *self._power_verdict(at))
         )
 
     def _power_verdict(self, at: Trim) -> tuple[str, ...]:
@@ -146,7 +146,7 @@ class TrimCurve(Shown):
         width = max(map(len, columns)) + 2
         lines = ["".join(f"{head:>{width}}" for head in columns)]
         lines += ["".join(f"{value:>{width}.3f}" for value in row) for row in zip(*columns.values(), strict=True)]
-        return "\n".join([f"Trims of {self.vehicle.card.title}", *lines, *(f"! {words}" for words in self.remarks)])
+        return "\n".join([f"Trims of {self.vehicle.card.title}", *lines, *(f"! {remark}" for remark in self.remarks)])
 
 
 def trim_curve(

@@ -85,7 +85,7 @@ def test_a_bend_and_a_point_that_still_moves_are_told() -> None:
         for c in (0.0, 0.1)
     )
     assert all(check.good for check in straight)
-    assert any("structure beyond the repeats" in check.words and not check.good for check in bent)
+    assert any("structure beyond the repeats" in check.text and not check.good for check in bent)
     time = np.arange(400) / 100
     still, moving = (
         steady.steady_points(
@@ -152,7 +152,7 @@ def test_what_is_held_carries_its_error_and_a_second_measurement_moves_what_lean
     (told,) = joint.add(_result("three", {"drag_x": 2.0}, 1.0))[1]
     assert (joint.values["drag_x"], joint.values["drag_y"]) == pytest.approx((1.5, 6.0))
     np.testing.assert_allclose(joint.among(("drag_x", "drag_y")), [[0.5, 1.0], [1.0, 0.1 + 2.0 + 9.0 * 0.25]])
-    assert told.words == f"drag_x: three and one are {0.5**0.5:+.1f} sigmas apart."
+    assert told.text == f"drag_x: three and one are {0.5**0.5:+.1f} sigmas apart."
 
 
 def _clip(record: BenchRecord) -> BenchRecord:
@@ -261,21 +261,21 @@ def test_ground_effect_is_told_by_the_height_and_by_nothing_else(coax: Vehicle) 
     """At one height it scales thrust alike: residuals stay straight, the factor is too large by what is told."""
     found, doubts = _thrust_checks(coax, Setup(height=0.2))
     assert len(doubts) == 2
-    assert all("0.2 m above the floor, ground effect adds 4.8 % to the thrust" in check.words for check in doubts)
+    assert all("0.2 m above the floor, ground effect adds 4.8 % to the thrust" in check.text for check in doubts)
     gained = found.model.card.values()["k_thrust_lower"] / coax.card.values()["k_thrust_lower"]
     assert gained == pytest.approx(1.0 / (1.0 - (0.171 / 0.8) ** 2), abs=2e-3)
     assert _thrust_checks(coax, Setup(height=2.0))[1] == []
     free, doubts = _thrust_checks(coax, Setup())
     assert doubts == []
-    assert any("does not say how high" in check.words for check in free.details.results[0].checks)
+    assert any("does not say how high" in check.text for check in free.details.results[0].checks)
 
 
 def test_vibration_is_told(coax: Vehicle) -> None:
     assert _thrust_checks(coax, Setup())[1] == []
     found = _thrust_checks(coax, Setup())[0].details.results[0].checks
-    assert any("with the rotors off: the rest is vibration" in check.words for check in found)
+    assert any("with the rotors off: the rest is vibration" in check.text for check in found)
     strong = _thrust_checks(coax, Setup(force_vibration=4.0))[1]
-    assert any("as much as what is measured" in check.words for check in strong)
+    assert any("as much as what is measured" in check.text for check in strong)
 
 
 def test_a_moment_that_bends_with_the_tilt_is_told(coax: Vehicle, records: Records) -> None:
@@ -284,7 +284,7 @@ def test_a_moment_that_bends_with_the_tilt_is_told(coax: Vehicle, records: Recor
     stiffer = 1.0 + 0.1 * (np.hypot(record["servo_roll"], record["servo_pitch"]) / 0.75) ** 2
     for change, good in ((1.0 + 0.0 * stiffer, True), (stiffer, False)):
         found = evaluate([_changed(record, Mx=change * record["Mx"], My=change * record["My"])], coax)
-        doubts = [check.words for check in found.details.results[0].checks if not check.good]
+        doubts = [check.text for check in found.details.results[0].checks if not check.good]
         assert (doubts == []) == good
     assert any("My [N m]: the residuals have a structure beyond the repeats" in words for words in doubts)
 
@@ -292,7 +292,7 @@ def test_a_moment_that_bends_with_the_tilt_is_told(coax: Vehicle, records: Recor
 def test_a_drift_of_the_sensor_is_told(coax: Vehicle, records: Records) -> None:
     record = records["swashplate"]
     found = evaluate([_changed(record, Fx=record["Fx"] + 0.3 / 60.0 * record["time"])], coax)
-    words = [check.words for check in found.details.results[0].checks]
+    words = [check.text for check in found.details.results[0].checks]
     assert any("Fx [N] drifted by 0.3" in told and "takes a steady drift out" in told for told in words)
     entry, truth = found.model.card.parameters["linkage_lower"], coax.card.values()["linkage_lower"]
     assert abs(entry.value - truth) < 4.0 * (entry.sigma or 0.0)
@@ -307,7 +307,7 @@ def test_a_rotor_at_a_multiple_of_the_sample_rate_is_told(coax: Vehicle) -> None
         found = steady.steady_points(BenchRecord("r", ("thrust",), channels), ("Fz", "omega_upper"))
         check = checks.check_vibration(found, "Fz")
         assert check.good == good
-        assert ("looks like a steady load" in check.words) != good
+        assert ("looks like a steady load" in check.text) != good
 
 
 def test_what_has_no_record_keeps_the_published_value(coax: Vehicle, records: Records, tmp_path: Path) -> None:

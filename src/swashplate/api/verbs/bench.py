@@ -105,7 +105,7 @@ class PlanBench(OnBench["MeasurementPlan"]):
     def text(self, answer: MeasurementPlan, width: int) -> list[Any]:
         from swashplate.text_table import text_columns as table
 
-        rows = [(r.name, ", ".join(r.procedures), f"{r.duration:.0f}", r.words) for r in answer.records]
+        rows = [(r.name, ", ".join(r.procedures), f"{r.duration:.0f}", r.about) for r in answer.records]
         cells = [
             (a.name, f"{a.value:.5g}", f"{a.sigma:.2g}", a.unit, str(a.repeats or "too many"), ", ".join(a.procedures))
             for a in answer.aims
