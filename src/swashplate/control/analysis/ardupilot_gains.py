@@ -139,16 +139,16 @@ class Suggestion(Shown):
         def margins(f: LoopFigures) -> dict[str, list[float]]:
             return {name: [r.value, r.sigma] for name, r in vars(f.margins).items()}
 
-        told: dict[str, Any] = {k: v for k, v in vars(self).items() if k != "loop"}
-        told |= {"figures_suggested": read(self.figures_suggested), "figures_flown": read(self.figures_flown)}
-        told |= {"margins": margins(self.figures_suggested), "flown_margins": margins(self.figures_flown)}
-        return told | {"refused": self.refused}
+        document: dict[str, Any] = {k: v for k, v in vars(self).items() if k != "loop"}
+        document |= {"figures_suggested": read(self.figures_suggested), "figures_flown": read(self.figures_flown)}
+        document |= {"margins": margins(self.figures_suggested), "flown_margins": margins(self.figures_flown)}
+        return document | {"refused": self.refused}
 
     def table(self) -> list[tuple[str, str, str]]:
         """What the loop is worth: a name with its unit, suggested, flown."""
-        told = [_told(f) for f in (self.figures_suggested, self.figures_flown)]
+        columns = [_told(f) for f in (self.figures_suggested, self.figures_flown)]
         coupled = any(np.isfinite(f.coupling) for f in (self.figures_suggested, self.figures_flown))
-        return [(name, ours, theirs) for (name, ours), (_, theirs) in zip(*told, strict=True)][
+        return [(name, ours, theirs) for (name, ours), (_, theirs) in zip(*columns, strict=True)][
             : None if coupled else -1
         ]
 
@@ -171,8 +171,8 @@ def _told(f: LoopFigures) -> list[tuple[str, str]]:
     def number(value: float, scale: float = 1.0) -> str:
         return f"{scale * value:.3g}" if np.isfinite(value) else "-"
 
-    def margin(words: str) -> str:
-        return words if judged else "-"
+    def margin(text: str) -> str:
+        return text if judged else "-"
 
     return [
         ("phase margin [deg]", margin(f"{f.margins.phase_margin!r}")),
@@ -218,7 +218,7 @@ def suggest_gains(
     """
     known, behind = dict(autopilot or {}), dict(sources or {})
     fit, answering = (model, model.solution) if isinstance(model, Result) else (None, structure_of(model))
-    made = []
+    suggestions = []
     for axis, (rate, command) in axes_of(known).items():
         rates = [o for o in answering.outputs if behind.get(o, o) in (rate, f"{rate}_sid")]
         commands = [i for i in answering.inputs if behind.get(i, i) == command]
@@ -227,8 +227,8 @@ def suggest_gains(
             gyro = known.get("INS_GYRO_FILTER", 0.0) if raw else 0.0
             filters = filters_of(axis, known)
             loop = RateLoop(answering, axis, rates[0], commands[0], filters, gyro, _in_time(model), fit)
-            made.append(_suggest(loop, known, premise(rates[0], commands[0]) if premise else ""))
-    return tuple(_with_words(s, beware(s.axis, known)) for s in _with_coupling(made))
+            suggestions.append(_suggest(loop, known, premise(rates[0], commands[0]) if premise else ""))
+    return tuple(_with_words(s, beware(s.axis, known)) for s in _with_coupling(suggestions))
 
 
 def _in_time(model: Vehicle | StateSpaceModel | Fitted) -> StateSpaceModel | None:
@@ -258,8 +258,8 @@ def _suggest(loop: RateLoop, known: Mapping[str, float], refused: str) -> Sugges
         return none(refuted)
     gains = _best(loop, omega)
     if gains is None:
-        told = f"{PHASE_MARGIN:g} degrees, {GAIN_MARGIN:g} dB and a sensitivity of {PEAK:g}"
-        return none(f"no gains tried that the firmware can hold keep {told}.", as_flown)
+        required = f"{PHASE_MARGIN:g} degrees, {GAIN_MARGIN:g} dB and a sensitivity of {PEAK:g}"
+        return none(f"no gains tried that the firmware can hold keep {required}.", as_flown)
     if turned := refused_by_sign(short(gains)):
         return none(turned, as_flown)
     suggestion = Suggestion(loop.axis, gains, loop.figures(gains, omega), flown, as_flown, loop)
@@ -346,12 +346,12 @@ def _keep(loops: Complex) -> NDArray[np.bool_]:
     return np.asarray(~encircled & ~narrow & ~loud.any(axis=1) & ~near & ~above[:, -1])
 
 
-def _with_coupling(made: Sequence[Suggestion]) -> list[Suggestion]:
+def _with_coupling(single: Sequence[Suggestion]) -> list[Suggestion]:
     """With what the axes do to each other, where all of them have gains."""
-    suggestions, loops = list(made), tuple(s.loop for s in made)
+    suggestions, loops = list(single), tuple(s.loop for s in single)
     for gains, figures in (("parameters", "figures_suggested"), ("flown", "figures_flown")):
-        sets = tuple(getattr(s, gains) for s in made)
-        if all({"P", "I", "D", "FF"} & set(short(k)) for k in sets) and all(np.isfinite(s.peak) for s in made):
+        sets = tuple(getattr(s, gains) for s in single)
+        if all({"P", "I", "D", "FF"} & set(short(k)) for k in sets) and all(np.isfinite(s.peak) for s in single):
             joined = couplings(loops, sets, SEEN)
             suggestions = [
                 replace(s, **{figures: replace(getattr(s, figures), coupling=value)})
@@ -366,20 +366,20 @@ def _with_words(s: Suggestion, besides: str) -> Suggestion:
     if s.parameters == s.flown:
         return replace(s, words=f"Keep what you fly: nothing that was tried is better.{besides}")
     changes = gain_changes(s.figures_flown, s.figures_suggested)
-    buys = tuple(words for words, good in changes if good)
-    costs = tuple(words for words, good in changes if not good)
-    words = (
+    buys = tuple(text for text, good in changes if good)
+    costs = tuple(text for text, good in changes if not good)
+    text = (
         f"Keeps {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g} dB on the model, one axis at a time. Fly the feed-forward "
         "first with P, I and D at a third, then raise them."
     )
     if s.figures_suggested.overshoot > OVERSHOOT:
         size = f"{100.0 * s.figures_suggested.overshoot:.0f} %"
-        words += f" A step of the demand overshoots by {size} with the slowest filter tried: give it soft demands."
+        text += f" A step of the demand overshoots by {size} with the slowest filter tried: give it soft demands."
     if not s.flown:
-        words += " The log holds no flown gains: there is nothing to compare with."
-    words += besides
+        text += " The log holds no flown gains: there is nothing to compare with."
+    text += besides
     if not np.isfinite(s.loop.steady):
-        words += " Under a steady command the rate settles slowly or not at all: no feed-forward."
+        text += " Under a steady command the rate settles slowly or not at all: no feed-forward."
     if s.loop.unstable:
-        words += f" The slow mode that grows ({s.loop.unstable:.2g} rad/s) is left to the attitude loop."
-    return replace(s, words=words, buys=buys, costs=costs)
+        text += f" The slow mode that grows ({s.loop.unstable:.2g} rad/s) is left to the attitude loop."
+    return replace(s, words=text, buys=buys, costs=costs)

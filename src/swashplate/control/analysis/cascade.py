@@ -75,16 +75,16 @@ def cascade_plant(
     """
     model, w = linearize(vehicle, trim), omega
     at = mixer.unmixed(trim.inputs, parameters)
-    moved = _STEP * np.eye(len(COMMANDS))
-    ends = (np.asarray(_mixed(mixer, at + sign * moved, dict(parameters))) for sign in (1.0, -1.0))
+    steps = _STEP * np.eye(len(COMMANDS))
+    ends = (np.asarray(_mixed(mixer, at + sign * steps, dict(parameters))) for sign in (1.0, -1.0))
     effect = np.subtract(*ends).T[: len(vehicle.input_names)] / (2.0 * _STEP)
-    late = np.exp(-1j * w[:, None] * (delays[None, :] + 0.5 / rate))
+    lag = np.exp(-1j * w[:, None] * (delays[None, :] + 0.5 / rate))
     n = len(model.states)
-    states = np.linalg.solve(1j * w[:, None, None] * np.eye(n) - model.A, (model.B[None] * late[:, None, :]) @ effect)
+    states = np.linalg.solve(1j * w[:, None, None] * np.eye(n) - model.A, (model.B[None] * lag[:, None, :]) @ effect)
     rows = [model.states.index(name) for name in ("p", "q", "r", "phi", "theta", "psi", "x", "y", "z")]
-    seen = states[:, rows]
-    speeds = 1j * w[:, None, None] * seen[:, 6:]
-    response = np.concatenate([seen[:, :6], speeds, seen[:, 6:]], axis=1, dtype=np.complex128)
+    outputs = states[:, rows]
+    speeds = 1j * w[:, None, None] * outputs[:, 6:]
+    response = np.concatenate([outputs[:, :6], speeds, outputs[:, 6:]], axis=1, dtype=np.complex128)
     for i, (command, output) in enumerate(zip(COMMANDS, ("p", "q", "r", "down"), strict=True)):
         if not np.max(np.abs(response[:, OUTPUTS.index(output), i])) > 1e-9:
             raise ControllerError(f"the {command} command moves no {output}.", where=vehicle.name, channel=command)

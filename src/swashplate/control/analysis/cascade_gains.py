@@ -143,8 +143,8 @@ def judge_cascade(
     Raises:
         ControllerError: naming the command that the vehicle turns against.
     """
-    k, late = law.parameters, _row(vehicle, delays) + law.output_delays
-    plant = cascade_plant(vehicle, hover, law.mixer, k, rate=law.rate, delays=late)
+    k, delay_row = law.parameters, _row(vehicle, delays) + law.output_delays
+    plant = cascade_plant(vehicle, hover, law.mixer, k, rate=law.rate, delays=delay_row)
     refuse_turned_commands(plant.omega, plant.response, commands=COMMANDS, outputs=OUTPUTS, where=vehicle.name)
     whole, inner = feedback(plant.omega, k), feedback(plant.omega, k, place=False)
     commands, leans = broken_at_commands(plant, whole, (0, 1, 2, 3)), broken_at_leans(plant, inner, whole)
@@ -172,10 +172,10 @@ def cascade_gains(
     """
     if unmoved := refused_by_card(vehicle.card):
         raise ControllerError(f"no gains are given: {unmoved}", where=vehicle.name)
-    late = _row(vehicle, delays) + start.output_delays
+    delay_row = _row(vehicle, delays) + start.output_delays
     open_loops = {f"ATC_RAT_{axis}_{name}": 0.0 for axis in AXES for name in "PID"}
     k: dict[str, float] = {**start.parameters, **open_loops}
-    plant = cascade_plant(vehicle, hover, start.mixer, k, rate=start.rate, delays=late, omega=COARSE)
+    plant = cascade_plant(vehicle, hover, start.mixer, k, rate=start.rate, delays=delay_row, omega=COARSE)
     refuse_turned_commands(plant.omega, plant.response, commands=COMMANDS, outputs=OUTPUTS, where=vehicle.name)
     law = start
 
@@ -202,12 +202,12 @@ def cascade_gains(
                     return
                 if np.any(modes.real > _STILL):
                     growing.add(float(loops.turns[i]))
-        told = f"{len(order)} of {len(worth)} sets keep {GAIN_KEPT:g} dB, {PHASE_KEPT:g} degrees and a sensitivity of "
-        told += f"{PEAK_KEPT:g} with every loop around it" + (
+        text = f"{len(order)} of {len(worth)} sets keep {GAIN_KEPT:g} dB, {PHASE_KEPT:g} degrees and a sensitivity of "
+        text += f"{PEAK_KEPT:g} with every loop around it" + (
             ", and a mode grows or hardly decays with each" if order else ""
         )
         raise ControllerError(
-            f"no gains of the {stage} loop hold: {told}.",
+            f"no gains of the {stage} loop hold: {text}.",
             where=vehicle.name,
             hint="Less delay or faster filters would leave room; fly this one by hand first.",
         )
@@ -228,8 +228,8 @@ def _modes(
     vehicle: Vehicle, hover: Trim, law: ArduPilotLaw, mode: FlightMode, delays: Mapping[str, float]
 ) -> NDArray[np.complex128]:
     """Modes of the law about the hover [1/s], the least stable first, without memories that nothing moves."""
-    flown = law.in_mode(mode).at(vehicle, hover)
-    modes = modes_of(sampled_loop(vehicle, flown, hover, delays=dict(delays)))
+    moded = law.in_mode(mode).at(vehicle, hover)
+    modes = modes_of(sampled_loop(vehicle, moded, hover, delays=dict(delays)))
     return modes[np.abs(modes) > _STILL]
 
 
@@ -248,8 +248,8 @@ def _placed(plant: CascadePlant, trial: Mapping[str, Array | float]) -> BrokenLo
 
 def largest_rate(plant: CascadePlant, output: str, command: int) -> float:
     """The largest rate per command from 1 to 10 rad/s [rad/s]."""
-    seen = (plant.omega >= _SEEN[0]) & (plant.omega <= _SEEN[1])
-    return float(np.max(np.abs(plant.response[seen, OUTPUTS.index(output), command])))
+    band = (plant.omega >= _SEEN[0]) & (plant.omega <= _SEEN[1])
+    return float(np.max(np.abs(plant.response[band, OUTPUTS.index(output), command])))
 
 
 def _attitude_sets(plant: CascadePlant, k: Mapping[str, float], axes: tuple[int, ...]) -> dict[str, Array]:
@@ -272,13 +272,13 @@ def _attitude_sets(plant: CascadePlant, k: Mapping[str, float], axes: tuple[int,
 
 def _height_sets(plant: CascadePlant, k: Mapping[str, float]) -> dict[str, Array]:
     """The integral is the acceleration's, or the climb's where the law has none of the acceleration (PX4)."""
-    seen = (plant.omega >= _SEEN[0]) & (plant.omega <= _SEEN[1])
-    lift = 1j * plant.omega[seen] * plant.response[seen, OUTPUTS.index("down"), 3]
+    band = (plant.omega >= _SEEN[0]) & (plant.omega <= _SEEN[1])
+    lift = 1j * plant.omega[band] * plant.response[band, OUTPUTS.index("down"), 3]
     one, shares = 10.0 / float(np.max(np.abs(lift))), np.geomspace(0.02, 1.5, 14)
     grid = np.array(list(product(shares, (0.5, 1.0, 2.0), (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0), (0.3, 0.5, 0.7, 1.0)))).T
     sets = {"PSC_ACCZ_P": grid[0] * one, "PSC_VELZ_P": grid[2], "PSC_POSZ_P": grid[3] * np.minimum(1.0, grid[2])}
-    own = k["PSC_ACCZ_I"] > 0.0
-    return sets | ({"PSC_ACCZ_I": grid[1] * grid[0] * one} if own else {"PSC_VELZ_I": 0.3 * grid[1] * grid[2]})
+    integral = k["PSC_ACCZ_I"] > 0.0
+    return sets | ({"PSC_ACCZ_I": grid[1] * grid[0] * one} if integral else {"PSC_VELZ_I": 0.3 * grid[1] * grid[2]})
 
 
 def _place_sets() -> dict[str, Array]:

@@ -198,11 +198,13 @@ def check_controller(
     if duration <= COUPLING_WITHIN:
         raise SwashError(f"is {duration:g} s, expected more than {COUPLING_WITHIN:g} s.", channel="duration")
     n = scale if scale is not None else _scale_of(vehicle)
-    late = dict(zip(vehicle.input_names, flown_delays(vehicle, controller, delays=delays).tolist(), strict=True))
+    delay_by_input = dict(
+        zip(vehicle.input_names, flown_delays(vehicle, controller, delays=delays).tolist(), strict=True)
+    )
     room = 1.0 / controller.rate + (computation or 0.0) if required_delay is None else required_delay
     if not 0.0 <= room <= _LONGEST_DELAY:
         raise SwashError(f"is {room:g} s, expected 0 to {_LONGEST_DELAY:g}.", channel="delay margin")
-    flying = Aircraft(vehicle, trim, late)
+    flying = Aircraft(vehicle, trim, delay_by_input)
     kind, problems = kind_of(controller), list[str]()
     judged = kind.judged(controller, flying)
     loop, notes = judged.loop, list(judged.notes)
@@ -212,7 +214,7 @@ def check_controller(
         margins = margins_of(loop, points=len(w), where=vehicle.name)
     except ControllerError as error:
         problems.append(f"No margins: {error.problem}")
-    told = judged.held is None  # the loop has the references in it
+    separate = judged.held is None  # the loop has the references in it
     if judged.held is None:
         held = tuple(r for r, (s, _, _) in STEPS.items() if s in loop.states and loop.answers(r, s))
     else:
@@ -220,7 +222,7 @@ def check_controller(
     left = {state: judged.sensitivity(w, state) for state in _DISTURBED} if margins else {}
     steps = fly_steps(flying, controller, held, duration, problems)
     blown = fly_gusts(flying, controller, gusts, held if margins else (), duration, problems, notes)
-    commanded = _commanded(loop) if told else []
+    commanded = _commanded(loop) if separate else []
     check = ControlCheck(
         vehicle=vehicle,
         trim=trim,
@@ -229,8 +231,8 @@ def check_controller(
         task=task,
         modes=modes_of(loop),
         margins=margins,
-        omega=w if told else w[:0],
-        opened=loop.opened(w) if told else np.zeros(0, dtype=np.complex128),
+        omega=w if separate else w[:0],
+        opened=loop.opened(w) if separate else np.zeros(0, dtype=np.complex128),
         attitudes=tuple(_attitude(loop, w, state, BANDWIDTH[task], command, n) for state in commanded),
         rejections=_rejections(w, {state: np.abs(s) for state, s in left.items() if s is not None}, n),
         steps=tuple(steps),
@@ -238,7 +240,7 @@ def check_controller(
         problems=tuple(problems),
         notes=(*notes, *kind.differences(controller, flying, margins)),
         in_gusts=blown,
-        delays=late,
+        delays=delay_by_input,
     )
     return with_delay_verdict(check, room)
 
@@ -249,10 +251,10 @@ def with_delay_verdict(check: ControlCheck, required: float) -> ControlCheck:
     problems = check.problems
     if check.margins is not None and check.margins.least_delay < required:
         short = [a for a in check.margins.axes if a.delay < required]
-        told = [f"{a.name} {delay_words(a.delay)}" for a in short]
+        short_of = [f"{a.name} {delay_words(a.delay)}" for a in short]
         if check.margins.delay < required:
-            told.append(f"all inputs together {delay_words(check.margins.delay)}")
-        problems = (*problems, f"Delay margin: {', '.join(told)}; required are {boundary.level1:.3g} ms.")
+            short_of.append(f"all inputs together {delay_words(check.margins.delay)}")
+        problems = (*problems, f"Delay margin: {', '.join(short_of)}; required are {boundary.level1:.3g} ms.")
     return replace(check, problems=problems, delay_boundary=boundary)
 
 

@@ -54,16 +54,16 @@ def step_metrics(time: Array, values: Array, *, wanted: float | None = None, rat
             one that ends below a third of its peak (a command that an outer loop takes back) has no rise or settling.
         rates: measured derivative; differences of the values where not given.
     """
-    moved = np.asarray(values, dtype=np.float64) - values[0]
+    change_of = np.asarray(values, dtype=np.float64) - values[0]
     t = np.asarray(time, dtype=np.float64) - time[0]
-    largest = float(np.max(np.abs(moved)))
-    derivative = np.gradient(moved, t) if rates is None else np.asarray(rates, dtype=np.float64)
+    largest = float(np.max(np.abs(change_of)))
+    derivative = np.gradient(change_of, t) if rates is None else np.asarray(rates, dtype=np.float64)
     quickness = float(np.max(np.abs(derivative))) / largest if largest > 0.0 else float("nan")
     nothing = float("nan")
-    final = wanted if wanted is not None else float(np.mean(moved[-max(1, int(_TAIL * moved.size)) :]))
+    final = wanted if wanted is not None else float(np.mean(change_of[-max(1, int(_TAIL * change_of.size)) :]))
     if largest == 0.0 or final == 0.0 or (wanted is None and abs(final) < largest / 3.0):
         return StepMetrics(nothing, nothing, nothing, largest, quickness, nothing)
-    share = moved / final
+    share = change_of / final
     low, high = (_first(t, share, level) for level in (0.1, 0.9))
     outside = np.flatnonzero(np.abs(share - 1.0) > _SETTLED)
     settled = 0.0 if not outside.size else nothing if outside[-1] == t.size - 1 else float(t[outside[-1] + 1])

@@ -43,8 +43,8 @@ def gain_changes(flown: LoopFigures, suggested: LoopFigures) -> list[tuple[str, 
         change = scale * (after - before)
         if not abs(change) >= (least * abs(scale * before) if relative and np.isfinite(before) else least):
             continue  # NaN is no change either
-        words = f"{what} {_plain(scale * before)} -> {_plain(scale * after)} {unit}".rstrip()
-        changes.append((words, (change > 0.0) == larger))
+        text = f"{what} {_plain(scale * before)} -> {_plain(scale * after)} {unit}".rstrip()
+        changes.append((text, (change > 0.0) == larger))
     return changes
 
 

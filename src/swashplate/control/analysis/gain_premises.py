@@ -50,16 +50,16 @@ def refused_by_data(fit: Fitted, responses: FrequencyResponse, rate: str, comman
 
 
 def _not_moved(responses: FrequencyResponse, command: str) -> str:
-    told = responses.settings.get("excitation", {})
-    name = next((n for n in (command, responses.settings.get("channels", {}).get(command)) if n in told), None)
+    excitation = responses.settings.get("excitation", {})
+    name = next((n for n in (command, responses.settings.get("channels", {}).get(command)) if n in excitation), None)
     if name is None:
         return f"nothing tells what moved '{command}': it may be the controller's answer to the motion. {FLY}"
-    if told[name]["kind"] in OUTSIDE:
+    if excitation[name]["kind"] in OUTSIDE:
         return ""
-    words = told[name]["words"]
+    evidence = excitation[name]["words"]
     return (
-        f"'{command}' was not moved from outside, as far as the log tells ({told[name]['kind']}): {words}"
-        f"{'' if FLY in words else f' {FLY}'}"
+        f"'{command}' was not moved from outside, as far as the log tells ({excitation[name]['kind']}): {evidence}"
+        f"{'' if FLY in evidence else f' {FLY}'}"
     )
 
 
@@ -136,13 +136,13 @@ def refuse_turned_commands(
     Raises:
         ControllerError: naming the command.
     """
-    seen = (omega >= _SEEN[0]) & (omega <= _SEEN[1])
+    band = (omega >= _SEEN[0]) & (omega <= _SEEN[1])
     for command, output, sense in _TURNS:
-        h = response[seen, outputs.index(output), commands.index(command)]
-        told, _, misfit = sign_of(omega[seen], h, integrations=1)
-        if told == -sense:
+        h = response[band, outputs.index(output), commands.index(command)]
+        sign, _, misfit = sign_of(omega[band], h, integrations=1)
+        if sign == -sense:
             raise ControllerError(
-                f"a positive {command} command makes {output} {SIGNED[told]}, expected {SIGNED[sense]} (with the "
+                f"a positive {command} command makes {output} {SIGNED[sign]}, expected {SIGNED[sense]} (with the "
                 f"sign turned it is {misfit[0]:.2f} rad off, as it is {misfit[1]:.2f}): no gains are given.",
                 where=where,
                 channel=command,

@@ -77,11 +77,11 @@ def filters_of(axis: str, known: Mapping[str, float]) -> dict[str, float]:
 
 def short(gains: Mapping[str, float]) -> dict[str, float]:
     """Gains as a loop of rad/s has them, by short names, from either firmware's."""
-    own = {name: (axis, key) for axis in ROTORFLIGHT for key, name in names_of(axis).items()}
+    known_names = {name: (axis, key) for axis in ROTORFLIGHT for key, name in names_of(axis).items()}
     by_short = {}
     for name, value in gains.items():
-        if name in own:
-            axis, key = own[name]
+        if name in known_names:
+            axis, key = known_names[name]
             by_short[key] = float(value) * _unit(axis, key)
         else:
             by_short[name.rsplit("_", 1)[-1]] = float(value)
@@ -119,11 +119,11 @@ def beware(axis: str, known: Mapping[str, float]) -> str:
     if axis not in ROTORFLIGHT:
         return ""
     stops: Sequence[float] = [known[name] for name in ("yaw_stop_gain_0", "yaw_stop_gain_1") if name in known]
-    words = " Boost, relax and decay of the error are not in the loop that was judged."
+    text = " Boost, relax and decay of the error are not in the loop that was judged."
     if axis == "yaw" and stops and max(stops) > 100.0:
         lost = 20.0 * math.log10(max(stops) / 100.0)
-        words += f" The stop gain of {max(stops):g} % multiplies P: take {lost:.1f} dB from the gain margin."
-    return words
+        text += f" The stop gain of {max(stops):g} % multiplies P: take {lost:.1f} dB from the gain margin."
+    return text
 
 
 def _unit(axis: str, key: str) -> float:

@@ -165,12 +165,12 @@ class RateLoop:
         a, b, c, d = self.structure.explicit()
         kept = [k for k, name in enumerate(self.structure.states) if name not in _SLOWER]
         i, o = self.structure.inputs.index(self.command), self.structure.outputs.index(self.rate)
-        fast, through, seen = a[np.ix_(kept, kept)], float(d[o, i]), c[o, kept]
+        fast, through, fast_row = a[np.ix_(kept, kept)], float(d[o, i]), c[o, kept]
         if kept and np.max(np.linalg.eigvals(fast).real) >= 0.0:
             return NAN
         reached = np.linalg.solve(fast, b[kept, i]) if kept else np.zeros(0)
-        settled = through - float(seen @ reached)
-        missing = float(seen @ expm(fast * _SETTLING) @ reached) if kept else 0.0
+        settled = through - float(fast_row @ reached)
+        missing = float(fast_row @ expm(fast * _SETTLING) @ reached) if kept else 0.0
         return settled if settled and abs(missing) <= _SETTLED * abs(settled) else NAN
 
     @property

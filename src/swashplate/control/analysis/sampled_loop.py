@@ -58,8 +58,8 @@ class SampledLoop:
 
     def answers(self, reference: str, state: str) -> bool:
         """Whether a state moves when a reference does."""
-        seen = self.response(np.geomspace(0.1, 1.0, 3) * self.rate, reference, state)
-        return bool(np.max(np.abs(seen)) > _NOTHING)
+        response = self.response(np.geomspace(0.1, 1.0, 3) * self.rate, reference, state)
+        return bool(np.max(np.abs(response)) > _NOTHING)
 
     def opened(self, frequencies: Array) -> Complex:
         """The loop opened at the inputs, for negative feedback, shape (frequencies, inputs, inputs).
@@ -128,8 +128,8 @@ def sampled_loop(
     late = flown_delays(vehicle, controller, delays=delays)
 
     def made(further: Array) -> SampledLoop:
-        F, G, before, whole = held_late(around.A, around.B, 1.0 / controller.rate, (late + further).tolist())
-        F, G, added = with_late_inputs(F, G, whole, before)
+        F, G, before, samples = held_late(around.A, around.B, 1.0 / controller.rate, (late + further).tolist())
+        F, G, added = with_late_inputs(F, G, samples, before)
         n, more = len(vehicle.state_names), len(added)
         command, memory = (np.hstack([d[:, :n], np.zeros((len(d), more)), d[:, n:]]) for d in parts[:2])
         names = (*vehicle.state_names, *(f"{vehicle.input_names[j]} {ago} ago" for j, ago in added))

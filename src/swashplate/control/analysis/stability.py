@@ -111,17 +111,17 @@ def margins_at(
             otherwise by phase over crossover.
     """
     w, L, names = opened_at(loop, inputs, points=points)
-    plain = margins(w, L, names)
+    by_axis = margins(w, L, names)
     if not exact or loop.later is None:
-        return plain
+        return by_axis
     S = np.linalg.inv(np.eye(len(names)) + L)
     axes = tuple(
         replace(
             axis, delay=delay_margin(loop, [axis.name], crossing_delays(w, (1.0 / S[:, i, i] - 1.0)[:, None, None]))
         )
-        for i, axis in enumerate(plain.axes)
+        for i, axis in enumerate(by_axis.axes)
     )
-    return replace(plain, axes=axes, delay=delay_margin(loop, names, crossing_delays(w, L)))
+    return replace(by_axis, axes=axes, delay=delay_margin(loop, names, crossing_delays(w, L)))
 
 
 def delay_margin(loop: SampledLoop, inputs: Sequence[str], guesses: NDArray[np.float64]) -> float:
@@ -176,8 +176,8 @@ def opened_at(
     if len(kept) < len(loop.inputs):
         inner = np.linalg.inv(np.eye(len(loop.inputs)) + L)[:, kept][:, :, kept]
         L = np.asarray(np.linalg.inv(inner) - np.eye(len(kept)), dtype=np.complex128)
-    moved = [i for i in range(len(kept)) if np.any(np.abs(L[:, i, i]) > _NO_LOOP)]
-    return w, L[:, moved][:, :, moved], tuple(loop.inputs[kept[i]] for i in moved)
+    closed = [i for i in range(len(kept)) if np.any(np.abs(L[:, i, i]) > _NO_LOOP)]
+    return w, L[:, closed][:, :, closed], tuple(loop.inputs[kept[i]] for i in closed)
 
 
 def require_stable(mode: complex, *, rate: float, where: str) -> None:

@@ -83,8 +83,8 @@ def step_paths(
     Raises:
         ControllerError: where no flight covers the distance.
     """
-    flown = _fly(vehicle, controller, trim, command, duration, size, parameters)
-    return paths_of(flown, command, distance)
+    batch = _fly(vehicle, controller, trim, command, duration, size, parameters)
+    return paths_of(batch, command, distance)
 
 
 def step_run(
@@ -108,9 +108,9 @@ def step_run(
     Raises:
         ControllerError: where no flight covers the distance.
     """
-    own = _fly(vehicle, controller, trim, command, duration, 1, None)
-    path = paths_of(own, command, distance)
-    flight = own.flight(0).between(0.0, float(path.time[0]))
+    batch = _fly(vehicle, controller, trim, command, duration, 1, None)
+    path = paths_of(batch, command, distance)
+    flight = batch.flight(0).between(0.0, float(path.time[0]))
     if not parameters and not wind:
         return StepRun(flight, path, None, ())
     size = next(values.shape[-1] for values in (*(parameters or {}).values(), *(wind or {}).values()))
@@ -155,8 +155,8 @@ def command_for_speed(
     fastest = 0.0
     for _ in range(_HALVINGS):
         command = 0.5 * (low + high) if fastest else high
-        flown = _fly(vehicle, controller, trim, command, duration, 1, None)
-        x, y, u = (flown[name][:, 0] for name in ("x", "y", "u"))
+        batch = _fly(vehicle, controller, trim, command, duration, 1, None)
+        x, y, u = (batch[name][:, 0] for name in ("x", "y", "u"))
         covered = np.flatnonzero(~(np.hypot(x, y) < distance))
         reached = float(np.nanmax(u[: covered[0] + 1] if covered.size else u))
         if not fastest:
@@ -195,19 +195,19 @@ def _fly(
     )
 
 
-def paths_of(flown: Batch, command: float, distance: float) -> Path:
+def paths_of(batch: Batch, command: float, distance: float) -> Path:
     """Where flights went until they had covered a distance [m]; `command` is what they were asked for, for messages.
 
     Raises:
         ControllerError: where no flight covers it.
     """
-    x, y, u = flown["x"], flown["y"], flown["u"]
+    x, y, u = batch["x"], batch["y"], batch["u"]
     covered = np.hypot(x, y) >= distance
     arrived = np.any(covered, axis=0)
     if not np.any(arrived):
         raise ControllerError(
-            f"no flight covers {distance:g} m in {flown.time[-1]:.0f} s with a pitch command of {command:g}.",
-            where=flown.vehicle.name,
+            f"no flight covers {distance:g} m in {batch.time[-1]:.0f} s with a pitch command of {command:g}.",
+            where=batch.vehicle.name,
             hint="Give a larger step or more time.",
         )
     last = np.argmax(covered, axis=0)
@@ -222,5 +222,5 @@ def paths_of(flown: Batch, command: float, distance: float) -> Path:
         leftmost=told(np.min(np.where(under_way, y, np.inf), axis=0)),
         rightmost=told(np.max(np.where(under_way, y, -np.inf), axis=0)),
         speed=told(np.max(np.where(under_way, u, -np.inf), axis=0)),
-        time=told(flown.time[last]),
+        time=told(batch.time[last]),
     )

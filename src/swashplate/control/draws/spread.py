@@ -60,8 +60,8 @@ class Limits:
     def words(self) -> str:
         """The limits in the units that they are shown in."""
         values = asdict(self)
-        told = [f"{n} {values[n] * f:g} {u}" for n, (u, f) in SHOWN.items() if math.isfinite(values[n])]
-        return ", ".join(told) or "none"
+        listed = [f"{n} {values[n] * f:g} {u}" for n, (u, f) in SHOWN.items() if math.isfinite(values[n])]
+        return ", ".join(listed) or "none"
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,8 @@ class Spread:
             rows.append((label, *(f"{v:.4g}" for v in figures[label]), bound, str(counts[name])))
         when = self.lost_after[self.worst]
         after = f", lost after {when:.2f} s" if math.isfinite(when) else ""
-        told = f"{self.flights} flights, {self.lost} lost; worst is number {self.worst}{after}"
-        return f"{told}\n{text_table(head, rows)}"
+        head_line = f"{self.flights} flights, {self.lost} lost; worst is number {self.worst}{after}"
+        return f"{head_line}\n{text_table(head, rows)}"
 
 
 def spread(batch: Batch, trim: Trim, *, limits: Limits | None = None) -> Spread:
@@ -158,18 +158,18 @@ def spread(batch: Batch, trim: Trim, *, limits: Limits | None = None) -> Spread:
         "heading": np.abs(psi),
     }
     series = {name: np.where(np.isfinite(values), values, np.inf) for name, values in series.items()}
-    whole = np.all([np.isfinite(values) for values in series.values()], axis=0)
-    series = {name: np.where(whole, values, np.inf) for name, values in series.items()}  # diverged in all at once
+    finite = np.all([np.isfinite(values) for values in series.values()], axis=0)
+    series = {name: np.where(finite, values, np.inf) for name, values in series.items()}  # diverged in all at once
     largest = {name: np.max(values, axis=0) for name, values in series.items()}
-    beyond: NDArray[np.bool_] = ~whole
+    beyond: NDArray[np.bool_] = ~finite
     excess = np.zeros(level.shape[1])
     for name, bound in asdict(bounds).items():
         beyond = beyond | (series[name] > bound)
         excess = np.maximum(excess, largest[name] / bound if math.isfinite(bound) else 0.0)
-    lost = np.any(beyond, axis=0) | ~np.all(whole, axis=0)
+    lost = np.any(beyond, axis=0) | ~np.all(finite, axis=0)
     after = np.where(lost, batch.time[np.argmax(beyond, axis=0)], np.inf)
     with np.errstate(invalid="ignore", over="ignore"):
-        rms = np.sqrt(np.mean(np.where(whole, level, np.inf) ** 2, axis=0))
+        rms = np.sqrt(np.mean(np.where(finite, level, np.inf) ** 2, axis=0))
     far = np.hypot(largest["place"], largest["height"]) if not np.any(lost) else np.where(lost, excess, -np.inf)
     # Of those that diverged, which are all infinitely far, the first to be lost.
     worst = int(np.lexsort((after, -far))[0])

@@ -126,8 +126,10 @@ def vary_parameters(
     for name, sigma in sigmas.items():
         p = model.parameters.get(name)
         if p is None or p.tie is not None:
-            told = f"is tied: {p.tie.text}" if p is not None and p.tie is not None else "is no parameter of the model"
-            raise ControllerError(f"{told}.", where=model.name, channel=name)
+            problem = (
+                f"is tied: {p.tie.text}" if p is not None and p.tie is not None else "is no parameter of the model"
+            )
+            raise ControllerError(f"{problem}.", where=model.name, channel=name)
         if not sigma >= 0.0:
             raise ControllerError(f"varies by {sigma:g}, expected zero or more.", where=model.name, channel=name)
         drawn[name] = np.clip(drawn.get(name, p.value) + sigma * random.standard_normal(count), p.lower, p.upper)

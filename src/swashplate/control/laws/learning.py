@@ -56,8 +56,8 @@ def straightened(
         return replace(controller, numbers=controller.numbers._replace(law=law._replace(o_zeta=law.o_zeta + change)))
 
     def drift(change: float) -> float:
-        made = with_lag(change)
-        return float(step_paths(vehicle, made, trim, command=command, distance=distance, duration=duration).drift[0])
+        lagged = with_lag(change)
+        return float(step_paths(vehicle, lagged, trim, command=command, distance=distance, duration=duration).drift[0])
 
     low, high = (-0.25 * _FURTHEST_LAG, 0.25 * _FURTHEST_LAG)
     ends = drift(low), drift(high)
@@ -111,8 +111,8 @@ def corrected_by_step(
         return replace(controller, numbers=controller.numbers._replace(law=across))
 
     ends = [
-        float(step_paths(vehicle, made, trim, command=command, distance=distance, duration=duration).drift[0])
-        for made in (controller, with_tilt(_NUDGE))
+        float(step_paths(vehicle, law_of, trim, command=command, distance=distance, duration=duration).drift[0])
+        for law_of in (controller, with_tilt(_NUDGE))
     ]
     slope = (ends[1] - ends[0]) / _NUDGE
     return with_tilt(-drift / slope)

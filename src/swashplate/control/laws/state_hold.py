@@ -72,10 +72,10 @@ def state_hold(
     """
     model = linearize(vehicle, trim)
     held = {name for name, _ in vehicle.trim_held}
-    moved = [i for i, name in enumerate(vehicle.input_names) if name not in held]
+    free = [i for i, name in enumerate(vehicle.input_names) if name not in held]
     if along is None or spans is None:
-        along = np.eye(len(vehicle.input_names))[:, moved]
-        spans = np.array([high - low for low, high in vehicle.input_limits])[moved]
+        along = np.eye(len(vehicle.input_names))[:, free]
+        spans = np.array([high - low for low, high in vehicle.input_limits])[free]
     B = model.B @ along
     weights = np.array([1.0 / _ALLOWED[name] ** 2 if name in _ALLOWED else 0.0 for name in model.states])
     if trim.speed or trim.lateral or trim.climb or trim.turn:

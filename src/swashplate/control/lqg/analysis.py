@@ -144,12 +144,12 @@ def sensitivity(
     (_, B, _), (_, Bc, _, Dc) = parts.plant, parts.compensator
     closed, _ = _closed(parts.plant, parts.compensator, bool(plan.sensors))
     drive, shown = np.zeros(closed.shape[0]), False
-    for i, (channel, late) in enumerate(_channels(plan, parts.truth)):
+    for i, (channel, samples) in enumerate(_channels(plan, parts.truth)):
         name, sign = _SHOWN_AS.get(channel.split(".")[-1], (channel.split(".")[-1], 1.0))
         if name != state:
             continue
         shown = True
-        if late:  # it enters the chain of samples that are on their way
+        if samples:  # it enters the chain of samples that are on their way
             drive[names.index(f"{channel} 1 ago")] += sign
         else:
             drive += sign * np.concatenate([B @ Dc[:, i], Bc[:, i]])
@@ -176,10 +176,10 @@ def _closed(
     """The closed loop's matrix, and how process noise (on the plant) and measurement noise enter it."""
     A, B, H = plant
     Ac, Bc, Cc, Dc = compensator
-    whole = np.block([[A + B @ Dc @ H, B @ Cc], [Bc @ H, Ac]])
+    closed = np.block([[A + B @ Dc @ H, B @ Cc], [Bc @ H, Ac]])
     by_process = np.vstack([np.eye(A.shape[0]), np.zeros((Ac.shape[0], A.shape[0]))])
-    by_noise = np.vstack([B @ Dc, Bc]) if noisy else np.zeros((whole.shape[0], 0))
-    return whole, (by_process, by_noise)
+    by_noise = np.vstack([B @ Dc, Bc]) if noisy else np.zeros((closed.shape[0], 0))
+    return closed, (by_process, by_noise)
 
 
 def _spread(model: SampledObserverModel, closed: Array, entering: tuple[Array, Array]) -> dict[str, float]:
@@ -189,9 +189,9 @@ def _spread(model: SampledObserverModel, closed: Array, entering: tuple[Array, A
     d = [model.names.index(f"disturbance {name}") for name in DISTURBED]
     fade, push = model.F[np.ix_(d, d)], model.F[np.ix_(m, d)]
     size = closed.shape[0]
-    whole = np.block([[closed, by_process @ push], [np.zeros((6, size)), fade]])
+    joined = np.block([[closed, by_process @ push], [np.zeros((6, size)), fade]])
     noise = np.zeros((size + 6, size + 6))
     noise[:size, :size] = by_process @ model.process[np.ix_(m, m)] @ by_process.T + by_noise @ model.noise @ by_noise.T
     noise[size:, size:] = model.process[np.ix_(d, d)]
-    P = scipy.linalg.solve_discrete_lyapunov(whole, noise, method="bilinear")
+    P = scipy.linalg.solve_discrete_lyapunov(joined, noise, method="bilinear")
     return {model.names[m[i]]: float(np.sqrt(max(P[i, i], 0.0))) for i in range(len(m)) if m[i] in model.vehicle}

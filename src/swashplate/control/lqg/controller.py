@@ -70,8 +70,8 @@ class Lqg(Controller):
         return len(self.plan.channels) + len(self.plan.biases)
 
     def draws(self, samples: int, seed: int | None = None) -> Array:
-        own = self.seed if seed is None else seed
-        return np.random.default_rng([own, _NOISE]).standard_normal((samples, self.drawn))
+        number = self.seed if seed is None else seed
+        return np.random.default_rng([number, _NOISE]).standard_normal((samples, self.drawn))
 
     def graph(self, law: LawOnEstimates | None = None) -> Any:
         """Its step, what an aircraft runs, as a CasADi function (`graph.step_graph`)."""
@@ -113,14 +113,14 @@ class Lqg(Controller):
     def first_estimate(self) -> ObserverEstimate:
         """At the trim, stored readings included."""
         plan, n = self.plan, self.plan.n
-        N, own = len(plan.names), n + 6 + len(plan.biases)
+        N, estimated = len(plan.names), n + 6 + len(plan.biases)
         mean = np.zeros(N)
         mean[:n] = self.start.state
         variance = np.zeros(N)
-        variance[:own] = observer.start_variance(plan, self.unrest)
+        variance[:estimated] = observer.start_variance(plan, self.unrest)
         w = np.array([*self.start.inputs, self.start.environment.voltage, *[1.0] * len(plan.sensors)], dtype=np.float64)
         P = np.diag(variance)
-        if own < N:
+        if estimated < N:
             deepest = max(at.kept for at in plan.sampling)
             for _ in range(deepest):  # every stored reading is one of the start
                 mean, G = observer.linearised_at(observer.keeping, plan, self.numbers, mean, w)
@@ -141,15 +141,18 @@ class Lqg(Controller):
         Raises:
             ControllerError: where the trim is of a vehicle with other inputs, or, without an observer, other states.
         """
-        own = self.vehicle
-        strange = trim.input_names != own.input_names or (not self.plan.sensors and trim.state_names != own.state_names)
+        designed = self.vehicle
+        strange = trim.input_names != designed.input_names or (
+            not self.plan.sensors and trim.state_names != designed.state_names
+        )
         if strange:
             raise ControllerError(
-                f"was designed on another aircraft than this {len(trim.state_names)}-state one.", where=own.name
+                f"was designed on another aircraft than this {len(trim.state_names)}-state one.", where=designed.name
             )
         known = trim.states()
         state = [
-            known.get(n, float(v)) for n, v in zip(own.state_names, np.asarray(self.feedback.states)[0], strict=True)
+            known.get(n, float(v))
+            for n, v in zip(designed.state_names, np.asarray(self.feedback.states)[0], strict=True)
         ]
-        start = replace(trim, state=np.array(state), state_names=own.state_names)
+        start = replace(trim, state=np.array(state), state_names=designed.state_names)
         return replace(self, start=start, seed=self.seed if seed is None else seed)

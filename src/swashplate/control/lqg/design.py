@@ -109,10 +109,10 @@ def design(
         raise ControllerError("a place is held in hover only.", channel="speeds", hint="Use holding 'speed'.")
     if list(speeds) != sorted(set(speeds)):
         raise ControllerError(f"are {list(speeds)}, expected ascending ones.", channel="speeds")
-    late = complete_delays(vehicle, input_delays(vehicle) if delays is None else delays)
+    delay_by_input = complete_delays(vehicle, input_delays(vehicle) if delays is None else delays)
     if computation is not None and not 0.0 <= computation <= 1.0:
         raise ControllerError(f"is {computation:g} s, expected 0 to 1.", channel="computation")
-    waits = [d + (computation or 0.0) for d in late.values()]
+    waits = [d + (computation or 0.0) for d in delay_by_input.values()]
     around = environment_of(vehicle, environment)
     if voltage is not None:
         around = around._replace(voltage=voltage)
@@ -127,15 +127,15 @@ def design(
     chosen = unrest or disturbances.unrest_of(vehicle.card)
     fade, process = observer.process_noise(plan, chosen)
     numbers = Numbers(parameter_row(vehicle, around), fade, process, observer.measurement_noise(plan))
-    own = checked_weights(vehicle, names, allowed or {}, effort, where=where)
+    efforts = checked_weights(vehicle, names, allowed or {}, effort, where=where)
 
     def designed(shares: Array, tight: float = 1.0) -> list[Array]:
         deviations = {**_eased(shares, tight), **(allowed or {})}
-        usual = bryson(vehicle, names, allowed=deviations, effort=_shared(vehicle, own, shares))
+        usual = bryson(vehicle, names, allowed=deviations, effort=_shared(vehicle, efforts, shares))
         weights = usual[0] if Q is None else square(Q), usual[1] if R is None else square(R)
         return [regulated(model, plan, holding, *weights, where=where) for model in models]
 
-    free = [R is None and name not in own for name in vehicle.input_names]
+    free = [R is None and name not in efforts for name in vehicle.input_names]
     most = np.where(free, crossover_limits(plan, models, computation=computation), np.inf)
     loops = [Watched(plan, numbers, m, place=holding == "place") for m in models]
     gains, shares, tight = *_slowed(designed, most, loops), 1.0
@@ -217,7 +217,7 @@ def _slowed(
 def _highest(loops: Sequence[Watched], gains: Sequence[Array]) -> Array:
     """Crossover of every loop, the highest of all trims [rad/s]."""
     return np.asarray(
-        np.max([crossovers(*loop.sensitivities(own)) for loop, own in zip(loops, gains, strict=True)], axis=0)
+        np.max([crossovers(*loop.sensitivities(gain)) for loop, gain in zip(loops, gains, strict=True)], axis=0)
     )
 
 
@@ -260,20 +260,20 @@ def regulated(model: LinearModel, plan: ObserverPlan, holding: Holding, Q: Array
                 where=where,
                 channel=label,
             )
-    moved = [j for j in range(G.shape[1]) if np.any(G[:, j])]
+    driven = [j for j in range(G.shape[1]) if np.any(G[:, j])]
     inside = np.ix_(kept, kept)
     chosen = [names[i] for i in kept]
     K = np.zeros((G.shape[1], size))
     gain = regulator(
         F[inside],
-        G[np.ix_(kept, moved)],
+        G[np.ix_(kept, driven)],
         Q[inside] * plan.dt,
-        R[np.ix_(moved, moved)] * plan.dt,
+        R[np.ix_(driven, driven)] * plan.dt,
         chosen,
         scale=np.array([typical(name) for name in chosen]),
         where=where,
     )
-    K[np.ix_(moved, kept)] = gain
+    K[np.ix_(driven, kept)] = gain
     return K
 
 
@@ -285,9 +285,9 @@ def design_model(model: LinearModel, plan: ObserverPlan, holding: Holding) -> tu
     C = np.zeros((4, F.shape[0]))
     for row, name in enumerate(errors):
         C[row, model.states.index(name)] = 1.0
-    whole = np.block([[F, np.zeros((F.shape[0], 4))], [plan.dt * C, np.eye(4)]])
+    augmented = np.block([[F, np.zeros((F.shape[0], 4))], [plan.dt * C, np.eye(4)]])
     waiting = [f"{model.inputs[j]} {ago} ago" for j, ago in added]
-    return whole, np.vstack([G, np.zeros((4, G.shape[1]))]), (*model.states, *waiting, *SUMS)
+    return augmented, np.vstack([G, np.zeros((4, G.shape[1]))]), (*model.states, *waiting, *SUMS)
 
 
 def battery_gain(model: LinearModel) -> Array:

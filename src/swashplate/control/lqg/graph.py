@@ -76,7 +76,7 @@ def lqg_step(
     Returns:
         What is carried on, and the commands within their limits.
     """
-    xp, late = M.xp, late_inputs(plan)
+    xp, late_of = M.xp, late_inputs(plan)
     before = [carried.given[delay][j] for j, delay in enumerate(plan.delays)]
     waiting = [carried.given[ago][j] for j, delay in enumerate(plan.delays) for ago in range(delay)]
     estimate = carried.estimate
@@ -101,13 +101,13 @@ def lqg_step(
     else:
         x = M.scalars(y)
     names = plan.equations.vehicle.state_names
-    decided = law or partial(lqr_law, names=names, late_of=late, feedback=feedback, dt=plan.dt, M=M)
+    decided = law or partial(lqr_law, names=names, late_of=late_of, feedback=feedback, dt=plan.dt, M=M)
     kept, commands = decided(carried.law, x, waiting, voltage, reference)
     given = [commands, *carried.given[:-1]]
     if plan.sensors:
         acting = [given[delay][j] for j, delay in enumerate(plan.delays)]
-        moved = periodic_gain.predicted_steadily if plan.period else observer.predicted
-        estimate = moved(plan, numbers, estimate, M.column([*acting, voltage]), taken, M)
+        predict = periodic_gain.predicted_steadily if plan.period else observer.predicted
+        estimate = predict(plan, numbers, estimate, M.column([*acting, voltage]), taken, M)
     return Carried(estimate, given, counts, kept), commands
 
 
@@ -193,21 +193,26 @@ def sensed_graph(plan: ObserverPlan, numbers: Numbers, step: Any, memory: int) -
     nb, channels, depth = len(plan.biases), len(plan.channels), readings_kept(plan)
     drawn = channels + nb
     sizes_of = {"own": nb + 1 + depth * channels, "x": _BODY, "felt": 3, "drawn": drawn}
-    own, x, felt, noise = (casadi.SX.sym(name, size) for name, size in sizes_of.items())
-    bias, count = own[:nb], own[nb]
+    carried_here, x, felt, noise = (casadi.SX.sym(name, size) for name, size in sizes_of.items())
+    bias, count = carried_here[:nb], carried_here[nb]
     now = casadi.vertcat(*true_readings(plan, x, felt, bias, CasadiBackend()))
-    stored = casadi.vertcat(now, own[nb + 1 : nb + 1 + (depth - 1) * channels])
+    stored = casadi.vertcat(now, carried_here[nb + 1 : nb + 1 + (depth - 1) * channels])
     queue = casadi.if_else(count < 0.5, casadi.repmat(now, depth, 1), stored)
     place = [at.late for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
     wander = np.asarray(numbers.process)[plan.n + 6 : plan.n + 6 + nb]
     noisy = [
-        queue[late * channels + i] + np.sqrt(variance) * noise[i]
-        for i, (late, variance) in enumerate(zip(place, np.asarray(numbers.measurement), strict=True))
+        queue[lag * channels + i] + np.sqrt(variance) * noise[i]
+        for i, (lag, variance) in enumerate(zip(place, np.asarray(numbers.measurement), strict=True))
     ]
     wandered = [bias[i] + np.sqrt(wander[i]) * noise[channels + i] for i in range(nb)]
     after = casadi.vertcat(*wandered, count + 1.0, queue)
-    sensing = casadi.Function("swash_sensed", [own, x, felt, noise], [casadi.vertcat(*noisy), casadi.densify(after)])
-    carried, reference = casadi.MX.sym("memory", memory + own.shape[0]), casadi.MX.sym("reference", len(REFERENCES))
+    sensing = casadi.Function(
+        "swash_sensed", [carried_here, x, felt, noise], [casadi.vertcat(*noisy), casadi.densify(after)]
+    )
+    carried, reference = (
+        casadi.MX.sym("memory", memory + carried_here.shape[0]),
+        casadi.MX.sym("reference", len(REFERENCES)),
+    )
     measured = casadi.MX.sym("measured", _BODY + 3 + 1 + drawn)
     y, kept = sensing(carried[memory:], measured[:_BODY], measured[_BODY : _BODY + 3], measured[_BODY + 4 :])
     stepped = step(carried[:memory], casadi.vertcat(y, measured[_BODY + 3]), reference)

@@ -38,37 +38,37 @@ def differences(controller: Lqg, flying: Aircraft, margins: Margins | None) -> t
         margins: of the loop; the answers to an input are compared at its crossover, at 5 rad/s where there is none.
     """
     vehicle = flying.vehicle
-    told = [*_numbers(controller, flying), *_options(controller, flying), *_delays(controller, flying)]
-    if not told and controller.vehicle.name == vehicle.name:
+    listed = [*_numbers(controller, flying), *_options(controller, flying), *_delays(controller, flying)]
+    if not listed and controller.vehicle.name == vehicle.name:
         return ()
-    own = controller.vehicle.card.title
-    head = f"The controller was designed on another model ('{own}') than the one flown ('{vehicle.card.title}')."
-    return (head, *told, *_answers(controller, flying, margins))
+    designed = controller.vehicle.card.title
+    head = f"The controller was designed on another model ('{designed}') than the one flown ('{vehicle.card.title}')."
+    return (head, *listed, *_answers(controller, flying, margins))
 
 
 def _numbers(controller: Lqg, flying: Aircraft) -> list[str]:
     """Numbers of the card that differ, where the equations are the same."""
-    own, theirs = controller.vehicle.card.values(), flying.vehicle.card.values()
+    designed, theirs = controller.vehicle.card.values(), flying.vehicle.card.values()
     if controller.vehicle.name != flying.vehicle.name:
         return [f"Equations: '{controller.vehicle.name}' against '{flying.vehicle.name}'."]
-    moved = {}
-    for name in sorted(own.keys() | theirs.keys()):
-        a, b = own.get(name, 0.0), theirs.get(name, 0.0)
+    apart = {}
+    for name in sorted(designed.keys() | theirs.keys()):
+        a, b = designed.get(name, 0.0), theirs.get(name, 0.0)
         size = max(abs(a), abs(b))
         if size and abs(a - b) > _ALIKE * size:
-            moved[name] = abs(a - b) / size
-    most = sorted(moved, key=lambda name: -moved[name])[:_NAMED]
-    listed = ", ".join(f"{name} {own.get(name, 0.0):.4g} against {theirs.get(name, 0.0):.4g}" for name in most)
-    rest = f" and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
-    return [f"Numbers of the card (design against flown): {listed}{rest}."] if moved else []
+            apart[name] = abs(a - b) / size
+    most = sorted(apart, key=lambda name: -apart[name])[:_NAMED]
+    listed = ", ".join(f"{name} {designed.get(name, 0.0):.4g} against {theirs.get(name, 0.0):.4g}" for name in most)
+    rest = f" and {len(apart) - _NAMED} more" if len(apart) > _NAMED else ""
+    return [f"Numbers of the card (design against flown): {listed}{rest}."] if apart else []
 
 
 def _options(controller: Lqg, flying: Aircraft) -> list[str]:
-    own, theirs = controller.vehicle.card.options, flying.vehicle.card.options
+    designed, theirs = controller.vehicle.card.options, flying.vehicle.card.options
     if controller.vehicle.name != flying.vehicle.name:
         return []
-    names = [name for name in sorted(own.keys() | theirs.keys()) if own.get(name) != theirs.get(name)]
-    listed = ", ".join(f"{name} {own.get(name)!r} against {theirs.get(name)!r}" for name in names)
+    names = [name for name in sorted(designed.keys() | theirs.keys()) if designed.get(name) != theirs.get(name)]
+    listed = ", ".join(f"{name} {designed.get(name)!r} against {theirs.get(name)!r}" for name in names)
     return [f"Options (design against flown): {listed}."] if names else []
 
 
@@ -92,13 +92,13 @@ def _answers(controller: Lqg, flying: Aircraft, margins: Margins | None) -> list
         inputs=np.asarray(controller.feedback.inputs)[at],
         speed=float(np.asarray(controller.feedback.speeds)[at]),
     )
-    own, theirs = linearize(controller.vehicle, own_trim), linearize(flying.vehicle, flying.trim)
+    designed, theirs = linearize(controller.vehicle, own_trim), linearize(flying.vehicle, flying.trim)
     crossovers = {a.name: a.crossover for a in margins.axes} if margins is not None else {}
     apart = []
-    for name in own.inputs:
+    for name in designed.inputs:
         w = crossovers.get(name, float("nan"))
         w = w if np.isfinite(w) else 5.0
-        a = _answer(own, name, w, controller.delays.get(name, 0.0))
+        a = _answer(designed, name, w, controller.delays.get(name, 0.0))
         b = _answer(theirs, name, w, flying.delays.get(name, 0.0))
         size = float(np.linalg.norm(a))
         if size > 0.0:
@@ -133,9 +133,9 @@ def flown_on(controller: Lqg, vehicle: Vehicle, trim: Trim) -> Lqg:
             where=controller.vehicle.card.title,
             hint="Design it with --method lqg: sensors read the same of both.",
         )
-    own = about(controller.vehicle, trim)
-    numbers = own.card.values()
-    named = {name: numbers.get(f"trim_{name}", 0.0) for name in own.state_names}
+    designed = about(controller.vehicle, trim)
+    numbers = designed.card.values()
+    named = {name: numbers.get(f"trim_{name}", 0.0) for name in designed.state_names}
     state = np.array([trim.states().get(name, value) for name, value in named.items()])
     limits = np.array(vehicle.input_limits)
     feedback = controller.feedback._replace(
@@ -143,10 +143,10 @@ def flown_on(controller: Lqg, vehicle: Vehicle, trim: Trim) -> Lqg:
     )
     return replace(
         controller,
-        vehicle=own,
+        vehicle=designed,
         feedback=feedback,
-        numbers=controller.numbers._replace(parameters=parameter_row(own, trim.environment)),
-        start=replace(trim, state=state, state_names=own.state_names),
+        numbers=controller.numbers._replace(parameters=parameter_row(designed, trim.environment)),
+        start=replace(trim, state=state, state_names=designed.state_names),
     )
 
 
@@ -186,11 +186,11 @@ class LqgKind(ControllerKind[Lqg]):
     own_sensors = True
 
     def about(self, controller: Lqg, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> Lqg:
-        own = controller.vehicle
-        if own.traits.linear and not vehicle.traits.linear:
+        designed = controller.vehicle
+        if designed.traits.linear and not vehicle.traits.linear:
             return replace(flown_on(controller, vehicle, trim), seed=seed)
-        if own.name != vehicle.name:
-            raise ControllerError(f"is for '{own.name}', not for '{vehicle.name}'.", where=own.card.title)
+        if designed.name != vehicle.name:
+            raise ControllerError(f"is for '{designed.name}', not for '{vehicle.name}'.", where=designed.card.title)
         return controller.starting_at(trim, seed=seed)
 
     def judged(self, controller: Lqg, flying: Aircraft) -> JudgedLoop:

@@ -134,9 +134,9 @@ def lqr_law(
     pushed = _mixed(now, [M.scalars(gain @ deviation) for gain in f.gains])
     commands, fits = [], 1.0
     for j, push in enumerate(pushed):
-        whole = trim_u[j] - push + f.battery[j] * (f.voltage - voltage)
-        fitted = _limited(whole, f.low[j], f.high[j], xp)
-        fits = xp.where(xp.abs(whole - fitted) > 0.0, 0.0, fits)
+        command = trim_u[j] - push + f.battery[j] * (f.voltage - voltage)
+        fitted = _limited(command, f.low[j], f.high[j], xp)
+        fits = xp.where(xp.abs(command - fitted) > 0.0, 0.0, fits)
         commands.append(fitted)
     # Integrals rest while a command is at its limit: they do not wind up.
     return [*(total + fits * dt * error for total, error in zip(sums, errors, strict=True)), asked, cruise], commands

@@ -78,8 +78,8 @@ def unseen(
 def plain(basis: Array) -> Array:
     """Another basis of the same columns' span, each column with a state of its own: easier to put into words."""
     _, _, pivots = scipy.linalg.qr(basis.T, pivoting=True)
-    own = np.sort(pivots[: basis.shape[1]])
-    turned = basis @ np.linalg.inv(basis[own])
+    kept = np.sort(pivots[: basis.shape[1]])
+    turned = basis @ np.linalg.inv(basis[kept])
     return np.asarray(turned / np.linalg.norm(turned, axis=0), dtype=np.float64)
 
 

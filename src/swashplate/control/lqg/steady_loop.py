@@ -174,15 +174,17 @@ def seen_of(controller: Lqg, on: Aircraft) -> Truth:
     Raises:
         ControllerError: where the inputs are not the same, or another aircraft is flown without sensors.
     """
-    own, plan = controller.vehicle, controller.plan
-    if on.vehicle.input_names != own.input_names or not (plan.sensors or on.vehicle.state_names == own.state_names):
-        raise ControllerError("was designed on an aircraft with other inputs or states.", where=own.name)
+    designed, plan = controller.vehicle, controller.plan
+    if on.vehicle.input_names != designed.input_names or not (
+        plan.sensors or on.vehicle.state_names == designed.state_names
+    ):
+        raise ControllerError("was designed on an aircraft with other inputs or states.", where=designed.name)
     theirs = replace(plan, equations=equations_of(on.vehicle), period=0)
     fade, process = observer.process_noise(theirs, controller.unrest)
     row = parameter_row(on.vehicle, on.trim.environment)
     numbers = Numbers(row, fade, process, observer.measurement_noise(theirs))
     model = linearize(on.vehicle, on.trim)
-    base = np.array([on.delays.get(name, 0.0) for name in own.input_names])
+    base = np.array([on.delays.get(name, 0.0) for name in designed.input_names])
     without = () if float(controller.feedback.place) > 0.5 else ("x", "y")
 
     def later(further: Array) -> SampledObserverModel:

@@ -47,16 +47,16 @@ def limited(
         commands: of roll, pitch and yaw. collective: deflection.
         ring: 100 limits the cyclic to a circle, 0 to nothing.
     """
-    whole = xp.clip(commands, -LIMIT, LIMIT)
+    within = xp.clip(commands, -LIMIT, LIMIT)
     cut = xp.greater(xp.abs(commands), LIMIT)
     radius = LIMIT * xp.where(ring > 0.0, 2.0**0.5 - ring * 0.01 * (2.0**0.5 - 1.0), 1e9)
-    beyond = xp.sqrt(whole[0] * whole[0] + whole[1] * whole[1] + 1e-18) / radius
-    cyclic = whole[:2] / xp.maximum(beyond, 1.0)
+    beyond = xp.sqrt(within[0] * within[0] + within[1] * within[1] + 1e-18) / radius
+    cyclic = within[:2] / xp.maximum(beyond, 1.0)
     rings = beyond > 1.0
     cut = xp.where(cut, 1.0, 0.0)
     ringed = xp.where(rings, 1.0, 0.0)
     cut = xp.stack([xp.maximum(cut[0], ringed), xp.maximum(cut[1], ringed), cut[2]])
-    return xp.concatenate([cyclic, whole[2:]]), xp.clip(collective, -LIMIT, LIMIT), cut
+    return xp.concatenate([cyclic, within[2:]]), xp.clip(collective, -LIMIT, LIMIT), cut
 
 
 def governed(

@@ -54,8 +54,8 @@ def table(x: Scalar, points: tuple[int, ...], xp: ArrayFunctions) -> Operand:
     """Between the points of a table over 0 to 1; beyond it the last piece goes on, never below zero."""
     bins = len(points) - 1
     steps = np.diff(points)
-    whole = points[0] + sum(steps[i] * xp.clip(x * bins - i, 0.0, 1.0) for i in range(bins - 1))
-    return xp.maximum(whole + steps[-1] * xp.maximum(x * bins - (bins - 1), 0.0), 0.0)
+    value = points[0] + sum(steps[i] * xp.clip(x * bins - i, 0.0, 1.0) for i in range(bins - 1))
+    return xp.maximum(value + steps[-1] * xp.maximum(x * bins - (bins - 1), 0.0), 0.0)
 
 
 def _within(value: Operand, limit: Operand, xp: ArrayFunctions) -> Operand:
@@ -214,14 +214,14 @@ def _flooded(
     """While the collective rests, the error flows into the offset, without a step of the command."""
     side = xp.where(xp.greater(0.0, error), -1.0, 1.0) * xp.where(xp.greater(0.0, collective), -1.0, 1.0)
     wanted = side * table(curve, OFFSET_FLOOD, xp) * 0.08 * quiet
-    moved = _within(offset + wanted, most, xp) - offset
+    gained = _within(offset + wanted, most, xp) - offset
     scale = collective * share
-    taken = moved * scale
+    taken = gained * scale
     all_of_it = xp.greater(xp.abs(taken), xp.abs(error))
     safe = xp.where(xp.greater(xp.abs(scale), 0.0), scale, 1.0)
-    moved, taken = xp.where(all_of_it, error / safe, moved), xp.where(all_of_it, error, taken)
+    gained, taken = xp.where(all_of_it, error / safe, gained), xp.where(all_of_it, error, taken)
     used = xp.greater(share, 0.0)
-    return error - xp.where(used, taken, 0.0), offset + xp.where(used, moved, 0.0)
+    return error - xp.where(used, taken, 0.0), offset + xp.where(used, gained, 0.0)
 
 
 def _precompensated(
