@@ -1,10 +1,11 @@
-"""What campaigns of fits share: what their files say of a fit and its logs, where it starts, and one that may fail."""
+"""What campaigns of fits share: the question of `swash identify`, asked from many starts, and one that may fail."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,142 +13,126 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.api.campaigns.flown import vehicle_of
-from swashplate.api.campaigns.kind import CampaignSettings, NamedFile
-from swashplate.api.campaigns.tasks import Columns
+from swashplate.api.asking import strings
+from swashplate.api.campaigns.kind import CampaignKind, CampaignSettings, vehicle_of
+from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
+from swashplate.api.question import default_of
+from swashplate.api.verbs.identify import FitVehicle
 from swashplate.arrays import Array
 from swashplate.errors import CampaignError, SwashError
-from swashplate.flights.flight import Flight
-from swashplate.flights.readers.read import read
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.result import Result, bounds_of
+from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
-from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 
 
-class FitCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """What every campaign of fits says in its file.
+class FitWords(CampaignSettings, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """What campaigns of fits say beside the words of `swash identify`.
 
     Attributes:
         vehicle: a name or a file: the equations and the numbers that starts are about.
-        free, method, outputs, ties, wind: as of `sp.identify`.
+        biases: outputs with a constant bias in each record, of a state-space model.
     """
 
     vehicle: str
-    free: str | list[str] | None = None
-    method: str | None = None
-    outputs: list[str] | None = None
-    ties: list[str] = msgspec.field(default_factory=list)
-    wind: bool = False
-
-    def free_of(self, model: Vehicle) -> tuple[str, ...]:
-        """Names of the numbers of a model that a fit moves.
-
-        Raises:
-            IdentificationError, CardError: for names that the model does not have.
-            CampaignError: for names beside a state-space model, whose file says itself what is free.
-        """
-        if model.structure is not None:
-            if self.free is not None:
-                raise CampaignError(
-                    f"is {self.free!r}, and '{model.structure.name}' is a state-space model.",
-                    channel="free",
-                    hint="Leave it out: what its file does not call fixed is free.",
-                )
-            return model.structure.free
-        return parameterize(model, "full" if self.free is None else self.free, ties=self.ties).names
-
-    def fitted(
-        self, begin: Vehicle, data: Flight | Sequence[Flight] | FrequencyResponse, *, biases: Sequence[str] = ()
-    ) -> Result[Any, Any]:
-        """One fit, from where the model stands."""
-        return identify(
-            _identified(begin),
-            data,
-            free=None if begin.structure is not None else self.free,
-            method=self.method,
-            outputs=self.outputs,
-            ties=self.ties,
-            wind=self.wind,
-            biases=biases,
-        )
-
-
-class LogsCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """What campaigns of fits to logs say in their files, about the vehicle's numbers.
-
-    Attributes:
-        flights: logs to fit to.
-        condition: False takes the logs as they are, at one rate already. rate: otherwise, samples per second [Hz].
-        biases: as of `sp.identify`.
-    """
-
-    flights: list[str] = msgspec.field(default_factory=list)
-    condition: bool = True
-    rate: float = 100.0
     biases: list[str] = msgspec.field(default_factory=list)
 
-    @property
-    def logs(self) -> tuple[NamedFile, ...]:
-        """The vehicle's file and the logs."""
-        return NamedFile("vehicle", self.vehicle, True), *(NamedFile("flights", name) for name in self.flights)
 
-    def model(self, files: Mapping[str, Path]) -> Vehicle:
-        """The vehicle."""
-        return vehicle_of(str(files.get(self.vehicle, self.vehicle)))
+class FitKind(CampaignKind):
+    """A kind whose rows are fits of a vehicle, or of a state-space model by its file."""
 
-    def records(self, files: Mapping[str, Path]) -> tuple[Flight, ...]:
-        """Its logs, conditioned, in the order of the file."""
-        raw = (read(files[name]) for name in self.flights)
-        return tuple(flight.condition(rate=self.rate, cutoff=0.0) if self.condition else flight for flight in raw)
+    rows = "fit"
+    question = FitVehicle
+    without = ("hold_out", "prior", "close_loop", "posterior")
+
+    @abstractmethod
+    def start(self, settings: Any, model: Vehicle, names: Sequence[str], seed: int) -> Array:
+        """Values (p,) that a fit starts from."""
+
+    @abstractmethod
+    def data(self, settings: Any, asked: FitVehicle, model: Vehicle, files: Mapping[str, Path]) -> Callable[[int], Any]:
+        """What is fitted to, by the row's seed."""
+
+    def parts(self, settings: Any, folder: Path) -> tuple[Portion, ...]:
+        check_method(settings.method)
+        return super().parts(settings, folder)
+
+    def run(self, settings: Any, portion: Portion, files: Mapping[str, Path]) -> Columns:
+        model, names, fitted = self._problem(settings, files)
+        seeds = [seed_of(portion.seed, row) for row in range(portion.count)]
+        starts = np.array([self.start(settings, model, names, seed) for seed in seeds]).reshape(len(seeds), len(names))
+        fits: list[Result[Any, Any] | str] = []
+        for seed, values in zip(seeds, starts, strict=True):
+            try:
+                fits.append(fitted(seed, values))
+            except SwashError as error:
+                fits.append(str(error))
+        return fit_columns(fits, names) | {f"start.{name}": starts[:, k] for k, name in enumerate(names)}
+
+    def replay(self, settings: Any, portion: Portion, files: Mapping[str, Path], row: int) -> Result[Any, Any]:
+        model, names, fitted = self._problem(settings, files)
+        seed = seed_of(portion.seed, row)
+        return fitted(seed, self.start(settings, model, names, seed))
+
+    def _problem(
+        self, settings: Any, files: Mapping[str, Path]
+    ) -> tuple[Vehicle, tuple[str, ...], Callable[[int, Array], Result[Any, Any]]]:
+        """The model, the names that a fit moves, and the fit of a row's seed from values (p,)."""
+        model = vehicle_of(str(files.get(settings.vehicle, settings.vehicle)))
+        asked: FitVehicle = self.asked(settings, files, vehicle=model)
+        names, data = _moved_by(asked, model), self.data(settings, asked, model, files)
+
+        def fitted(seed: int, values: Array) -> Result[Any, Any]:
+            begin = model.with_values({name: float(value) for name, value in zip(names, values, strict=True)})
+            if begin.structure is None:
+                return replace(asked, vehicle=begin, flight=data(seed)).answer().fit
+            outputs = None if asked.outputs is None else strings(asked.outputs)
+            return identify(
+                begin.structure, data(seed), method=asked.method, outputs=outputs, iterations=asked.iterations,
+                horizon=asked.horizon, biases=settings.biases,
+            )  # fmt: skip
+
+        return model, names, fitted
 
 
-@dataclass(frozen=True)
-class Attempt:
-    """A fit, or in words why there is none."""
-
-    fit: Result[Any, Any] | None
-    refused: str = ""
-
-    @staticmethod
-    def at(make: Callable[[], Result[Any, Any]]) -> Attempt:
-        """What comes of a fit that may be refused."""
-        try:
-            return Attempt(make())
-        except SwashError as error:
-            return Attempt(None, str(error))
-
-    @property
-    def cost(self) -> float:
-        return np.nan if self.fit is None else self.fit.cost
-
-    @property
-    def usable(self) -> bool:
-        return self.fit is not None and not self.fit.failed
-
-    @property
-    def converged(self) -> bool:
-        return self.fit is not None and self.fit.converged
-
-    @property
-    def problem(self) -> str:
-        return self.refused if self.fit is None else "; ".join(self.fit.problems)
-
-    def estimate(self, name: str) -> tuple[float, float]:
-        """Value and standard deviation of a number; NaN where there is no fit."""
-        return (np.nan, np.nan) if self.fit is None else (self.fit[name].value, self.fit[name].best_sigma)
+_OF_VEHICLES = ("free", "tie", "wind", "fix", "keep_unexcited", "residual", "leave_out")
 
 
-def outcome_columns(attempts: Sequence[Attempt]) -> Columns:
-    """Whether each fit came to an end that may be used, its cost, and what was wrong with it."""
-    return {
-        "cost": np.array([attempt.cost for attempt in attempts], dtype=np.float64),
-        "usable": np.array([attempt.usable for attempt in attempts], dtype=np.int64),
-        "converged": np.array([attempt.converged for attempt in attempts], dtype=np.int64),
-        "problem": np.array([attempt.problem for attempt in attempts], dtype=np.str_),
+def _moved_by(asked: FitVehicle, model: Vehicle) -> tuple[str, ...]:
+    """Names of the numbers of a model that a fit moves.
+
+    Raises:
+        IdentificationError, CardError: for names that the model does not have.
+        CampaignError: for words beside a state-space model that only a vehicle's fit takes.
+    """
+    if model.structure is None:
+        free = strings(asked.free)
+        return parameterize(model, free[0] if len(free) == 1 else free, ties=strings(asked.tie), fixed=asked.fix).names
+    for name in _OF_VEHICLES:
+        if getattr(asked, name) != default_of(FitVehicle, name):
+            raise CampaignError(
+                f"is {getattr(asked, name)!r}, and '{model.structure.name}' is a state-space model.",
+                channel=name,
+                hint="Leave it out: what its file does not call fixed is free.",
+            )
+    return model.structure.free
+
+
+def fit_columns(fits: Sequence[Result[Any, Any] | str], names: Sequence[str]) -> Columns:
+    """Whether each fit may be used, what was wrong with it (in words, where there is none), its cost and numbers."""
+    there = [None if isinstance(fit, str) else fit for fit in fits]
+    problems = [fit if isinstance(fit, str) else "; ".join(fit.problems) for fit in fits]
+    columns: Columns = {
+        "cost": np.array([np.nan if fit is None else fit.cost for fit in there], dtype=np.float64),
+        "usable": np.array([fit is not None and not fit.failed for fit in there], dtype=np.int64),
+        "converged": np.array([fit is not None and fit.converged for fit in there], dtype=np.int64),
+        "problem": np.array(problems, dtype=np.str_),
     }
+    for name in names:
+        columns[name] = np.array([np.nan if fit is None else fit[name].value for fit in there])
+        columns[f"{name}.sigma"] = np.array([np.nan if fit is None else fit[name].best_sigma for fit in there])
+    return columns
 
 
 def unusable(table: Columns, usable: NDArray[np.bool_]) -> list[str]:
@@ -155,17 +140,9 @@ def unusable(table: Columns, usable: NDArray[np.bool_]) -> list[str]:
     lost = int(np.sum(~usable))
     if not lost:
         return []
-    told = f"{lost} fits may not be used and are in no figure below"
     reasons = Counter(filter(None, map(str, table["problem"][~usable]))) if "problem" in table else Counter()
-    return [
-        told,
-        *(f"their most frequent problem ({count} of {lost}): {reason}" for reason, count in reasons.most_common(1)),
-    ]
-
-
-def _identified(model: Vehicle) -> Vehicle | StateSpaceModel:
-    """What `identify` takes for a vehicle: of a state-space model its matrices of named expressions."""
-    return model if model.structure is None else model.structure
+    most = [f"their most frequent problem ({n} of {lost}): {reason}" for reason, n in reasons.most_common(1)]
+    return [f"{lost} fits may not be used and are in no figure below", *most]
 
 
 def values_of(model: Vehicle, names: Sequence[str]) -> Array:
@@ -173,17 +150,7 @@ def values_of(model: Vehicle, names: Sequence[str]) -> Array:
     return np.array([model.numbers[name].value for name in names], dtype=np.float64)
 
 
-def spreads_of(model: Vehicle, names: Sequence[str]) -> Array:
-    """Standard deviations of a model's numbers (p,), one where none is known."""
-    return np.array([getattr(model.numbers[name], "sigma", None) or 1.0 for name in names], dtype=np.float64)
-
-
 def within_bounds(model: Vehicle, names: Sequence[str], values: Array) -> Array:
     """Values (p,) that physics allows, the nearest ones."""
-    low, high = bounds_of(_identified(model), names)
+    low, high = bounds_of(model if model.structure is None else model.structure, names)
     return np.clip(values, low, high)
-
-
-def started(model: Vehicle, names: Sequence[str], values: Array) -> Vehicle:
-    """The model with other numbers to start a fit from."""
-    return model.with_values({name: float(value) for name, value in zip(names, values, strict=True)})

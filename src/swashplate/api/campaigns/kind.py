@@ -1,22 +1,27 @@
-"""What a campaign can be of: the protocol of a kind, what every campaign's file says, and the registry."""
+"""What a campaign can be of: the base of a kind, what every campaign's file says, and the registry."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar, cast
+from typing import Any, ClassVar, cast
 
 import msgspec
 
 from swashplate import documents
 from swashplate.api.campaigns.tasks import Columns, Portion, portions
-from swashplate.api.question import VerbQuestion, default_of, entries
+from swashplate.api.question import VerbQuestion, default_of, entries, fields_of
 from swashplate.errors import CampaignError
+from swashplate.flights.consistency import UNCHECKED
+from swashplate.flights.flight import Flight
+from swashplate.flights.readers.read import read
+from swashplate.models.catalogue import vehicle as find_vehicle
+from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry
-
-Asked = TypeVar("Asked", bound=VerbQuestion[Any])
 
 
 class CampaignSettings(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
@@ -39,20 +44,7 @@ class CampaignSettings(msgspec.Struct, forbid_unknown_fields=True, kw_only=True,
     keep: list[str] = msgspec.field(default_factory=lambda: ["*"])
 
 
-class NamedFile(NamedTuple):
-    """A file that a campaign's file names.
-
-    Attributes:
-        entry: where it stands there. text: what stands there.
-        or_name: True where it may be the name of something packaged instead (a vehicle).
-    """
-
-    entry: str
-    text: str
-    or_name: bool = False
-
-
-NO_RESULT = ("kind", "of", "title", "count", "batch", "over")
+NO_RESULT = ("kind", "of", "title", "count", "batch")
 """Entries that no task's result depends on: its portion says the rest."""
 
 
@@ -77,32 +69,63 @@ class CampaignFindings:
     again: str = ".json"
 
 
-class CampaignKind(Protocol):
-    """One kind of campaign: a file with an object of this protocol, and a line in `CAMPAIGNS` (or an entry point of the
-    group `swashplate.campaigns` in another package)."""
+class CampaignKind(ABC):
+    """One kind of campaign: a file with an object of a subclass, and a line in `CAMPAIGNS` (or an entry point of the
+    group `swashplate.campaigns` in another package). Its file has the words of a verb, and few of its own.
 
-    @property
-    def rows(self) -> str:
-        """What a row is: "flight", "fit", "log"."""
-        ...
+    Attributes:
+        rows: what a row is: "flight", "fit", "log".
+        question: of the verb. words: what its file says beside. without: words of the verb that mean nothing here.
+        own_files: of its own words those that name files.
+    """
 
-    @property
+    rows: ClassVar[str]
+    question: ClassVar[type[VerbQuestion[Any]]]
+    words: ClassVar[type[CampaignSettings]] = CampaignSettings
+    without: ClassVar[tuple[str, ...]] = ()
+    own_files: ClassVar[tuple[str, ...]] = ()
+
+    @cached_property
     def schema(self) -> type[CampaignSettings]:
         """What its file says."""
-        ...
+        words: list[Any] = []
+        for name in entries(self.question):
+            if name not in (*self.words.__struct_fields__, *self.without):
+                default = default_of(self.question, name)
+                words.append((name, Any) if default is dataclasses.MISSING else (name, Any, default))
+        name, how = f"{self.question.__name__}Campaign", {"kw_only": True, "frozen": True}
+        made = msgspec.defstruct(name, words, bases=(self.words,), forbid_unknown_fields=True, **how)  # type: ignore[arg-type]
+        return cast(type[CampaignSettings], made)
 
-    def files(self, settings: Any) -> Sequence[NamedFile]:
-        """Files that every task needs."""
-        ...
+    def files(self, settings: Any) -> Iterator[tuple[str, str]]:
+        """Files that every task needs: where each stands, and what stands there."""
+        for name in (*(n for n in _file_words(self.question) if n not in self.without), *self.own_files):
+            given = getattr(settings, name)
+            for text in () if given is None else given if isinstance(given, list | tuple) else (given,):
+                yield name, str(text)
+
+    def asked(self, settings: Any, files: Mapping[str, Path], **instead: Any) -> Any:
+        """The question of a campaign's file, its files where they lie here, some of its fields from elsewhere."""
+        told = {name: getattr(settings, name) for name in entries(self.question) if name not in self.without}
+        for name in _file_words(self.question) & told.keys():
+            given = told[name]
+            several = isinstance(given, list | tuple)
+            told[name] = tuple(files.get(one, one) for one in given) if several else files.get(given, given)
+        return self.question(**told | instead)
 
     def parts(self, settings: Any, folder: Path) -> tuple[Portion, ...]:
-        """Its tasks. `folder` is that of the campaign's file.
+        """Its tasks: rows in tasks of `batch`. `folder` is that of the campaign's file.
 
         Raises:
             SwashError: what in the file contradicts itself, said before anything is computed.
         """
-        ...
+        self.asked(settings, {})
+        return portions(count=settings.count, batch=settings.batch or self.usual_batch, seed=settings.seed)
 
+    usual_batch: ClassVar[int] = 1
+    """Rows of a task, where the file does not say."""
+
+    @abstractmethod
     def run(self, settings: Any, portion: Portion, files: Mapping[str, Path]) -> Columns:
         """One task: the same columns for the same arguments, to the bit, on any worker.
 
@@ -111,15 +134,35 @@ class CampaignKind(Protocol):
             portion: which rows.
             files: where the content of `files` lies, by the entry's text.
         """
-        ...
 
+    @abstractmethod
     def findings(self, settings: Any, table: Columns) -> CampaignFindings:
         """What the rows say, those that are there."""
-        ...
 
+    @abstractmethod
     def replay(self, settings: Any, portion: Portion, files: Mapping[str, Path], row: int) -> Any:
         """What row `row` of a portion was, whole: something with a method `save(path)`."""
-        ...
+
+
+_FILES = ("Aircraft", "Logs", "Pilot", "Fitted", "Path")
+"""Languages whose words name files."""
+
+
+def _file_words(question: type[VerbQuestion[Any]]) -> dict[str, None]:
+    return {f.name: None for f in fields_of(question) if str(f.type).removesuffix(" | None") in _FILES}
+
+
+def logged(asked: Any, path: Path) -> Flight:
+    """A log as a question says that it is read; a mapping that this machine has kept is not asked, as on no worker."""
+    stamps = "drop" if asked.drop_bad_stamps else "error"
+    flight = read(path, mapping=asked.mapping, units=asked.units, bad_stamps=stamps)
+    return flight.done(UNCHECKED) if asked.as_logged else flight
+
+
+@lru_cache(maxsize=4)
+def vehicle_of(name_or_file: str) -> Vehicle:
+    """A vehicle, read once in a worker's life."""
+    return find_vehicle(name_or_file)
 
 
 CAMPAIGNS: Registry[CampaignKind] = Registry(
@@ -133,35 +176,6 @@ CAMPAIGNS: Registry[CampaignKind] = Registry(
     },
 )
 """By the name that a campaign's file says as `of`."""
-
-
-def in_batches(settings: CampaignSettings, *, usual: int) -> tuple[Portion, ...]:
-    """The campaign's rows in tasks of `batch`, or of `usual` where the file says nothing."""
-    return portions(count=settings.count, batch=settings.batch or usual, seed=settings.seed)
-
-
-def schema_of(question: type[VerbQuestion[Any]]) -> type[CampaignSettings]:
-    """What the file of a campaign says whose tasks ask a verb: the words of the verb."""
-    words: list[Any] = []
-    for name in entries(question):
-        if name not in CampaignSettings.__struct_fields__:
-            default = default_of(question, name)
-            words.append((name, Any) if default is dataclasses.MISSING else (name, Any, default))
-    made = msgspec.defstruct(
-        f"{question.__name__}Campaign",
-        words,
-        bases=(CampaignSettings,),
-        forbid_unknown_fields=True,
-        kw_only=True,
-        frozen=True,
-    )
-    return cast(type[CampaignSettings], made)
-
-
-def question_of(settings: CampaignSettings, question: type[Asked], **instead: Any) -> Asked:
-    """The question of a campaign's file, some of its fields from elsewhere."""
-    own = {name: getattr(settings, name) for name in entries(question)}
-    return question(**own | instead)
 
 
 def settings_of(name: str, document: Mapping[str, Any], *, where: str = "") -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import time
 from collections.abc import Mapping
@@ -13,8 +14,7 @@ from typing import Any
 import msgspec
 
 from swashplate import documents
-from swashplate.api.campaigns.flown import vehicle_of
-from swashplate.api.campaigns.kind import CAMPAIGNS, NO_RESULT, CampaignKind, CampaignSettings
+from swashplate.api.campaigns.kind import CAMPAIGNS, NO_RESULT, CampaignKind, CampaignSettings, vehicle_of
 from swashplate.api.campaigns.pool import ProcessPool
 from swashplate.api.campaigns.program import differences, program
 from swashplate.api.campaigns.store import CampaignStore
@@ -178,10 +178,10 @@ def _planned(text: str, place: Path, *, where: str) -> CampaignPlan:
         raise CampaignError("is less than one.", where=where, channel="count" if settings.count < 1 else "batch")
     files = {}
     try:
-        for entry, name, or_name in kind.files(settings):
+        for entry, name in kind.files(settings):
             if is_file(place / name):
                 files[name] = (place / name).read_bytes()
-            elif or_name:
+            elif entry == "vehicle":
                 vehicle_of(name)  # says what there is
             else:
                 raise CampaignError(f"there is no file '{name}'.", channel=entry, hint=f"It is looked for in {place}.")
@@ -192,7 +192,7 @@ def _planned(text: str, place: Path, *, where: str) -> CampaignPlan:
         raise CampaignError(
             f"its files have more than {_LARGEST >> 20} MiB, and every task takes them along.", where=where
         )
-    whole = msgspec.to_builtins(settings)
+    whole = json.loads(json.dumps(msgspec.to_builtins(settings)))  # lists as a store gives them back
     tasks = made_tasks(str(document["of"]), matters(whole), parts, files=files, program=program())
     return CampaignPlan(text, place, str(document["of"]), whole, tasks)
 

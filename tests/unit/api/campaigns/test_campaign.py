@@ -33,8 +33,8 @@ of = "multi-start"
 count = 4
 seed = 3
 vehicle = "roll.toml"
-flights = ["gusty.nc"]
-condition = false
+flight = ["gusty.nc"]
+rate = 50
 method = "output-error"
 outputs = ["p", "pdot", "ay"]
 """
@@ -206,9 +206,9 @@ def test_a_damaged_result_is_named(tmp_path: Path) -> None:
         (('kind = "campaign"', 'kind = "vehicle"'), "kind is 'vehicle', expected 'campaign'"),
         (("count = 4", "count = 0"), "count: is less than one"),
         (("count = 4", "counts = 4"), "counts: is not known here"),
-        (("gusty.nc", "missing.nc"), "flights: there is no file 'missing.nc'. It is looked for in"),
+        (("gusty.nc", "missing.nc"), "flight: there is no file 'missing.nc'. It is looked for in"),
         (("seed = 3", "factor = 0.5"), "factor, same: expected factor above 1"),
-        (('flights = ["gusty.nc"]', ""), "c.toml: flights: expected either flights or responses"),
+        (('flight = ["gusty.nc"]', ""), "c.toml: flight: expected either flights or responses"),
         (('"roll.toml"', '"rool"'), "rool: is neither a vehicle's name nor a file"),
     ],
 )
@@ -224,7 +224,9 @@ def test_a_file_that_is_none_is_refused(place: Path, tmp_path: Path, change: tup
 def test_what_is_kept_is_chosen(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     task = sp.plan_campaign(place / "c.toml").tasks[1]
     kind = worker.opened(task)[0]
-    with pytest.raises(CampaignError, match="free: is 'Lb', and 'roll' is a state-space model"):  # whose file says it
+    with pytest.raises(
+        CampaignError, match=r"free: is \('Lb',\), and 'roll' is a state-space model"
+    ):  # whose file says it
         worker.work(replace(task, settings={**task.settings, "free": "Lb"}))
     monkeypatch.setattr(type(kind), "run", lambda *_: {n: np.zeros(1) for n in ("cost", "usable", "Lb", "Lb.sigma")})
     assert list(worker.work(replace(task, settings={**task.settings, "keep": ["Lb*", "cost"]}))) == [

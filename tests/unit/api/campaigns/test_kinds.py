@@ -24,6 +24,8 @@ from swashplate.api.campaigns.kinds.multi_start import MULTI_START, optima, star
 from swashplate.api.campaigns.kinds.recovery import RECOVERY, judged
 from swashplate.api.campaigns.shares import quantile, share_interval
 from swashplate.api.campaigns.tasks import Columns, Portion, portions
+from swashplate.api.question import entries
+from swashplate.api.verbs.identify import FitTransferFunctions, FitVehicle
 from swashplate.api.verbs.simulate import FlyMany
 from swashplate.control.draws.spread import Limits
 from swashplate.errors import CampaignError
@@ -107,7 +109,7 @@ def test_flights_are_asked_for_as_the_file_says(tmp_path: Path, monkeypatch: pyt
     says = found("monte-carlo", table, **document)
     assert says.summary[0][1].startswith("1 of 2 (50 %")
     assert (says.worst, says.again) == ("place", ".nc")
-    assert [entry.entry for entry in of_flights.MONTE_CARLO.files(settings)] == ["vehicle", "controller", "fit"]
+    assert [entry for entry, _ in of_flights.MONTE_CARLO.files(settings)] == ["vehicle", "controller", "fit"]
 
 
 @pytest.mark.parametrize(
@@ -161,15 +163,15 @@ def test_starts_are_sorted_by_the_optimum_they_end_at() -> None:
         "number": np.arange(6), "cost": cost, "usable": np.array([1, 1, 1, 1, 1, 0]), "start.Lb": np.ones(6),
         "Lb": np.arange(6.0),
     }  # fmt: skip
-    says = found("multi-start", table, vehicle="coax", flights=["a"])
+    says = found("multi-start", table, vehicle="coax", flight=["a"])
     assert says.summary[0][1] == "1, number 3"
     assert says.summary[1][1].startswith("2 of 6")
     assert says.summary[2][1].startswith("2 of 6"), "an infinite cost, and one that may not be used"
     assert says.tables[0][2][:2] == (("1", "1", "2", "3"), ("2", "5", "2", "0"))
     assert says.careful == ()
-    alone = found("multi-start", table | {"cost": np.array([5, 1, 3, 7, 9, 11.0])}, vehicle="coax", flights=["a"])
+    alone = found("multi-start", table | {"cost": np.array([5, 1, 3, 7, 9, 11.0])}, vehicle="coax", flight=["a"])
     assert "reached by one start only" in alone.careful[0]
-    none = found("multi-start", table | {"usable": np.zeros(6)}, vehicle="coax", flights=["a"])
+    none = found("multi-start", table | {"usable": np.zeros(6)}, vehicle="coax", flight=["a"])
     assert none.careful == ("6 fits may not be used and are in no figure below",)
     assert MULTI_START.rows == "fit"
 
@@ -252,11 +254,24 @@ def test_a_number_that_is_zero_starts_about_it_by_its_own_spread() -> None:
 
 
 @pytest.mark.parametrize(
-    ("of", "settings"), [("recovery", {"maneuver": "hover:4s"}), ("multi-start", {"flights": ["a"]})]
+    ("of", "settings"), [("recovery", {"maneuver": "hover:4s"}), ("multi-start", {"flight": ["a"]})]
 )
 def test_a_method_that_nobody_has_is_refused_before_anything_is_computed(of: str, settings: dict[str, Any]) -> None:
     with pytest.raises(sp.SwashError, match="method is 'predicton-error', expected one of "):
         CAMPAIGNS[of].parts(settings_of(of, {"vehicle": "coax", "method": "predicton-error", **settings}), Path())
+
+
+def test_files_of_fits_and_logs_have_the_words_of_identify() -> None:
+    for of, question in (("recovery", FitVehicle), ("multi-start", FitVehicle), ("fleet", FitTransferFunctions)):
+        kind, words = CAMPAIGNS[of], set(CAMPAIGNS[of].schema.__struct_fields__)
+        assert entries(question).keys() - words == set(kind.without)
+        assert "hold_out" not in words, "files of an entry that no worker would have"
+    settings = settings_of("multi-start", {"vehicle": "v.toml", "flight": ["a.nc", "b.nc"], "mapping": "m.toml"})
+    assert list(MULTI_START.files(settings)) == [
+        ("vehicle", "v.toml"), ("flight", "a.nc"), ("flight", "b.nc"), ("mapping", "m.toml"),
+    ]  # fmt: skip
+    with pytest.raises(sp.SwashError, match="iterations: is 0, expected at least 1"):
+        MULTI_START.parts(settings_of("multi-start", {"vehicle": "coax", "flight": ["a"], "iterations": 0}), Path())
 
 
 def test_the_reason_of_most_unusable_fits_is_told() -> None:

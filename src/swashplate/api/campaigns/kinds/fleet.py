@@ -5,40 +5,36 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from swashplate.api.campaigns.kind import CampaignFindings, CampaignSettings, NamedFile
+from swashplate.api.campaigns.kind import CampaignFindings, CampaignKind, CampaignSettings, logged
 from swashplate.api.campaigns.shares import share_words
 from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
+from swashplate.api.verbs.identify import FitTransferFunctions
+from swashplate.api.verbs.respond import Respond
 from swashplate.errors import CampaignError, SwashError
-from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import inspect
-from swashplate.flights.readers.read import read
 from swashplate.identification.core.result import Result
-from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
-from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.transfer_function import Form
 
 GOOD = "good"
 _SHOWN = 40
 
 
-class FleetCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """The file of a campaign of logs.
+class FleetWords(CampaignSettings, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """What a campaign of logs says beside the words of `swash identify` for transfer functions.
 
     Attributes:
         folder: where the logs are, on every worker. pattern: which files, `**/*.bin` for folders inside it too.
         input, output: channels of the response that is fitted. others: inputs that it is conditioned on.
-        names: the log's channel by the name used here, where the log calls it otherwise.
-        mapping: a TOML file that says which columns are which channels.
-        rate: to which logs are brought [Hz]. band: limits [Hz]. form: of the transfer function.
-        least_coherence: from which a response is used. largest_cost: above it a fit is poor (J of Tischler and Remple).
+        form: of the transfer function. largest_cost: above it a fit is poor (J of Tischler and Remple).
     """
 
     folder: str
@@ -46,26 +42,21 @@ class FleetCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, 
     input: str
     output: str
     others: list[str] = msgspec.field(default_factory=list)
-    names: dict[str, str] = msgspec.field(default_factory=dict)
-    mapping: str | None = None
-    rate: float = 100.0
-    band: tuple[float, float] | None = None
     form: str = "1/2"
-    least_coherence: float = 0.6
     largest_cost: float = 100.0
 
 
-class FleetKind:
+class FleetKind(CampaignKind):
     """See `CampaignKind`."""
 
     rows = "log"
-    schema = FleetCampaign
+    question = FitTransferFunctions
+    words = FleetWords
+    without = ("responses", "hold_out", "outputs", "gains", "margins")
 
-    def files(self, settings: FleetCampaign) -> Sequence[NamedFile]:
-        return () if settings.mapping is None else (NamedFile("mapping", settings.mapping),)
-
-    def parts(self, settings: FleetCampaign, folder: Path) -> tuple[Portion, ...]:
+    def parts(self, settings: Any, folder: Path) -> tuple[Portion, ...]:
         Form.parse(settings.form)
+        self.asked(settings, {})
         place = folder / settings.folder
         if not place.is_dir():
             raise CampaignError("there is no such folder.", where=place, channel="folder")
@@ -74,7 +65,7 @@ class FleetKind:
             raise CampaignError(f"has no file '{settings.pattern}'.", where=place, channel="pattern")
         return tuple(Portion(k, 1, seed_of(settings.seed, k), str(path), _digest(path)) for k, path in enumerate(logs))
 
-    def run(self, settings: FleetCampaign, portion: Portion, files: Mapping[str, Path]) -> Columns:
+    def run(self, settings: Any, portion: Portion, files: Mapping[str, Path]) -> Columns:
         path = Path(portion.of)
         if not path.is_file() or _digest(path) != portion.digest:
             raise CampaignError("is not the log that the campaign was begun with, or not on this worker.", where=path)
@@ -85,12 +76,10 @@ class FleetKind:
         row: dict[str, Any] = {"log": path.name, "verdict": verdict, **facts, **numbers}
         return {name: np.array([value]) for name, value in row.items()}
 
-    def replay(
-        self, settings: FleetCampaign, portion: Portion, files: Mapping[str, Path], row: int
-    ) -> Result[Any, Any]:
-        return self._fit(settings, self._read(settings, Path(portion.of), files), {})
+    def replay(self, settings: Any, portion: Portion, files: Mapping[str, Path], row: int) -> Result[Any, Any]:
+        return self._fit(settings, logged(self.asked(settings, files), Path(portion.of)), files, {})
 
-    def findings(self, settings: FleetCampaign, table: Columns) -> CampaignFindings:
+    def findings(self, settings: Any, table: Columns) -> CampaignFindings:
         if "verdict" not in table:
             return CampaignFindings((), {})
         verdicts = [str(words) for words in table["verdict"]]
@@ -109,7 +98,7 @@ class FleetKind:
 
     def _judge(
         self,
-        settings: FleetCampaign,
+        settings: Any,
         path: Path,
         files: Mapping[str, Path],
         facts: dict[str, Any],
@@ -117,7 +106,7 @@ class FleetKind:
     ) -> str:
         """What a log is worth, in words; `facts` and `numbers` are filled in as far as it goes."""
         try:
-            raw = self._read(settings, path, files)
+            raw = logged(self.asked(settings, files), path)
         except SwashError as error:
             return f"cannot be read: {error.problem}"
         look = inspect(raw)
@@ -125,7 +114,7 @@ class FleetKind:
         if look.damage:
             return f"damaged: {'; '.join(look.damage)}"
         try:
-            fit = self._fit(settings, raw, numbers)
+            fit = self._fit(settings, raw, files, numbers)
         except SwashError as error:
             return f"no response: {error.problem}"
         numbers |= {"cost": float(fit.cost), **{e.name: float(e.value) for e in fit.estimates if e.name in numbers}}
@@ -135,17 +124,20 @@ class FleetKind:
             return f"poor fit: J = {fit.cost:.3g}, above {settings.largest_cost:g}"
         return GOOD
 
-    def _read(self, settings: FleetCampaign, path: Path, files: Mapping[str, Path]) -> Flight:
-        return read(path, mapping=None if settings.mapping is None else files[settings.mapping])
-
-    def _fit(self, settings: FleetCampaign, raw: Flight, numbers: dict[str, float]) -> Result[Any, Any]:
-        inputs = (settings.input, *settings.others)
-        records = uniform_records(raw, (*inputs, settings.output), rate=settings.rate, names=settings.names)
-        measured = respond(records, inputs=inputs, outputs=(settings.output,), band=settings.band)
+    def _fit(
+        self, settings: Any, raw: Flight, files: Mapping[str, Path], numbers: dict[str, float]
+    ) -> Result[Any, Any]:
+        asked: FitTransferFunctions = self.asked(settings, files)
+        renamed: Any = asked.rename or {}
+        channels = {name: renamed.get(name, name) for name in (settings.input, *settings.others)}
+        output = {settings.output: renamed.get(settings.output, settings.output)}
+        measured = Respond(
+            (raw,), inputs=channels, outputs=output, band=asked.split_band()[0], rate=asked.rate, cutoff=asked.cutoff
+        ).answer()
         numbers["coherence"] = float(np.nanmedian(measured.coherence[:, 0, 0]))
-        return fit_transfer_function(
-            measured, settings.form, input=settings.input, band=settings.band, least_coherence=settings.least_coherence
-        )
+        fit = replace(asked, responses=measured).answer().fit
+        assert fit is not None
+        return fit
 
 
 def _digest(path: Path) -> str:

@@ -2,91 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
-from swashplate.api.campaigns.fitting import (
-    Attempt,
-    LogsCampaign,
-    outcome_columns,
-    spreads_of,
-    started,
-    unusable,
-    values_of,
-    within_bounds,
-)
-from swashplate.api.campaigns.kind import CampaignFindings, NamedFile, in_batches
+from swashplate.api.asking import strings
+from swashplate.api.campaigns.fitting import FitKind, FitWords, unusable, values_of, within_bounds
+from swashplate.api.campaigns.kind import CampaignFindings, logged
 from swashplate.api.campaigns.shares import share_words
-from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
+from swashplate.api.campaigns.tasks import Columns, Portion
+from swashplate.api.verbs.identify import FitVehicle
 from swashplate.arrays import Array
 from swashplate.errors import CampaignError
-from swashplate.flights.flight import Flight
-from swashplate.identification.core.result import Result
-from swashplate.identification.estimators import check_method
+from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.vehicle import Vehicle
 
 _SHOWN = 6
 
 
-class MultiStartCampaign(LogsCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """The file of a campaign of starts, about the vehicle's numbers.
+class MultiStartWords(FitWords, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """What a campaign of starts says beside the words of `swash identify`.
 
     Attributes:
-        responses: measured responses (.nc) instead of flights, for a state-space model.
+        flight: logs to fit to. responses: measured responses (.nc) instead, for a state-space model.
         factor: each free number starts at its value times or divided by up to this; one that is zero, within plus and
             minus `factor` times its standard deviation or one.
         same: costs that differ by no more are of one optimum, in units of the cost.
     """
 
+    flight: list[str] = msgspec.field(default_factory=list)
     responses: str | None = None
     factor: float = 3.0
     same: float = 0.1
 
 
-class MultiStartKind:
+class MultiStartKind(FitKind):
     """See `CampaignKind`."""
 
-    rows = "fit"
-    schema = MultiStartCampaign
+    words = MultiStartWords
+    own_files = ("responses",)
 
-    def files(self, settings: MultiStartCampaign) -> Sequence[NamedFile]:
-        measured = [] if settings.responses is None else [NamedFile("responses", settings.responses)]
-        return (*settings.logs, *measured)
-
-    def parts(self, settings: MultiStartCampaign, folder: Path) -> tuple[Portion, ...]:
-        check_method(settings.method)
-        if bool(settings.flights) == (settings.responses is not None):
-            raise CampaignError("expected either flights or responses.", channel="flights")
+    def parts(self, settings: Any, folder: Path) -> tuple[Portion, ...]:
+        if bool(settings.flight) == (settings.responses is not None):
+            raise CampaignError("expected either flights or responses.", channel="flight")
         if not settings.factor > 1.0 or not settings.same >= 0.0:
             raise CampaignError("expected factor above 1 and same at least 0.", channel="factor, same")
-        return in_batches(settings, usual=1)
+        return super().parts(settings, folder)
 
-    def run(self, settings: MultiStartCampaign, portion: Portion, files: Mapping[str, Path]) -> Columns:
-        model, data = self._read(settings, files)
-        names = settings.free_of(model)
-        seeds = [seed_of(portion.seed, row) for row in range(portion.count)]
-        starts = [start_values(model, names, factor=settings.factor, seed=seed) for seed in seeds]
-        attempts = [Attempt.at(partial(_fitted, settings, started(model, names, begin), data)) for begin in starts]
-        columns = outcome_columns(attempts)
-        for k, name in enumerate(names):
-            columns[f"start.{name}"] = np.array([start[k] for start in starts])
-            columns[name] = np.array([attempt.estimate(name)[0] for attempt in attempts])
-        return columns
+    def start(self, settings: Any, model: Vehicle, names: Sequence[str], seed: int) -> Array:
+        return start_values(model, names, factor=settings.factor, seed=seed)
 
-    def replay(
-        self, settings: MultiStartCampaign, portion: Portion, files: Mapping[str, Path], row: int
-    ) -> Result[Any, Any]:
-        model, data = self._read(settings, files)
-        names = settings.free_of(model)
-        begin = start_values(model, names, factor=settings.factor, seed=seed_of(portion.seed, row))
-        return _fitted(settings, started(model, names, begin), data)
+    def data(self, settings: Any, asked: FitVehicle, model: Vehicle, files: Mapping[str, Path]) -> Callable[[int], Any]:
+        if settings.responses is not None:
+            responses = FrequencyResponse.load(files[settings.responses])
+            return lambda seed: responses
+        raw = tuple(logged(asked, files[name]) for name in settings.flight)
+        if model.structure is None:
+            flights = tuple(flight.condition(rate=asked.rate, cutoff=asked.cutoff) for flight in raw)
+        else:
+            channels = (*model.structure.inputs, *(strings(asked.outputs) or model.structure.outputs))
+            flights = uniform_records(raw, channels, rate=asked.rate, cutoff=asked.cutoff, names={})
+        return lambda seed: flights
 
-    def findings(self, settings: MultiStartCampaign, table: Columns) -> CampaignFindings:
+    def findings(self, settings: Any, table: Columns) -> CampaignFindings:
         if not {"cost", "usable"} <= table.keys():
             return CampaignFindings((), {})
         names = [name.removeprefix("start.") for name in table if name.startswith("start.")]
@@ -116,25 +98,13 @@ class MultiStartKind:
             careful=tuple(careful),
         )  # fmt: skip
 
-    def _read(
-        self, settings: MultiStartCampaign, files: Mapping[str, Path]
-    ) -> tuple[Vehicle, tuple[Flight, ...] | FrequencyResponse]:
-        if settings.responses is not None:
-            return settings.model(files), FrequencyResponse.load(files[settings.responses])
-        return settings.model(files), settings.records(files)
-
-
-def _fitted(
-    settings: MultiStartCampaign, begin: Vehicle, data: tuple[Flight, ...] | FrequencyResponse
-) -> Result[Any, Any]:
-    return settings.fitted(begin, data, biases=settings.biases)
-
 
 def start_values(model: Vehicle, names: Sequence[str], *, factor: float, seed: int) -> Array:
     """Where a fit starts: each number off by a factor that is evenly spread in its logarithm, within its bounds."""
     random = np.random.default_rng(seed)
     middle, spread = values_of(model, names), random.uniform(-1.0, 1.0, len(names))
-    about = factor * spread * spreads_of(model, names)
+    sigmas = np.array([getattr(model.numbers[name], "sigma", None) or 1.0 for name in names])
+    about = factor * spread * sigmas
     return within_bounds(model, names, np.where(middle == 0.0, about, middle * factor**spread))
 
 

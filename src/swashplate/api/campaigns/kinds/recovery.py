@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,25 +11,16 @@ import numpy as np
 from scipy.stats import norm
 
 from swashplate.api.asking import turbulence
-from swashplate.api.campaigns.fitting import (
-    Attempt,
-    FitCampaign,
-    outcome_columns,
-    started,
-    unusable,
-    values_of,
-    within_bounds,
-)
-from swashplate.api.campaigns.flown import vehicle_of
-from swashplate.api.campaigns.kind import CampaignFindings, NamedFile, in_batches
+from swashplate.api.campaigns.fitting import FitKind, FitWords, unusable, values_of, within_bounds
+from swashplate.api.campaigns.kind import CampaignFindings, vehicle_of
 from swashplate.api.campaigns.shares import SURE, share_interval, share_words
-from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
+from swashplate.api.campaigns.tasks import Columns, Portion
 from swashplate.api.fly_maneuver import holding
+from swashplate.api.verbs.identify import FitVehicle
+from swashplate.arrays import Array
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
-from swashplate.identification.core.result import Result
-from swashplate.identification.estimators import check_method
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import simulate_maneuver
 from swashplate.simulation.sensors import QUIET, Sensors, observe
@@ -40,12 +30,12 @@ _NORMAL = float(norm.ppf(0.5 * (1.0 + SURE)))
 """Standard deviations that hold 95 % of a normal distribution."""
 
 
-class RecoveryCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """The file of a campaign of recoveries: its vehicle is the truth.
+class RecoveryWords(FitWords, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """What a campaign of recoveries says beside the words of `swash identify`: its vehicle is the truth.
 
     Attributes:
         controller: its file; the hold of the vehicle's kind where not given.
-        maneuver: as of `swash simulate`. rate: samples per second [Hz].
+        maneuver: as of `swash simulate`.
         gusts: none, "indoor", "indoor=SIGMA", or a mean wind outdoors [m/s].
         sensors: "clean" (motion capture with noise only) or "real" (with gaps and outliers).
         noise: instead of these, standard deviations of white noise by channel, for any model.
@@ -54,52 +44,43 @@ class RecoveryCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, fr
 
     maneuver: str
     controller: str | None = None
-    rate: float = 100.0
     gusts: str | float = "none"
     sensors: Literal["clean", "real"] = "clean"
     noise: dict[str, float] = msgspec.field(default_factory=dict)
     start: float = 0.2
 
 
-class RecoveryKind:
+class RecoveryKind(FitKind):
     """See `CampaignKind`."""
 
-    rows = "fit"
-    schema = RecoveryCampaign
+    words = RecoveryWords
+    own_files = ("controller",)
+    without = (*FitKind.without, "flight", "mapping", "units", "drop_bad_stamps", "as_logged")
 
-    def files(self, settings: RecoveryCampaign) -> Sequence[NamedFile]:
-        given = (NamedFile("vehicle", settings.vehicle, True),)
-        return given if settings.controller is None else (*given, NamedFile("controller", settings.controller))
-
-    def parts(self, settings: RecoveryCampaign, folder: Path) -> tuple[Portion, ...]:
-        check_method(settings.method)
+    def parts(self, settings: Any, folder: Path) -> tuple[Portion, ...]:
         turbulence(settings.gusts)
         parse_maneuver(settings.maneuver)
         if not 0.0 <= settings.start < 1.0:
             raise CampaignError(f"is {settings.start:g}, expected 0 to less than 1.", channel="start")
-        return in_batches(settings, usual=1)
+        return super().parts(settings, folder)
 
-    def run(self, settings: RecoveryCampaign, portion: Portion, files: Mapping[str, Path]) -> Columns:
+    def start(self, settings: Any, model: Vehicle, names: Sequence[str], seed: int) -> Array:
+        off = np.random.default_rng([seed, 1]).uniform(-settings.start, settings.start, len(names))
+        return within_bounds(model, names, values_of(model, names) * (1.0 + off))
+
+    def data(self, settings: Any, asked: FitVehicle, model: Vehicle, files: Mapping[str, Path]) -> Callable[[int], Any]:
+        controller = None if settings.controller is None else files[settings.controller]
+        return lambda seed: flown(settings, model, controller, seed)
+
+    def run(self, settings: Any, portion: Portion, files: Mapping[str, Path]) -> Columns:
+        columns = super().run(settings, portion, files)
         truth = vehicle_of(str(files.get(settings.vehicle, settings.vehicle)))
-        names = settings.free_of(truth)
-        exact = values_of(truth, names)
-        seeds = [seed_of(portion.seed, row) for row in range(portion.count)]
-        attempts = [Attempt.at(partial(self._fitted, settings, truth, names, files, seed)) for seed in seeds]
-        columns = outcome_columns(attempts)
-        for name, true in zip(names, exact, strict=True):
-            value, sigma = np.array([attempt.estimate(name) for attempt in attempts]).T
+        for name in [name.removesuffix(".sigma") for name in columns if name.endswith(".sigma")]:
             with np.errstate(divide="ignore", invalid="ignore"):
-                columns |= {name: value, f"{name}.sigma": sigma, f"{name}.off": (value - true) / sigma}
+                columns[f"{name}.off"] = (columns[name] - truth.numbers[name].value) / columns[f"{name}.sigma"]
         return columns
 
-    def replay(
-        self, settings: RecoveryCampaign, portion: Portion, files: Mapping[str, Path], row: int
-    ) -> Result[Any, Any]:
-        truth = vehicle_of(str(files.get(settings.vehicle, settings.vehicle)))
-        names = settings.free_of(truth)
-        return self._fitted(settings, truth, names, files, seed_of(portion.seed, row))
-
-    def findings(self, settings: RecoveryCampaign, table: Columns) -> CampaignFindings:
+    def findings(self, settings: Any, table: Columns) -> CampaignFindings:
         names = [name.removesuffix(".off") for name in table if name.endswith(".off")]
         if not names or "usable" not in table:
             return CampaignFindings((), {})
@@ -125,14 +106,6 @@ class RecoveryKind:
         table_of = ("How often the bounds hold the truth", head, tuple(cells))
         return CampaignFindings(summary, shown, tables=(table_of,), careful=tuple(careful))
 
-    def _fitted(
-        self, settings: RecoveryCampaign, truth: Vehicle, names: Sequence[str], files: Mapping[str, Path], seed: int
-    ) -> Result[Any, Any]:
-        flight = flown(settings, truth, None if settings.controller is None else files[settings.controller], seed)
-        off = np.random.default_rng([seed, 1]).uniform(-settings.start, settings.start, len(names))
-        begin = started(truth, names, within_bounds(truth, names, values_of(truth, names) * (1.0 + off)))
-        return settings.fitted(begin, flight)
-
 
 def judged(inside: int, of: int) -> str:
     """Whether bounds that should hold the truth in 95 % of all cases do, as far as so many tell."""
@@ -144,7 +117,7 @@ def judged(inside: int, of: int) -> str:
     return "too wide" if low > SURE else "as they say"
 
 
-def flown(settings: RecoveryCampaign, truth: Vehicle, controller: Path | None, seed: int) -> Flight:
+def flown(settings: Any, truth: Vehicle, controller: Path | None, seed: int) -> Flight:
     """One flight of the truth as its sensors saw it, conditioned."""
     maneuver = parse_maneuver(settings.maneuver)
     gusts = turbulence(settings.gusts)
