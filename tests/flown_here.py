@@ -130,7 +130,7 @@ class World(begins.World):
 
     def _fresh(self) -> Craft:
         inputs = np.array(self.trim.inputs)
-        past = np.tile(inputs, (1 + int(self.steps_back.max()), 1))
+        past = np.tile(inputs, (self.depth, 1))
         return Craft(np.array(self.trim.state), past, np.array(self.pilot.memory), inputs)
 
     def set_mode(self, mode: Mode) -> None:

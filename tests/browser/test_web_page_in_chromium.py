@@ -103,12 +103,18 @@ def flown_here(world: World, plan: dict[str, Any]) -> tuple[np.ndarray, np.ndarr
     return np.array(own[0]), np.array(own[1])
 
 
-@pytest.mark.parametrize("name", ["coax", "raptor50", "crazyflie"])
+@pytest.mark.parametrize("name", ["coax", "raptor50", "crazyflie", "late"])
 def test_it_flies_as_here_with_the_network_off(browser: Any, name: str, tmp_path: Path) -> None:
-    (file,) = sp.export_model(name, "web").save(tmp_path)
+    """The last one with delays as a fit of the CoaX remembers them."""
+    vehicle = sp.vehicle("coax" if name == "late" else name)
+    if name == "late":
+        fitted = {**vehicle.card.observer, "nuisance": {"delay_motor": 0.0617, "delay_servo": 0.0333}}
+        vehicle = vehicle.with_card(replace(vehicle.card, observer=fitted))
+    (file,) = sp.export_model(vehicle, "web", name=name).save(tmp_path)
     assert file.stat().st_size < 1_000_000
     page, said = opened(browser, file)
-    world = World(sp.vehicle(name))
+    world = World(vehicle)
+    assert world.delays.any() == (name == "late")
     plan = plan_of(world)
     found = page.evaluate(FLY, plan)
     x, u = flown_here(world, plan)

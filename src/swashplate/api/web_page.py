@@ -11,9 +11,10 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.links.live.replay import flight_at
 from swashplate.links.live.single_page import LOGGED_RATE, single_page
-from swashplate.links.live.world import World
+from swashplate.links.live.world import NOT_HELD, World
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 
 MOST_DRAWS = 20
@@ -36,10 +37,9 @@ def web(request: ExportRequest) -> Export:
         )
     if len(request.draws) > MOST_DRAWS:
         raise ExportError(f"is {len(request.draws)}, expected {MOST_DRAWS} at most.", channel="draws")
-    world = World(model, controller=request.controller, draws=request.draws)
+    at_once = model.structure is None and request.late is None and any(input_delays(model).values())  # as was asked for
+    world = World(model, controller=request.controller, draws=request.draws, at_once=at_once)
     logged, left = (None, "") if request.flight is None else beside(request.flight)
-    late = {name: delay for name, delay in (request.late or {}).items() if delay}
-    not_flown = ", ".join(f"{name} {1e3 * delay:.3g} ms" for name, delay in late.items())
     page = single_page(world, name=request.name, made=request.origin, logged=logged)
     drawn = f"; {len(request.draws)} models drawn from the fit" if request.draws else ""
     drawn += f"; {request.flight.provenance.source or 'the flight'}{left}" if request.flight is not None else ""
@@ -48,7 +48,7 @@ def web(request: ExportRequest) -> Export:
         {f"{request.name}.html": page.encode()},
         (
             f"Inside: {inside}. Open it by double-click.",
-            *((f"The page's pilot flies without the identified delays ({not_flown}).",) if not_flown else ()),
+            *(() if world.holds else (f"Careful: the page's own pilot {NOT_HELD} (--controller).",)),
         ),
     )
 

@@ -7,8 +7,6 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from swashplate.atomic import scratch_folder
 from swashplate.compiler import ran, web_compiler
 from swashplate.engine.c_expression import body, filled
@@ -77,7 +75,7 @@ def frame_code(world: World) -> str:
             "ARGUMENTS": max(4, int(f.sz_arg())),
             "RESULTS": max(1, int(f.sz_res())),
             "PERIOD": len(back),
-            "DEPTH": 1 + int(np.max(back)),
+            "DEPTH": world.depth,
             "CARRIED": law.memory,
             "ASKED": len(WANTED),
             "GAINS": world.pilot.gain_count,

@@ -108,7 +108,7 @@ class Pilot:
         speed, climb, turn: what a full stick asks for where something is held [m/s], [m/s], [rad/s].
         rate: of the controller [Hz].
         title: what it is, in words.
-        delays: from command to actuator, by input [s]; None for those of a linear model, and none of another.
+        delays: from command to actuator, by input [s], of a designed controller; None for the vehicle's own.
         feels: whether it wants the specific force.
     """
 

@@ -89,7 +89,7 @@ def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
         "period": world.period,
         "logged": LOGGED_RATE,
         "sizes": {
-            "depth": 1 + int(np.max(steps)),
+            "depth": world.depth,
             "carried": pilot.memory.size,
             "gains": pilot.gain_count,
             "draws": law.draws,

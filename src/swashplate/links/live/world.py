@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,11 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import Mode, Pilot, pilot
+from swashplate.links.live.steadiness import holds
 from swashplate.models.surroundings import environment_of, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.controller import Controller
+from swashplate.simulation.linearize import linearize
 from swashplate.simulation.stepping import LONGEST_STEP
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
@@ -24,6 +27,11 @@ FAN_SECONDS = 2.0
 """How long drawn models fly on their own."""
 OPENS: Mode = "attitude"
 """The mode in which a page opens, where the law flies it."""
+HELD: tuple[Mode, ...] = ("attitude", "velocity", "position")
+"""The modes in which the pilot holds the hover by itself."""
+NOT_HELD = "does not hold the hover with the identified delays, a controller made for them would"
+REMEMBERED = 0.3
+"""Seconds of commands that the code keeps at least, so that a fit's delays need no code of their own."""
 _GUST_LENGTH, _GUST_SPEED = 5.0, 2.0
 
 
@@ -36,6 +44,7 @@ class World:
         believed: what the pilot's law is made for; the vehicle where None.
         draws: models that a fit cannot tell from this one. They fly beside it under the same law and sticks, and begin
             anew where it is every `FAN_SECONDS`.
+        at_once: leave out the delays that the card knows, or that the controller was made for.
 
     Attributes:
         environment: of its hover. nominal_voltage: of its battery [V], None without.
@@ -43,6 +52,8 @@ class World:
         substeps: of physics in one period of the law. period: of the law [s].
         delays: from command to actuator [s], by input.
         steps_back: how many periods ago the input was given that acts in a step, shape (substeps, n_inputs).
+        depth: how many commands the code keeps.
+        holds: whether the own pilot holds the hover with these delays.
 
     Raises:
         SwashError: where it has no hover, or the controller is for another vehicle.
@@ -55,6 +66,7 @@ class World:
         controller: Controller | None = None,
         believed: Vehicle | None = None,
         draws: Sequence[Vehicle] = (),
+        at_once: bool = False,
     ) -> None:
         self.vehicle, self.draws, self._controller = vehicle, tuple(draws), controller
         self.nominal_voltage = vehicle.card.values().get("voltage_nominal")
@@ -67,8 +79,19 @@ class World:
         rate = 1.0 / LONGEST_STEP if vehicle.card.options.get("ground") else PHYSICS_RATE
         self.substeps = round(rate / self.pilot.rate)
         self.period = self.substeps / rate
-        self.delays = delays_of(vehicle, self.pilot.delays)
+        known = self.pilot.delays
+        if known is None:
+            by_name = input_delays(vehicle)
+            known = np.array([by_name.get(name, 0.0) for name in vehicle.input_names])
+        self.delays = np.zeros(known.size) if at_once else known
         self.steps_back = steps_back(self.delays, self.substeps, rate)
+        self.depth = 1 + max(int(np.max(self.steps_back)), round(REMEMBERED / self.period))
+        self.holds = True
+        if controller is None and self.delays.any():
+            model, modes = linearize(vehicle, self.trim), set(HELD) & set(self.pilot.modes)
+            self.holds = all(holds(self.pilot, mode, model, self.steps_back) for mode in modes)
+        if not self.holds:
+            self.pilot = replace(self.pilot, title=f"{self.pilot.title}: {NOT_HELD}")
 
     def law_for(self, vehicle: Vehicle) -> Pilot:
         """The pilot's law, made for the numbers of some vehicle of the same kind.
@@ -88,14 +111,6 @@ def gust_filters(*, rate: float) -> list[GustFilter]:
 def page_gusts(sigma: float) -> Gusts:
     """The page's turbulence of a standard deviation [m/s]."""
     return Gusts((sigma, sigma, 0.6 * sigma), (_GUST_LENGTH,) * 3, _GUST_SPEED)
-
-
-def delays_of(vehicle: Vehicle, delays: Array | None) -> Array:
-    """From command to actuator [s], by input."""
-    if delays is not None:
-        return np.asarray(delays, dtype=np.float64)
-    late = input_delays(vehicle) if vehicle.traits.linear else {}  # the page's own pilots are tuned without
-    return np.array([late.get(name, 0.0) for name in vehicle.input_names])
 
 
 def steps_back(delays: Array, substeps: int, rate: float) -> NDArray[np.int_]:

@@ -20,7 +20,7 @@ from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
 from swashplate.links.live.replay import Replay, as_json, replay
 from swashplate.links.live.session import LiveSession
-from swashplate.links.live.world import delays_of, steps_back
+from swashplate.links.live.world import steps_back
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse, structure, to_toml
@@ -101,10 +101,10 @@ def test_input_delays_are_flown(thirteen: World) -> None:
 
 def test_delays_that_are_no_whole_controller_steps() -> None:
     late = linear_vehicle(parse(to_toml(structure("thirteen_state")).replace("value = 0.02", "value = 0.034")))
-    back = steps_back(delays_of(late, None), 5, 500.0)
+    back = World(late).steps_back
     ago = np.arange(5)[:, None] * 2 + 10 * back  # ms from when the input was given to the substep
     assert np.all((ago >= 34) & (ago < 44))
-    assert not steps_back(delays_of(sp.vehicle("coax"), None), 5, 500.0).any()
+    assert not steps_back(np.zeros(4), 5, 500.0).any()
 
 
 @pytest.fixture(scope="module")

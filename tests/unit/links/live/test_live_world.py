@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,12 +20,16 @@ from swashplate.errors import ControllerError, FlightError
 from swashplate.filtering.sensor_suite import suite
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.links.live import world as live_world
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
 from swashplate.links.live.world import FAN_SECONDS
 from swashplate.models.card import packaged_cards
 from swashplate.simulation.wind import Gusts, Turbulence, dryden
+
+ROLL_RATE = 9
+"""Its place in a state row."""
 
 
 @lru_cache
@@ -340,3 +345,21 @@ def test_a_place_that_the_wind_takes_is_told_and_one_that_is_held_is_not(coax: W
     assert "The place is not held, it is" in words
     assert "too little against this wind" in words
     fresh(coax, "position")
+
+
+@pytest.mark.parametrize(("servo", "holds"), [(0.03, True), (0.08, False)])
+def test_identified_delays_are_flown_and_a_pilot_that_does_not_hold_them_is_told(servo: float, holds: bool) -> None:
+    """The verdict of the linear loop is that of the flight: a kick fades, or grows."""
+    card = sp.vehicle("coax").card
+    late = replace(card, observer={**card.observer, "nuisance": {"delay_motor": 0.06, "delay_servo": servo}})
+    world = World(sp.vehicle("coax").with_card(late))
+    assert world.delays.tolist() == [0.06, 0.06, servo, servo]
+    assert world.steps_back[0].tolist() == [6, 6, round(100 * servo), round(100 * servo)]
+    assert world.holds == holds
+    assert ("does not hold the hover" in world.pilot.title) != holds
+    fresh(world, "attitude")
+    fly(world, 0.2, roll=1.0)
+    early = max(np.abs(fly(world, 0.01)[ROLL_RATE]) for _ in range(50))
+    fly(world, 4.0)
+    assert (max(np.abs(fly(world, 0.01)[ROLL_RATE]) for _ in range(50)) < early) == holds
+    assert not live_world.World(world.vehicle, at_once=True).delays.any()
