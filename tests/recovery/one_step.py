@@ -13,8 +13,8 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.identification.core import accuracy
+from swashplate.identification.time.estimates import LAGS
 from swashplate.identification.time.filter_error import FilterError
-from swashplate.identification.time.record_fit import LAGS
 
 
 @dataclass(frozen=True)

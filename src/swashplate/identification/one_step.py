@@ -22,7 +22,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.result import Result, bounds_of
-from swashplate.identification.time.record_fit import LAGS
+from swashplate.identification.time.estimates import LAGS
 from swashplate.models.traits import PhysicalEffect
 
 LEVEL = 0.01

@@ -81,6 +81,12 @@ class Row:
     def bounds(self) -> tuple[Array, Array]:
         return self.column("lower") / self.scale, self.column("upper") / self.scale
 
+    def numbers(self, row: Array) -> dict[str, float]:
+        """What a scaled row holds by name, in units."""
+        plain, logarithmic = row * self.scale, self.column("logarithmic") > 0.0
+        plain = np.where(logarithmic, np.exp(np.where(logarithmic, plain, 0.0)), plain)
+        return dict(zip(self.names, plain.tolist(), strict=True))
+
     def prior(self, row: Array) -> tuple[float, Array, Array]:
         """Half the squared distance from the priors, its gradient and its Hessian (the priors' information)."""
         away = row - self.column("mean") / self.scale

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +13,15 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import PUSHES
 from swashplate.identification.core import accuracy
-from swashplate.identification.core.parameters import Free, Parameterization
-from swashplate.identification.core.result import Constant, Estimate
-from swashplate.identification.core.scoring import Optimum, Sought
-from swashplate.models.vehicle import Vehicle
+from swashplate.identification.core.likelihood import Likelihood
+from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors
+from swashplate.identification.core.parameter_row import Entry, Row
+from swashplate.identification.core.parameters import Parameterization
+from swashplate.identification.core.result import Constant, Estimate, bounds_of
+from swashplate.identification.core.scoring import Optimum, Solver, Sought, minimise
+
+LAGS = 1.0
+"""Seconds of residual correlation that the corrected bound allows for."""
 
 _UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad", **dict.fromkeys(PUSHES[:3], "m/s^2")}
 _UNITS |= dict.fromkeys(PUSHES[3:], "rad/s^2")
@@ -22,48 +29,8 @@ _UNITS |= dict.fromkeys(PUSHES[3:], "rad/s^2")
 
 
 def record_unit(name: str) -> str:
-    """Unit of a constant that belongs to a record."""
-    return _UNITS.get(name) or _UNITS[name.split("_")[0]]
-
-
-@dataclass(frozen=True)
-class Found:
-    """An optimum with its covariances and the step that is left to the exact one, scaled.
-
-    Attributes:
-        table, criterion, optimum: what was sought, and where the search ended.
-        logs: names of the flights that have constants of their own.
-        prior: the priors' information (p, p).
-        plain, corrected: covariances (p, p) of the row, without and with the colour of the residuals.
-        left: Newton's step from where the search ended (p,).
-    """
-
-    table: Parameterization
-    criterion: Criterion
-    logs: tuple[str, ...]
-    optimum: Optimum
-    prior: Array
-    plain: Array
-    corrected: Array
-    left: Array
-
-    @property
-    def places(self) -> NDArray[np.intp]:
-        return self.criterion.row.places("parameter")
-
-    @property
-    def vehicle(self) -> Vehicle:
-        """The vehicle with what the search found."""
-        return self.table.vehicle.with_values(self.table.identified(self.numbers[: len(self.table.free)]))
-
-    @property
-    def numbers(self) -> Array:
-        return np.asarray(self.optimum.row * self.criterion.row.scale)
-
-    def scaled(self, covariance: Array) -> Array:
-        """A covariance of the parameters in their units."""
-        scale = self.criterion.row.scale[self.places]
-        return np.asarray(covariance[np.ix_(self.places, self.places)] * np.outer(scale, scale))
+    """Unit of a constant that belongs to a record; "" where it has none."""
+    return _UNITS.get(name) or _UNITS.get(name.split("_")[0], "")
 
 
 class Criterion(Sought, Protocol):
@@ -74,94 +41,168 @@ class Criterion(Sought, Protocol):
         ...
 
 
-def found_at(
-    table: Parameterization, likelihood: Criterion, optimum: Optimum, *, logs: tuple[str, ...], lags: int
-) -> Found:
+@dataclass(frozen=True)
+class Solved:
+    """An optimum with its covariances.
+
+    Attributes:
+        likelihood, criterion, optimum: what was sought, and where the search ended; the criterion is the likelihood, or
+            the errors ahead that it leads to.
+        prior: the priors' information (p, p).
+        plain, corrected: covariances (p, p) of the criterion's scaled row, without and with the errors' colour.
+        whole: the likelihood's row where the search ended.
+        numbers: of that, by name, in their units.
+        colour: standard deviation of each parameter by the errors' autocorrelation, over that of white errors.
+    """
+
+    likelihood: Likelihood
+    criterion: Criterion
+    optimum: Optimum
+    prior: Array
+    plain: Array
+    corrected: Array
+    whole: Array
+    numbers: Mapping[str, float]
+    colour: Array = field(default_factory=lambda: np.ones(1))
+
+    @property
+    def row(self) -> Row:
+        return self.criterion.row
+
+    @property
+    def places(self) -> NDArray[np.intp]:
+        return self.row.places("parameter")
+
+    @cached_property
+    def left(self) -> Array:
+        """Newton's step from where the search ended to the exact optimum, scaled (p,)."""
+        gradient = self.criterion.scores(self.optimum.row)[1] + self.row.prior(self.optimum.row)[1]
+        return np.asarray(-self.plain @ gradient)
+
+    def scaled(self, covariance: Array) -> Array:
+        """A covariance of the parameters in their units."""
+        scale = self.row.scale[self.places]
+        return np.asarray(covariance[np.ix_(self.places, self.places)] * np.outer(scale, scale))
+
+    def identified(self, table: Parameterization) -> dict[str, float]:
+        """Names and values of everything that moved, tied parameters too."""
+        return table.identified([self.numbers[name] for name in table.names])
+
+
+def solved_at(likelihood: Likelihood, optimum: Optimum, *, known: Array | None = None) -> Solved:
     """The covariances at an optimum: plain, and corrected for coloured residuals (Maine and Iliff 1981).
 
     Args:
-        table, likelihood, optimum: what was sought, and where the search ended.
-        logs: names of the flights that have constants of their own.
-        lags: how many errors of correlation to allow for.
+        likelihood, optimum: what was sought, and where the search ended.
+        known: information (p, p) that alone counts beside the records'; errors then may hold together over half an
+            octave (`accuracy.covariance_by_octaves`). None: that of all priors, and they do not.
     """
-    prior = likelihood.row.prior(optimum.row)[2]
-    plain = accuracy.covariance(likelihood.row, optimum.information, prior)
+    row = likelihood.row
+    prior = row.prior(optimum.row)[2] if known is None else known
+    if known is None:
+        plain = accuracy.covariance(row, optimum.information, prior)
+    else:  # noises that are not there have no information at all: what nothing tells is left out
+        plain = np.asarray(np.linalg.pinv(optimum.information + known, hermitian=True), dtype=np.float64)
     white, sensitivities, rest = likelihood.whitened(optimum.row)
+    lags = round(LAGS / likelihood.records[0].dt)
     corrected = accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=lags)
-    gradient = likelihood.scores(optimum.row)[1] + likelihood.row.prior(optimum.row)[1]
-    return Found(table, likelihood, logs, optimum, prior, plain, corrected, -plain @ gradient)
+    own, coloured = (np.diag(c)[row.places("parameter")] for c in (plain, corrected))
+    colour = np.sqrt(np.divide(coloured, own, out=np.ones_like(own), where=own > 0.0))
+    if known is not None:
+        by_octaves = accuracy.covariance_by_octaves(plain, rest + prior, white, sensitivities)
+        corrected = accuracy.covering(corrected, plain, by_octaves)
+    numbers = row.numbers(likelihood.sized(optimum.row))
+    return Solved(likelihood, likelihood, optimum, prior, plain, corrected, optimum.row, numbers, colour)
 
 
-def estimates_of(best: Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], list[str]]:
-    """Every free or tied parameter with its bounds, and in words what physics forbids."""
-    table = best.table
-    k = len(table.free)
-    values = table.identified(best.numbers[:k])
-    card = vehicle.card.parameters
-    sigma = np.sqrt(np.maximum(np.diag(best.scaled(best.plain)), 0.0))
-    corrected = np.sqrt(np.maximum(np.diag(best.scaled(best.corrected)), 0.0))
-    estimates, problems = [], []
-    scales = best.criterion.row.scale
-    total = np.diag(best.optimum.information + best.prior)[best.places]
-    insensitivity = scales[best.places] / np.sqrt(np.maximum(total, 1e-300))
-    for i, free in enumerate(table.free):
-        exact = values[free.name] + float(best.left[i] * scales[i])
-        alone, apart = _against_prior(free, exact, float(sigma[i]), float(corrected[i]))
+def solved_ahead(first: Solved, horizon: Horizon, solver: Solver, *, settling: float = 0.0) -> Solved:
+    """The optimum of the errors ahead, from that of the likelihood and beside what that knows."""
+    likelihood = first.likelihood
+    criterion = MultiStepErrors(
+        likelihood, first.whole, likelihood.records, horizon=horizon, settling=settling, known=first.corrected
+    )
+    optimum = minimise(criterion, solver, start=criterion.start)
+    optimum = replace(optimum, converged=optimum.converged and first.optimum.converged)
+    prior = criterion.row.prior(optimum.row)[2]
+    plain = accuracy.covariance(criterion.row, optimum.information, prior)
+    white, sensitivities, rest = criterion.whitened(optimum.row)
+    corrected = TWICE * accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=criterion.lags)
+    whole = criterion.whole_row(optimum.row)
+    numbers = likelihood.row.numbers(whole)
+    return Solved(likelihood, criterion, optimum, prior, plain, corrected, whole, numbers, first.colour)
+
+
+def estimates_of(
+    solved: Solved, start: Any, table: Parameterization | None = None
+) -> tuple[tuple[Estimate, ...], list[str]]:
+    """Every free or tied parameter with its bounds, and in words what physics forbids.
+
+    Args:
+        solved: where the search ended.
+        start: the model before the fit, a vehicle or a state-space model.
+        table: with ties and where priors come from (None: neither).
+    """
+    known = (start.card if hasattr(start, "card") else start).parameters
+    sources = {} if table is None else {free.name: free.source for free in table.free}
+    entries, scales = [solved.row.entries[i] for i in solved.places], solved.row.scale[solved.places]
+    sigma, corrected = (np.sqrt(np.maximum(np.diag(solved.scaled(c)), 0.0)) for c in (solved.plain, solved.corrected))
+    total = np.diag(solved.optimum.information + solved.prior)[solved.places]
+    estimates = []
+    for i, entry in enumerate(entries):
+        value, spread, held = solved.numbers[entry.name], float(sigma[i]), bool(np.isfinite(entry.sigma))
+        exact = value + float(solved.left[solved.places[i]] * scales[i]) if held else value
+        alone, apart = _against_prior(entry, exact, spread, float(corrected[i])) if held else (np.nan, np.nan)
         estimates.append(
             Estimate(
-                name=free.name,
-                unit=card[free.name].unit,
-                start=card[free.name].value,
-                value=values[free.name],
-                sigma=float(sigma[i]),
+                name=entry.name,
+                unit=known[entry.name].unit,
+                start=known[entry.name].value,
+                value=value,
+                sigma=spread,
                 sigma_corrected=float(corrected[i]),
-                insensitivity=float(insensitivity[i]),
-                prior_mean=free.mean,
-                prior_sigma=free.sigma,
-                prior_share=0.0 if free.sigma is None else float(min(1.0, (sigma[i] / free.sigma) ** 2)),
-                at_bound=free.name in best.optimum.at_bound,
-                prior_source=free.source if free.sigma is not None else "",
+                insensitivity=float(scales[i] / np.sqrt(total[i])) if total[i] > 0.0 else np.inf,
+                prior_mean=entry.mean if held else None,
+                prior_sigma=entry.sigma if held else None,
+                prior_share=float(min(1.0, (spread / entry.sigma) ** 2)) if held else 0.0,
+                at_bound=entry.name in solved.optimum.at_bound,
+                prior_source=sources.get(entry.name, "") if held else "",
                 alone=alone,
                 disagreement=apart,
             )
         )
-    for name, expression in table.ties:
-        gradient = np.array([_slope(table, best.numbers[:k], name, i) for i in range(k)])
-        sizes = [float(np.sqrt(max(gradient @ best.scaled(c) @ gradient, 0.0))) for c in (best.plain, best.corrected)]
-        estimates.append(
-            Estimate(
-                name=name,
-                unit=card[name].unit,
-                start=card[name].value,
-                value=values[name],
-                sigma=sizes[0],
-                sigma_corrected=sizes[1],
-                tie=expression.text,
-            )
-        )
-
-    for name, value in values.items():
-        low, high = card[name].lower, card[name].upper
-        inside = (low is None or value >= low - 1e-12) and (high is None or value <= high + 1e-12)
-        if not (np.isfinite(value) and inside):
-            problems.append(f"{name} = {value:.4g} is not physical (allowed: {low} to {high})")
-    if not np.isfinite(best.optimum.cost):
-        problems.append("the cost is not finite")
+    if table is not None:
+        estimates += _tied(solved, start, table)
+    problems = [] if np.isfinite(solved.optimum.cost) else ["the cost is not finite"]
+    for e, low, high in zip(estimates, *bounds_of(start, [e.name for e in estimates]), strict=True):
+        if not (np.isfinite(e.value) and low - 1e-12 <= e.value <= high + 1e-12):
+            problems.append(f"{e.name} = {e.value:.4g} is not physical (allowed: {low:g} to {high:g})")
     return tuple(estimates), problems
+
+
+def _tied(solved: Solved, start: Any, table: Parameterization) -> list[Estimate]:
+    card, values, made = start.card.parameters, solved.identified(table), []
+    numbers = np.array([solved.numbers[name] for name in table.names])
+    for name, expression in table.ties:
+        gradient = np.array([_slope(table, numbers, name, i) for i in range(len(numbers))])
+        sizes = [np.sqrt(max(gradient @ solved.scaled(c) @ gradient, 0.0)) for c in (solved.plain, solved.corrected)]
+        own = card[name]
+        plain, wider = map(float, sizes)
+        made.append(Estimate(name, own.unit, own.value, values[name], plain, wider, tie=expression.text))
+    return made
 
 
 _SEEN = 1.0 - 1e-6
 """Share of the information that is the prior's above which rounding hides what the flight says."""
 
 
-def _against_prior(free: Free, value: float, sigma: float, corrected: float) -> tuple[float, float]:
+def _against_prior(free: Entry, value: float, sigma: float, corrected: float) -> tuple[float, float]:
     """What the flight alone says, and how many sigmas that is from the prior (NaN, NaN where it says nothing).
 
     The prior's information is subtracted again: 1/F = 1/C - 1/P for the variances of flight, both and prior. A sharp
     prior holds the value almost still, so `value` must be the exact optimum. What coloured residuals add to the bound
     is added to the flight's.
     """
-    if free.mean is None or free.sigma is None or not sigma**2 < _SEEN * free.sigma**2:
+    if not sigma**2 < _SEEN * free.sigma**2:
         return float("nan"), float("nan")
     flight = 1.0 / (sigma**-2.0 - free.sigma**-2.0)
     alone = flight * (value / sigma**2 - free.mean / free.sigma**2)
@@ -176,14 +217,20 @@ def _slope(table: Parameterization, numbers: Array, name: str, place: int) -> fl
     return float((high - low) / (2.0 * step[place]))
 
 
-def constants(best: Found) -> tuple[Constant, ...]:
-    """Delays, trims and lever arms of every log."""
-    row = best.criterion.row
-    sigma = np.sqrt(np.maximum(np.diag(best.plain), 0.0)) * row.scale
-    estimates = []
-    for i in row.places("nuisance"):
-        name, _, number = row.names[i].partition("[")
-        unit = record_unit(name)
-        record = best.logs[int(number[:-1])]
-        estimates.append(Constant(record, name, unit, float(best.numbers[i]), float(sigma[i])))
-    return tuple(estimates)
+def constants(solved: Solved, names: Sequence[str], groups: Sequence[str]) -> tuple[Constant, ...]:
+    """What belongs to records and not to the model: delays, trims, start states, shifts, biases, gusts and gains.
+
+    Args:
+        solved: where the search ended. names: of the records, by the number in an entry's name.
+        groups: of entries.
+    """
+    sigma = np.sqrt(np.maximum(np.diag(solved.plain), 0.0)) * solved.row.scale
+    made = []
+    for entry, spread in zip(solved.row.entries, sigma.tolist(), strict=True):
+        if entry.group in groups:
+            name, _, number = entry.name.partition("[")
+            value = solved.numbers[entry.name]
+            record = names[int(number[:-1])] if number else ""
+            spread *= value if entry.logarithmic else 1.0
+            made.append(Constant(record, name, record_unit(name), value, spread))
+    return tuple(made)

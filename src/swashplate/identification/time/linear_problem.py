@@ -25,7 +25,7 @@ from swashplate.identification.core.result import Estimate
 from swashplate.identification.estimators import GAINS, Question
 from swashplate.identification.time.linear_filter import RATES, VELOCITIES, FilterErrors, GustErrors
 from swashplate.identification.time.linear_likelihood import LinearErrors
-from swashplate.identification.time.record_fit import RecordEstimator, RecordProblem
+from swashplate.identification.time.record_fit import SOLVER, RecordEstimator, RecordProblem
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
@@ -38,7 +38,8 @@ _TORN = 5.0
 class LinearKind:
     """State-space models."""
 
-    takes = frozenset({"gusts"})
+    takes = frozenset({"gusts", "shifts", "biases"})
+    solver = SOLVER
 
     def unsuited(self, model: Vehicle | StateSpaceModel) -> str:
         return "" if isinstance(model, StateSpaceModel) else "it fits state-space models"
@@ -64,7 +65,8 @@ class LinearKind:
         return RecordProblem(
             likelihood,
             model,
-            [model.parameters[n].unit for n in model.free],
+            method,
+            flights,
             identified,
             settings if question.gusts is None else {**settings, "gusts": question.gusts},
             words=lambda estimates: torn(estimates, model),

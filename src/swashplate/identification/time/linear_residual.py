@@ -19,7 +19,7 @@ from swashplate.filtering.disturbed_model import N_DISTURBANCES
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.parameters import Free, Parameterization, trim_of_record
-from swashplate.identification.time.estimates import Found
+from swashplate.identification.time.estimates import Solved
 from swashplate.identification.time.filter_error import FilterError
 from swashplate.identification.time.innovations import Filtered
 from swashplate.models.residual import HEADING, ROWS, coefficients, counted_from, heading_counted, with_residual
@@ -166,9 +166,8 @@ def begun_where_it_ended(row: Row, alone: Row, reached: Array, residual: LinearR
     return np.array([known[name] for name in row.names]) / row.scale
 
 
-def physics_shifts(alone: Found, together: Found) -> dict[str, float]:
+def physics_shifts(alone: Solved, together: Solved) -> dict[str, float]:
     """How far the physics moved, in standard deviations of what is free with the residual."""
     sigma = np.sqrt(np.maximum(np.diag(together.scaled(together.corrected)), 1e-300))
-    before = alone.table.identified(alone.numbers[: len(alone.table.free)])
-    after = together.table.identified(together.numbers[: len(together.table.free)])
-    return {name: (after[name] - before[name]) / float(sigma[i]) for i, name in enumerate(alone.table.names)}
+    names = [alone.row.names[i] for i in alone.places]
+    return {name: (together.numbers[name] - alone.numbers[name]) / float(sigma[i]) for i, name in enumerate(names)}

@@ -17,7 +17,7 @@ from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.estimators import GAINS, Question
 from swashplate.identification.time.feedback import mark_answers
-from swashplate.identification.time.record_fit import RecordEstimator, RecordProblem, check_biases
+from swashplate.identification.time.record_fit import SOLVER, RecordEstimator, RecordProblem, check_biases
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.surroundings import environment_of
@@ -28,7 +28,8 @@ from swashplate.models.vehicle import Vehicle
 class VehicleKind:
     """Any vehicle."""
 
-    takes = frozenset({"free", "ties", "priors", "environment"})
+    takes = frozenset({"free", "ties", "priors", "environment", "shifts", "biases"})
+    solver = SOLVER
 
     def unsuited(self, model: Vehicle | StateSpaceModel) -> str:
         return "" if isinstance(model, Vehicle) else "it fits vehicles"
@@ -65,12 +66,12 @@ class VehicleKind:
         moved = excitations(flights, model.input_names, outputs=outputs)
         answers = tuple(f"{one.input}: {one.words}" for one in of_inputs(moved).values() if one.kind == CONTROLLER)
         sources = ", ".join(piece.name for piece in likelihood.records)
-        made, card = _Identified(table, method, sources, moved), model.card.parameters
         return RecordProblem(
             likelihood,
             model,
-            [card[name].unit for name in table.names],
-            made.vehicle,
+            method,
+            flights,
+            _Identified(table, method, sources, moved).vehicle,
             {
                 "free": list(table.names),
                 "ties": [f"{name} = {tie.text}" for name, tie in table.ties],
@@ -78,7 +79,7 @@ class VehicleKind:
                 "shifts": bool(question.shifts),
                 "biases": list(question.biases),
             },
-            ties=made.ties,
+            table=table,
             words=lambda _: answers,
         )
 
@@ -91,11 +92,6 @@ class _Identified:
     method: str
     sources: str
     moved: Sequence[Excitation]
-
-    def ties(self, numbers: Mapping[str, float]) -> list[Estimate]:
-        table = self.table
-        card, values = table.vehicle.card.parameters, table.identified([numbers[n] for n in table.names])
-        return [Estimate(n, card[n].unit, card[n].value, values[n], tie=tie.text) for n, tie in table.ties]
 
     def vehicle(self, estimates: Mapping[str, Estimate]) -> Vehicle:
         table, origin = self.table, f"identified by {self.method} from {self.sources}"
