@@ -23,7 +23,8 @@ from swashplate.links.ardupilot.mixer_responses import MIXER_AXES
 from swashplate.links.ardupilot.trial import Background, TrialEndedError, TrialLine
 from swashplate.links.betaflight.binary import BetaflightBinary
 from swashplate.links.betaflight.configuration import configuration
-from swashplate.links.betaflight.gains import AXES, RATES, axis_response, betaflight_gains
+from swashplate.links.betaflight.gains import AXES, RATES, SIGNS, axis_response, betaflight_gains
+from swashplate.links.betaflight.log_clock import log_clock
 from swashplate.links.betaflight.motors import MotorMapping
 from swashplate.links.betaflight.packets import MOTORS_PORT
 from swashplate.links.betaflight.pilot import pilot_for
@@ -143,7 +144,7 @@ def _judged(
     comparison, longest = TruthBeside(), trial.session.exchanged.longest
     for axis, (sweep, began) in trial.flown.items():
         try:
-            lines += _axis(flight, axis, sweep, began, model, mapping, longest, comparison)
+            lines += _axis(flight, axis, sweep, began, trial, model, mapping, longest, comparison)
         except SwashError as error:
             lines.append(TrialLine(f"{axis}: response", str(error), "a response", False))
     return comparison
@@ -154,6 +155,7 @@ def _axis(
     axis: str,
     sweep: StickSweep,
     began: float,
+    trial: BetaflightTrial,
     model: LinearModel,
     mapping: MotorMapping,
     longest: float,
@@ -161,20 +163,32 @@ def _axis(
 ) -> list[TrialLine]:
     """Truth beside the response from the mixer's command to the rate.
 
+    The command is what the motors got of it: the mixer limits the sums that a log has. The log's clock is held against
+    ours by the stick, and the truth is taken at our frequencies.
+
     The truth is not late: a step moves the time that has passed under the newest motors, which is early by what a state
     waits for its loop. Without lockstep either side may be off by the longest step that there was, so may the phase.
     """
     place, command, stick = AXES.index(axis), f"mixer_{axis}", f"stick_{axis}"
     rate = f"{RATES[place]}_imu" if f"{RATES[place]}_imu" in flight else RATES[place]
-    start = float(flight.time(rate)[0]) + began
-    piece = flight.between(start, start + sweep.seconds)
+    pilot = np.array(trial.pilot.sent)
+    about = float(flight.time(stick)[0]) + began - trial.armed
+    clock = log_clock(
+        flight.time(stick), flight.values(stick), lambda t: np.interp(began + t, pilot[:, 0], pilot[:, 1 + place]),
+        sweep.seconds, about, channel=stick,
+    )  # fmt: skip
+    piece = flight.between(clock.start, clock.start + sweep.seconds / clock.ratio)
+    names = [f"motor_{channel}" for channel in mapping.channels]
+    if all(name in piece for name in names):
+        motors = np.array([piece.values(name) for name in names])
+        piece = piece.with_channel(command, SIGNS[place] * mapping.commands(motors)[place], like=names[0])
     records = uniform_records([piece], (command, rate, stick), rate=_RATE)
     response = respond(
         records, inputs=[command], outputs=[rate], references=(stick,), band=(1.25 * sweep.low, 0.75 * sweep.high)
     )
     h, coherence, error = response.pair(rate, command)
     good = np.isfinite(h) & (coherence >= _COHERENT)
-    true = axis_response(model, mapping, place, response.omega)
+    true = axis_response(model, mapping, place, response.omega * clock.ratio)
     share = float(np.mean(good))
     comparison.curves[(rate, command)] = {
         "truth": (response.omega, true),
@@ -183,7 +197,11 @@ def _axis(
     comparison.remarks += [f"{axis}: {text}" for text in (*response.warnings, *response.problems)]
     told = f"{100.0 * share:.0f} % of the band"
     enough = share >= _LEAST_SHARE
-    lines = [TrialLine(f"{axis}: coherent", told, f"{100.0 * _LEAST_SHARE:.0f} % of the band", enough)]
+    slow = f"{100.0 * (clock.ratio - 1.0):.2f} % slower than the physics"
+    lines = [
+        TrialLine(f"{axis}: clock of the log", slow),
+        TrialLine(f"{axis}: coherent", told, f"{100.0 * _LEAST_SHARE:.0f} % of the band", enough),
+    ]
     if good.any():
         gain, phase = gain_and_phase_off(h[good], true[good])
         sigma = np.nan_to_num(error[good])

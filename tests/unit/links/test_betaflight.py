@@ -12,6 +12,7 @@ import swashplate as sp
 from swashplate.control.laws.rotorflight.mixers import SWASHPLATES
 from swashplate.links.betaflight.configuration import configuration
 from swashplate.links.betaflight.gains import AXES, axis_response, betaflight_gains
+from swashplate.links.betaflight.log_clock import log_clock
 from swashplate.links.betaflight.motors import MotorMapping
 from swashplate.links.betaflight.packets import PulseRefusal, Pulses, pulses_of, state_packet, sticks_packet
 from swashplate.links.betaflight.servo_outputs import SwashServoMapping
@@ -168,6 +169,29 @@ def test_a_sweep_goes_from_one_end_to_the_other() -> None:
     assert sweep(-1.0) == sweep(21.0) == 0.0
     assert 0.5 / np.diff(crossings)[0] == pytest.approx(0.5, rel=0.2)
     assert 0.5 / np.diff(crossings)[-2] == pytest.approx(6.0, rel=0.1)
+
+
+@pytest.mark.parametrize("ratio", [0.97, 1.0, 1.03])
+def test_the_clock_of_a_log_is_found_by_its_stick(ratio: float) -> None:
+    sweep, random = StickSweep("roll", 0.5, 6.0, 20.0), np.random.default_rng(1)
+    time = np.arange(0.0, 40.0, 0.002)  # the log's, in which the sweep began at 9 s
+
+    def sent(t: np.ndarray) -> np.ndarray:
+        return np.array([sweep(float(each)) for each in t])
+
+    stick = -0.9 * sent((time - 9.0) * ratio) + 0.02 * random.standard_normal(time.size)
+    clock = log_clock(time, stick, sent, 20.0, 9.4, channel="stick_roll")
+    assert clock.ratio == pytest.approx(ratio, abs=2e-4)
+    assert clock.start == pytest.approx(9.0, abs=0.01)
+    with pytest.raises(sp.SwashError, match="stick_roll: is not the stick that was sent"):
+        log_clock(time, random.standard_normal(time.size), sent, 20.0, 9.4, channel="stick_roll")
+
+
+def test_commands_come_back_from_what_motors_got(craft: tuple[MotorMapping, LinearModel]) -> None:
+    mapping, _ = craft
+    asked = np.array([[0.1, -0.2, 0.05], [0.0, 0.3, 0.1], [-0.04, 0.0, 0.02]])
+    motors = 0.45 + np.array(mapping.mixer) @ asked
+    np.testing.assert_allclose(mapping.commands(motors), asked, atol=1e-12)
 
 
 def off(model: LinearModel, mapping: MotorMapping, axis: str) -> tuple[float, float]:

@@ -59,7 +59,8 @@ def mode_name(firmware: str, number: int) -> str:
 
 
 _STATISTICS = "STAT_"  # counters that ArduPilot keeps among its parameters
-_EV_ARMED, _EV_DISARMED = (10, 15), 11
+_EV_ARMED, _EV_DISARMED, _EV_AUTO_ARMED = 10, 11, 15
+"""AP_Logger's LogEvent; AUTO_ARMED comes when the throttle is raised, of a helicopter after its run-up: later."""
 # SIDS: field of the message -> field of `Chirp`.
 _CHIRP = {
     "Mag": "magnitude", "FSt": "start_hz", "FSp": "stop_hz", "TFin": "fade_in", "TC": "dwell", "TR": "record",
@@ -134,13 +135,17 @@ def _modes(messages: Messages, firmware: str) -> list[Event]:
 
 
 def _arming(messages: Messages) -> list[Event]:
-    changes: list[tuple[float, bool]] = []
+    changes, raised = list[tuple[float, bool]](), list[float]()
     if (table := messages.get("EV")) is not None:
         number = table.number("Id")
-        changes += [(t, True) for t in seconds(table)[np.isin(number, _EV_ARMED)].tolist()]
+        changes += [(t, True) for t in seconds(table)[number == _EV_ARMED].tolist()]
         changes += [(t, False) for t in seconds(table)[number == _EV_DISARMED].tolist()]
+        raised = seconds(table)[number == _EV_AUTO_ARMED].tolist()
     if (table := messages.get("ARM")) is not None:
         changes += list(zip(seconds(table).tolist(), (table.number("ArmState") == 1).tolist(), strict=True))
+    if raised and not any(time <= raised[0] for time, _ in changes):  # it was armed before the log began
+        first = (seconds(table)[:1] for table in messages.tables.values())
+        changes.append((min(time.item() for time in first if np.isfinite(time).any()), True))
     events: list[Event] = []
     for time, armed in sorted((time, armed) for time, armed in changes if math.isfinite(time)):
         kind = "armed" if armed else "disarmed"

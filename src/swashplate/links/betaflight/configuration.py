@@ -25,7 +25,7 @@ def configuration(mapping: MotorMapping, gains: Mapping[str, float]) -> str:
     """
     lines = [
         "feature -GPS",
-        "feature -AIRMODE",
+        "feature AIRMODE",  # without it the mixer takes a part of every command away below half throttle
         "feature -RX_SERIAL",
         "mixer CUSTOM",
         "mmix reset",

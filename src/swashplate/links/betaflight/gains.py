@@ -2,7 +2,7 @@
 
 Its scales (pid.h): a command is 0.032029 P per deg/s, 0.244381 I per deg and 0.000529 D per deg/s^2 of the thousand
 that are a whole one; motors get 945 us of it between their idle and their top. Loops are judged one at a time with the
-filters of its defaults, and as late as its motors are behind states that come every 2 ms from another program.
+filters of its defaults, and as late as its motors are behind states that come from another program.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ TRAVEL = 0.945
 _SCALES = {"p": 0.032029, "i": 0.244381, "d": 0.000529}
 _WHOLE, _DEGREES = 1000.0, 180.0 / np.pi
 _LATE = 0.006
-"""s: a state waits up to 2 ms, the loop 0.125 ms, its motors up to 2 ms for the next state, and half of that hold."""
+"""s: a state waits up to 0.5 ms (1 ms at real time), the loop 1 ms, its motors as long as the state for the next one;
+the rest is for a machine that is late."""
 _GYRO, _SLOPE = (250.0, 500.0), (75.0, 150.0)
 """Hz: low-passes of first order of the gyro and of D, at a low throttle."""
 _QUICK = 20.0

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from swashplate.arrays import Array
 from swashplate.errors import LinkError
 from swashplate.links.servo import Servo
 from swashplate.models.vehicle import Vehicle
@@ -46,6 +49,11 @@ class MotorMapping:
         reach = max(max(abs(x), abs(y)) for x, y in places)
         self.mixer = tuple((-y / reach, -x / reach, float(sense)) for (x, y), sense in zip(places, senses, strict=True))
         """Of each motor its share of roll (right), pitch (nose down) and yaw, as `mmix` has them."""
+
+    def commands(self, motors: Array) -> Array:
+        """The mixer's roll, pitch and yaw commands behind shares of the motors' travel, (m, n); shape (3, n)."""
+        mixed = np.column_stack([np.ones(self.motors), np.array(self.mixer)])
+        return np.asarray((np.linalg.pinv(mixed) @ motors)[1:], dtype=np.float64)
 
     def restart(self) -> None:
         """Nothing is carried over."""

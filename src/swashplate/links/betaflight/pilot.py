@@ -52,7 +52,7 @@ class AnglePilot:
         depth: of the ground below the origin of the motion [m].
         phase: what is done. height: to keep [m].
         sweep: added to the roll, pitch or yaw stick (0 to 2), a function of time since it began; None for none.
-        seen: every look. stick: the sweeps' part of the stick by look.
+        seen: every look. sent: time [s] and roll, pitch and yaw sticks (-1 to 1) of each.
     """
 
     lift: float
@@ -62,6 +62,7 @@ class AnglePilot:
     height: float = 1.0
     sweep: tuple[int, Callable[[float], float]] | None = None
     seen: list[Look] = field(default_factory=list)
+    sent: list[tuple[float, float, float, float]] = field(default_factory=list)
     _since: float = 0.0
     _due: float = -1.0
     _sum: float = 0.0
@@ -97,8 +98,10 @@ class AnglePilot:
                 added[axis] = signal(time - self._since)
                 roll, pitch, yaw = roll + added[0], pitch + added[1], yaw + added[2]
         armed = _LOW if self.phase == "off" else _HIGH
-        sticks = [_CENTRE + 500.0 * max(-1.0, min(1.0, each)) for each in (roll, pitch)]
-        self._sticks = [*sticks, _LOW + 1000.0 * throttle, _CENTRE + 500.0 * max(-1.0, min(1.0, yaw)), armed, _HIGH]
+        roll, pitch, yaw = (max(-1.0, min(1.0, each)) for each in (roll, pitch, yaw))
+        self.sent.append((time, roll, pitch, yaw))
+        sticks = [_CENTRE + 500.0 * each for each in (roll, pitch, yaw)]
+        self._sticks = [*sticks[:2], _LOW + 1000.0 * throttle, sticks[2], armed, _HIGH]
         return self._sticks
 
     def _lean(self, now: Look, north_speed: float, east_speed: float) -> tuple[float, float]:

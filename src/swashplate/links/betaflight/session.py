@@ -28,16 +28,17 @@ from swashplate.links.plant import Plant
 from swashplate.links.sensing import Sensing
 from swashplate.simulation.stepping import Motion
 
-STEP = 0.002
-"""s between two states, if the machine can."""
+STEP, _WALL = 0.0005, 0.001
+"""s between two states: twice for each of its loops, so that none works with a state again and the motors of each are
+sent, as they stand in its log; s of wall clock at least."""
 LONGEST = 0.02
 """s that the physics moves at once at most: what a machine stood still longer is lost to it, and told."""
 _TICK = 0.00025
 """s: moves are whole numbers of it."""
 _STAMP = 0.015
 """s between the two time stamps that set the pace: 20 ms are no pace for it."""
-STICKS_EVERY = 5
-"""States between two packets of sticks: 100 Hz."""
+STICKS_EVERY = 0.01
+"""s between two packets of sticks."""
 _AT_REST = 1000.0
 """us: motors before the first packet."""
 Sticks = Callable[[float, Motion], list[float] | None]
@@ -90,7 +91,7 @@ class BetaflightSession:
         self.pace, self._motors = 1.0, mapping.motors
         self.pulses = [_AT_REST] * max(plant.mapping.channels)
         self.exchanged = Exchanged()
-        self._said_broken = False
+        self._said_broken, self._due = False, 0.0
 
     def take(self, data: bytes) -> None:
         """A datagram of the motors' port, whatever it holds."""
@@ -124,8 +125,10 @@ class BetaflightSession:
         held = self.sticks(self.plant.time, moved)
         self.exchanged.states += 1
         state = state_packet(_STAMP, self._sensing.read(moved))[: self._size]
-        due = held is not None and self.exchanged.states % STICKS_EVERY == 0
-        return state, sticks_packet(self.plant.time, held) if due and held is not None else None
+        if held is None or self.plant.time < self._due:
+            return state, None
+        self._due = self.plant.time + STICKS_EVERY - 1e-9
+        return state, sticks_packet(self.plant.time, held)
 
 
 def serve(
@@ -153,7 +156,7 @@ def serve(
         came = 0
         while go_on():
             pace = session.pace
-            while (left := moved_to + STEP / pace - time.monotonic()) > 0.0:
+            while (left := moved_to + max(STEP / pace, _WALL) - time.monotonic()) > 0.0:
                 time.sleep(left)
             _receive(bound, session)
             now = time.monotonic()

@@ -56,7 +56,7 @@ class BetaflightTrial:
         height: of the hover [m]. hover: s of it. sweeps: that are flown.
         lines: what was found so far.
         armed: simulated time at which the motors began to turn [s].
-        flown: sweeps that were flown to their end, and when they began, from then [s].
+        flown: sweeps that were flown to their end, and when they began [s].
     """
 
     session: BetaflightSession
@@ -189,7 +189,7 @@ class BetaflightTrial:
         self.pilot.begin_sweep(AXES.index(sweep.axis), sweep)
         self.pause(sweep.seconds + 0.5)
         self.pilot.sweep = None
-        self.flown[sweep.axis] = sweep, began - self.armed
+        self.flown[sweep.axis] = sweep, began
         words = f"{sweep.seconds:g} s, {sweep.low:g} to {sweep.high:g} Hz"
         self._tell(f"sweep of {sweep.axis}", words, "flown to its end", True)
         self.pause(4.0)

@@ -158,6 +158,18 @@ def test_an_unfinished_last_message_is_ordinary_but_a_log_that_ends_in_flight_is
     assert sweep.details["seen"] < sweep.details["stop"]
 
 
+def test_a_raised_throttle_is_not_the_arming(tmp_path: Path) -> None:
+    """AUTO_ARMED (15) comes after a helicopter's run-up; alone it says that it was armed before the log began."""
+    for number, before in ((10, 0.5), (15, 0.0)):
+        rows = [row for row in ardupilot_rows() if row[0] != "EV" or row[1][1] == 11]
+        begun = rows[0][1][0]
+        rows[6:6] = [("EV", (begun + 500_000, number)), ("EV", (begun + 700_000, 15))]
+        flight = _flight(tmp_path, dataflash(rows), f"{number}.bin")
+        told = [(event.kind, event.time) for event in flight.provenance.events if "armed" in event.kind]
+        assert [kind for kind, _ in told] == ["armed", "disarmed"]
+        assert told[0][1] == pytest.approx(begun / 1e6 + before)
+
+
 def test_a_sweep_that_the_pilot_stopped_is_not_blamed_on_the_log(tmp_path: Path) -> None:
     rows = [row for row in ardupilot_rows() if row[0] != "SIDD" or row[1][0] < 26_000_000]
     (said,) = _flight(tmp_path, dataflash(rows)).provenance.damage
