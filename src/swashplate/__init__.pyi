@@ -18,9 +18,11 @@ from swashplate.api.verbs.link import accept_autopilot as accept_autopilot
 from swashplate.api.verbs.link import check_autopilot as check_autopilot
 from swashplate.api.verbs.maneuver import design_maneuver as design_maneuver
 from swashplate.api.verbs.maneuver import needed_excitation as needed_excitation
+from swashplate.api.verbs.respond import respond as respond
 from swashplate.api.verbs.simulate import monte_carlo as monte_carlo
 from swashplate.api.verbs.track import track as track
 from swashplate.api.verbs.validate import compare as compare
+from swashplate.api.verbs.validate import validate as validate
 from swashplate.api.verbs.vehicle import stitch as stitch
 from swashplate.control.analysis.stability import loop_margins as loop_margins
 from swashplate.control.laws.autopilot import autopilot as autopilot
@@ -41,7 +43,6 @@ from swashplate.identification.identify import identify as identify
 from swashplate.identification.posterior import posterior as posterior
 from swashplate.identification.responses.arithmetic import combine as combine
 from swashplate.identification.responses.frequency_response import FrequencyResponse as FrequencyResponse
-from swashplate.identification.responses.respond import respond as respond
 from swashplate.models.catalogue import structure as structure
 from swashplate.models.catalogue import vehicle as vehicle
 from swashplate.models.vehicle import Vehicle as Vehicle
@@ -58,7 +59,6 @@ from swashplate.simulation.sensors import observe as observe
 from swashplate.simulation.trim import trim as trim
 from swashplate.validation.residuals import residuals as residuals
 from swashplate.validation.validation import Validation as Validation
-from swashplate.validation.verb import validate as validate
 
 __version__: str
 __all__: list[str]

@@ -116,9 +116,8 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Iterator[Work]:
     done = Work()
     for verb in ("validate", "report"):
         monkeypatch.setitem(vars(sp), verb, getattr(done, verb))  # in the dictionary: nothing else is loaded
-    for verb in ("identify", "validate"):
-        monkeypatch.setattr(identification, verb, getattr(done, verb))
-    monkeypatch.setattr("swashplate.validation.verb.validate", done.validate)
+    monkeypatch.setattr(identification, "identify", done.identify)
+    monkeypatch.setattr("swashplate.validation.validate.validate", done.validate)
     monkeypatch.setattr("swashplate.reporting.report.report", done.report)
     monkeypatch.setattr(identification, "structure_of", lambda *results, title: results)
     monkeypatch.setattr(

@@ -39,8 +39,7 @@ class FromLogs(VerbQuestion[Answer]):
         """Flights as logged; those that are flights already as they are."""
         from swashplate.flights.flight import Flight
 
-        listed = [given] if isinstance(given, Flight | str | Path) else list(given or ())
-        return [one if isinstance(one, Flight) else self._read(str(one)) for one in listed]
+        return [one if isinstance(one, Flight) else self._read(str(one)) for one in _listed(given)]
 
     def _read(self, text: str) -> Flight:
         """The flight that a text names; a saved simulation goes by its file's name."""
@@ -101,11 +100,32 @@ class FromConditioned(FromLogs[Answer]):
         """Flights at one rate, each step in its history; those that are flights already as they are."""
         from swashplate.flights.flight import Flight
 
-        listed = [given] if isinstance(given, Flight | str | Path) else list(given or ())
         return [
             one if isinstance(one, Flight) else self._read(str(one)).condition(rate=self.rate, cutoff=self.cutoff)
-            for one in listed
+            for one in _listed(given)
         ]
+
+    def uniform(
+        self, given: Any, flights: Sequence[Flight], channels: Sequence[str], *, names: Any, also: Sequence[str] = ()
+    ) -> list[Flight]:
+        """What was given and read, as `uniform_records` makes it; flights that are so already as they are."""
+        from swashplate.flights.conditioning.uniform_records import is_uniform, uniform_records
+
+        made: list[Flight] = []
+        renamed = any(name != source for name, source in (names or {}).items())
+        for one, flight in zip(_listed(given), flights, strict=True):
+            if one is flight and not renamed and is_uniform(flight, [*channels, *(n for n in also if n in flight)]):
+                made.append(flight)
+            else:
+                made += uniform_records(flight, channels, rate=self.rate, cutoff=self.cutoff, names=names, also=also)
+        return made
+
+
+def _listed(given: Any) -> list[Any]:
+    """One log or several as several."""
+    from swashplate.flights.flight import Flight
+
+    return [given] if isinstance(given, Flight | str | Path) else list(given or ())
 
 
 def called(given: Any) -> list[str] | None:

@@ -22,8 +22,8 @@ from swashplate.reporting.case_parts import (
     compare_modes,
     compare_responses,
 )
+from swashplate.validation.along_inputs import fitted
 from swashplate.validation.compare import ModelComparison, along_flights
-from swashplate.validation.verb import fitted
 
 if TYPE_CHECKING:
     from swashplate.api.verbs.validate import Compare

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -197,22 +198,18 @@ def in_time(asked: FitInTime, say: Say) -> LinearStudy:
     return LinearStudy(material, structure=fit.solution)
 
 
-def along_flights(asked: Validate, model: StateSpaceModel, published: Vehicle | None, say: Say) -> LinearStudy:
+def along_flights(asked: Validate, model: StateSpaceModel, published: Vehicle | None) -> Verification:
     """A linear model along each flight's inputs, biases and shifts solved for, beside another one."""
     raw = asked.read(asked.flight)
-    say("flying the model along the inputs")
 
     def followed(one: StateSpaceModel) -> Verification:
-        flown = uniform_records(
-            raw, one.inputs, rate=asked.rate, cutoff=asked.cutoff, names=_names(asked), also=one.outputs
-        )
+        flown = asked.uniform(asked.flight, raw, one.inputs, names=_names(asked), also=one.outputs)
         return verify_inside(one, flown, band=asked.band)
 
-    rival = None
-    if published is not None:
-        other = published.structure or model_of(linearize(published), name=f"{published.name}, linearised in hover")
-        rival = followed(other)
-    return LinearStudy(ResponseMaterial(verification=followed(model), rival=rival), structure=model)
+    if published is None:
+        return followed(model)
+    other = published.structure or model_of(linearize(published), name=f"{published.name}, linearised in hover")
+    return replace(followed(model), other=followed(other))
 
 
 def _only_input(responses: FrequencyResponse) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from swashplate.api.asking import called, strings
 from swashplate.api.report_folder import ReportFolder
 from swashplate.api.saying import Say
+from swashplate.api.verbs.validate import Validate
 from swashplate.engine.roots import require_casadi
 from swashplate.errors import IdentificationError
 from swashplate.flights.checked import check_disjoint
@@ -29,7 +30,6 @@ from swashplate.reporting.summary import banners, summary
 from swashplate.reporting.terminal_tables import fit_table
 from swashplate.validation.controller_law import check_closed
 from swashplate.validation.validation import Validation
-from swashplate.validation.verb import validate
 
 if TYPE_CHECKING:
     from swashplate.api.verbs.identify import FitVehicle
@@ -170,9 +170,6 @@ def identify_vehicle(asked: FitVehicle, say: Say) -> Identification:
             refused = str(error)
     validation = None
     if unseen and not fit.failed:
-        validating = "validating on what the fit has not seen"
-        say(validating)
-        validation = validate(
-            fit, unseen, close_loop=close_loop, progress=lambda i, n: say(validating, done=i, total=n)
-        )
-    return Identification(fit, validation, refused)
+        say("validating on what the fit has not seen")
+        validation = Validate(fit, unseen, close_loop=close_loop).answer(say)
+    return Identification(fit, validation, refused)  # `records` has found the pose  # pyrefly: ignore[bad-argument-type]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -88,7 +88,7 @@ class Language:
             return self.read(list(value), called)
         if isinstance(value, list | tuple) and not self.repeated and value and all(isinstance(v, str) for v in value):
             return self.read(",".join(value), called)
-        return tuple(value) if isinstance(value, list) else value
+        return tuple(value) if isinstance(value, list | Iterator) else value
 
 
 def language_of(annotation: str, *, choices: tuple[str, ...] = ()) -> Language:

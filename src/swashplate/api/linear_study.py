@@ -29,7 +29,7 @@ class LinearStudy(ReportFolder):
     """A linear model: how it was fitted, how it follows records, and what can be read off it.
 
     Attributes:
-        material: responses, fits, trials, search, verification, rival and gains, as far as there are any.
+        material: responses, fits, trials, search, verification and gains, as far as there are any.
         margins: read off the responses and the model.
         structure: matrices of named expressions, which `model` is made of; None where there is no model.
         remarks: what the user must know beside the fit's own warnings.
@@ -108,7 +108,7 @@ class LinearStudy(ReportFolder):
             parts.append("\n".join(["Structures tried (zeros/poles):", *rows]))
         if self.fit is not None:
             parts.append("\n".join([repr(self.fit), *map(repr, self.margins)]))
-        parts += [repr(verified) for verified in (m.verification, m.rival) if verified is not None]
+        parts += [repr(m.verification)] if m.verification is not None else []
         parts += [repr(suggestion) for suggestion in m.gains]
         return "\n\n".join(parts)
 

@@ -50,7 +50,7 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
         raise SwashError("there is nothing to report.")
     parts = [
         sections_responses.gains_section(m.gains) if m.gains else None,
-        verification_section(m.verification, m.rival) if m.verification else None,
+        verification_section(m.verification) if m.verification else None,
         search_section(m.search) if m.search else None,
         sections_responses.fit_parameters_section(m.fit) if m.fit else None,
         sections_responses.time_fit_section(m.time_fit) if m.time_fit else None,

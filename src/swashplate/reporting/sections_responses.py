@@ -41,8 +41,7 @@ class ResponseMaterial:
     Attributes:
         responses: measured. transfer_functions: fits to them. trials: structures that were tried.
         fit: a state-space fit. search: for its structure.
-        verification: in time. rival: another model on the same records.
-        time_fit: a state-space model fitted to records in time.
+        verification: in time. time_fit: a state-space model fitted to records in time.
         gains: suggested for the autopilot.
     """
 
@@ -52,7 +51,6 @@ class ResponseMaterial:
     fit: StateSpaceFit | None = None
     search: StructureSearch | None = None
     verification: Verification | None = None
-    rival: Verification | None = None
     time_fit: Result[StateSpaceModel, TimeDetails] | None = None
     gains: tuple[Suggestion, ...] = field(default=())
 

@@ -16,7 +16,8 @@ _TRACES = 4
 """Stretches that are drawn."""
 
 
-def verification_section(v: Verification, rival: Verification | None = None) -> Section:
+def verification_section(v: Verification) -> Section:
+    rival = v.other
     rows = tuple(
         (
             o.output,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.shown import Shown
-from swashplate.validation.verb import along_inputs
+from swashplate.validation.along_inputs import along_inputs
 from swashplate.validation.verification import Verification
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.shown import Shown
-from swashplate.validation.verb import along_inputs
+from swashplate.validation.along_inputs import along_inputs
 from swashplate.validation.verification import Verification
 
 if TYPE_CHECKING:

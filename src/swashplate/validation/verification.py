@@ -60,6 +60,7 @@ class Verification(Shown):
         warnings: what a reader must know. data: the records, as a fit's `data`.
         inside: the same within the fitted band alone, where one was asked for.
         judgement: whether the records refute the model, and why. rivals: J_rms of the naive predictors.
+        other: another model on the same records, where one was asked for.
         constants, samples: numbers solved for, and numbers compared.
         floors: what the fits stand beside, by output.
         inputs: names of the model's inputs, in the order of the traces'. units: of inputs and outputs, by name.
@@ -82,6 +83,7 @@ class Verification(Shown):
     inputs: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     fitted_sources: tuple[str, ...] = ()
+    other: Verification | None = None
 
     @property
     def good(self) -> bool:
@@ -158,4 +160,5 @@ class Verification(Shown):
             lines.append(f"  {o.output:<10}{o.rms:>12.4g}  {o.unit:<8}{o.theil:>7.2f}{o.fit:>8.1f}")
         lines += [f"  {floor.channel}: {floor.scatter}{floor.summary_text}" for floor in self.floors]
         lines += [f"! {text}" for text in self.warnings]
-        return "\n".join(lines if self.inside is None else [*lines, repr(self.inside)])
+        lines += [repr(self.inside)] if self.inside is not None else []
+        return "\n".join([*lines, "", repr(self.other)] if self.other is not None else lines)

@@ -51,7 +51,9 @@ def test_a_result_prints_is_saved_and_makes_a_page(name: str) -> None:
     assert callable(kind.save)
 
 
-@pytest.mark.parametrize("name", ["check_controller", "compare", "design_controller", "fit_ss", "monte_carlo"])
+@pytest.mark.parametrize(
+    "name", ["check_controller", "compare", "design_controller", "fit_ss", "monte_carlo", "respond", "validate"]
+)
 def test_a_function_is_its_question(name: str) -> None:
     """Signature and help say each field with its unit, what comes of it, and what is raised."""
     verb = getattr(sp, name)

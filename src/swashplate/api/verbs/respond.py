@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import FromConditioned, called, strings
 from swashplate.api.languages import Band, Logs, Names, Numbers, Renamed
-from swashplate.api.question import argument, option, setting
+from swashplate.api.question import argument, option, setting, verb
 from swashplate.api.saying import Say, notice_unless_quiet, silent
 from swashplate.errors import SwashError
 
@@ -29,6 +29,11 @@ class Respond(FromConditioned["FrequencyResponse"]):
 
     With --combine the files are responses: they are multiplied, divided, inverted or negated, a loop is closed
     (L / (1 + L) of a broken loop with negative feedback) or broken (T / (1 - T)); FILE:OUTPUT/INPUT takes a pair.
+
+    Raises:
+        FlightError: no channel or no record to work on, inputs that no sweep moved while others were swept, a reference
+            that is a copy of an input or output, or channels that contradict each other.
+        SwashError: no sweep, where no channels are named; windows that are no lengths.
     """
 
     files: ClassVar[tuple[str, ...]] = (RESPONSES, "responses.json", "report.html")
@@ -63,7 +68,6 @@ class Respond(FromConditioned["FrequencyResponse"]):
 
     def _responded(self, say: Say) -> FrequencyResponse:
         from swashplate.flights.checked import check_disjoint
-        from swashplate.flights.conditioning.uniform_records import uniform_records
         from swashplate.identification.responses.respond import respond
 
         ins, outs, references = _pairs(self.inputs), _pairs(self.outputs), strings(self.references)
@@ -77,7 +81,7 @@ class Respond(FromConditioned["FrequencyResponse"]):
             ins, outs = ins or _pairs(moved), outs or _pairs(answering)
             told = f"inputs {', '.join(ins)}, outputs {', '.join(outs)}"
             notice_unless_quiet(f"{told}: what the sweeps moved, where --inputs and --outputs name nothing else")
-        flights = uniform_records(raw, (*ins, *outs, *references), rate=self.rate, cutoff=self.cutoff, names=ins | outs)
+        flights = self.uniform(self.logs, raw, (*ins, *outs, *references), names=ins | outs)
         check_disjoint(flights, called(self.logs))
         say("computing responses")
         return respond(
@@ -172,3 +176,6 @@ def load_responses(given: Any) -> FrequencyResponse:
         return given
     path = Path(given)
     return FrequencyResponse.load(path / RESPONSES if path.is_dir() else path)
+
+
+respond = verb("respond", Respond)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import FLIGHT, FromConditioned, FromFewLogs, called, drawn, strings
-from swashplate.api.languages import Aircraft, Band, Logs, Names, Numbers, Renamed, Things
+from swashplate.api.languages import Aircraft, Band, Drawn, Logs, Names, Numbers, Renamed, Things
 from swashplate.api.question import argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
@@ -15,16 +15,23 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from swashplate.api.case_comparison import CaseComparison
-    from swashplate.api.linear_study import LinearStudy
     from swashplate.validation.compare import ModelComparison
     from swashplate.validation.validation import Validation
+    from swashplate.validation.verification import Verification
 
 
-class Validate(FromConditioned["Validation | LinearStudy"]):
+class Validate(FromConditioned["Validation | Verification"]):
     """Predict flights from many start points and judge the predictions, next to the card and naive predictors.
 
-    A state-space model is flown along each flight's inputs instead; --band adds how it does within the band that it
-    was fitted over. Writes report.html and validation.json (verification.json) to --out.
+    So is a vehicle with the states of a rigid body, in flights whose pose was tracked. Any other model is flown along
+    each flight's inputs; start states, shifts and biases are solved for. --band adds how a state-space model does
+    within the band that it was fitted over. Writes report.html and validation.json (verification.json) to --out.
+
+    Raises:
+        FlightError: no record that is long enough, or flights that lack what the model needs.
+        SwashError: an axis whose loop cannot be closed, draws that are too few or of another model, or what such a
+            model has no use for.
+        CardError: an identified vehicle that does not say what it was identified from, and no `published`.
     """
 
     files: ClassVar[tuple[str, ...]] = ("report.html", "validation.json", "verification.json")
@@ -50,7 +57,9 @@ class Validate(FromConditioned["Validation | LinearStudy"]):
         metavar="FILE",
         help="A fit.json of this model: bands of predictions by models drawn from it, held against the flights.",
     )
-    draws: int | None = setting(default=None, help="with --posterior: how many, 39, 79, 119 and so on.", least=39)
+    draws: Drawn | None = setting(
+        default=None, help="with --posterior: how many, 39, 79, 119 and so on; in Python also models.", least=39
+    )
     band: Band | None = option(
         default=None, help="Of a state-space model: limits in Hz that it was fitted over, as 0.1-10."
     )
@@ -63,37 +72,47 @@ class Validate(FromConditioned["Validation | LinearStudy"]):
         default=None, help="NAME=CHANNEL, by commas: the log's CHANNEL as the model's NAME"
     )
 
-    def answer(self, say: Say = silent) -> Validation | LinearStudy:
+    def answer(self, say: Say = silent) -> Validation | Verification:
         from swashplate.identification.core.result import Result
         from swashplate.models.catalogue import vehicle
+        from swashplate.models.linear.state_space import StateSpaceModel
+        from swashplate.validation.along_inputs import fitted, verify_vehicle
 
-        text = isinstance(self.vehicle, str | Path)
-        judged = vehicle(self.vehicle) if text else self.vehicle
+        judged = vehicle(self.vehicle) if isinstance(self.vehicle, str | Path) else fitted(self.vehicle)
         other = vehicle(self.published) if isinstance(self.published, str | Path) else self.published
-        if self.draws is not None and self.posterior is None:
+        if isinstance(self.draws, int) and self.posterior is None:
             raise SwashError("is for --posterior.", channel="--draws", hint="Add --posterior fit.json.")
         model = judged.model if isinstance(judged, Result) else judged
-        draws = drawn(model, self.posterior, count=self.draws or 39)
-        if model.structure is not None:
-            return self._linear(model, other, say, draws=bool(draws))
-        if self.band is not None:
+        linear = model if isinstance(model, StateSpaceModel) else model.structure
+        if linear is None and self.band is not None:
             raise SwashError(
                 f"'{self._name(model)}' is a vehicle, and a band is for state-space models.", channel="--band"
             )
         if min(self.horizons) <= 0.0:
             told = ",".join(f"{one:g}" for one in self.horizons)
             raise SwashError(f"'{told}' are not all positive.", channel="--horizons")
+        if linear is not None:
+            from swashplate.api.fit_linear import along_flights
+
+            self._along(model, close_loop=self.close_loop, posterior=self.posterior, draws=self.draws)
+            say("flying the model along the inputs")
+            return along_flights(self, linear, other)
         from swashplate.flights.checked import check_disjoint
         from swashplate.identification.core.records import records
-        from swashplate.validation.validation import Validation
-        from swashplate.validation.verb import validate
+        from swashplate.identification.time.kinematics import PREDICTED
+        from swashplate.validation.validate import validate
 
+        count = self.draws if isinstance(self.draws, int) else 39
+        draws = self.draws if isinstance(self.draws, tuple) else drawn(model, self.posterior, count=count)
         say("reading flights")
         flights = self.conditioned(self.flight)
         check_disjoint(flights, called(self.flight))
+        if not set(PREDICTED) <= set(model.state_names):
+            self._along(model, close_loop=self.close_loop, posterior=draws, published=other)
+            return verify_vehicle(model, flights)
         records(flights, model)
         say("predicting (compiling takes longest the first time)")
-        made = validate(
+        return validate(
             judged,
             flights,
             published=other,
@@ -104,26 +123,24 @@ class Validate(FromConditioned["Validation | LinearStudy"]):
             draws=draws,
             progress=lambda done, total: say("predicting", done=done, total=total),
         )
-        assert isinstance(made, Validation)  # `records` has found the pose
-        return made
 
     def _name(self, model: Any) -> str:
         return str(self.vehicle) if isinstance(self.vehicle, str | Path) else model.name
 
-    def _linear(self, model: Any, other: Any, say: Say, *, draws: bool) -> LinearStudy:
-        from swashplate.api.fit_linear import along_flights
-
-        if self.close_loop or draws:
-            channel = "--close-loop" if self.close_loop else "--posterior"
-            raise SwashError(
-                f"'{self._name(model)}' is a state-space model: it flies along the inputs.", channel=channel
-            )
-        return along_flights(self, model.structure, other, say)
+    def _along(self, model: Any, **unused: Any) -> None:
+        """Refuse what is nothing to a model that is flown along the inputs."""
+        for name, value in unused.items():
+            if value:
+                raise SwashError(
+                    f"is nothing for '{self._name(model)}': it flies along the recorded inputs.",
+                    channel=f"--{name.replace('_', '-')}",
+                )
 
     def write(self, answer: Any, folder: Path, names: tuple[str, ...]) -> None:
         from swashplate.validation.validation import Validation
 
-        super().write(answer, folder, names[:2] if isinstance(answer, Validation) else names)
+        other = "verification.json" if isinstance(answer, Validation) else "validation.json"
+        super().write(answer, folder, tuple(name for name in names if name != other))
 
     def text(self, answer: Any, width: int) -> list[Any]:
         from swashplate.reporting.terminal_tables import validation_parts
@@ -131,15 +148,11 @@ class Validate(FromConditioned["Validation | LinearStudy"]):
 
         return validation_parts(answer, width=width) if isinstance(answer, Validation) else [repr(answer)]
 
-    def remarks(self, answer: Any) -> Sequence[str]:
-        from swashplate.api.linear_study import LinearStudy
-
-        return answer.remarks if isinstance(answer, LinearStudy) else ()
-
     def problems(self, answer: Any) -> Sequence[str]:
-        from swashplate.api.linear_study import LinearStudy
+        from swashplate.identification.responses.response_warnings import damaged
+        from swashplate.validation.verification import Verification
 
-        return answer.problems if isinstance(answer, LinearStudy) else ()
+        return damaged(answer.data) if isinstance(answer, Verification) else ()
 
 
 class Compare(FromFewLogs["CaseComparison | ModelComparison"], FromConditioned["CaseComparison | ModelComparison"]):
@@ -177,3 +190,4 @@ class Compare(FromFewLogs["CaseComparison | ModelComparison"], FromConditioned["
 
 
 compare = verb("compare", Compare)
+validate = verb("validate", Validate)

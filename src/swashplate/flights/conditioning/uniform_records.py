@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
 import xarray as xr
 
 from swashplate.flights.channel_names import MOTION, SET_POINT, STICK, with_names
@@ -67,6 +68,15 @@ def uniform_records(
         kept = {name: data for name, data in kept.items() if data.data_vars and data.sizes["time"] > 1}
         made.append(flight.with_streams({**flight.streams, **kept}))
     return tuple(made)
+
+
+def is_uniform(flight: Flight, channels: Sequence[str]) -> bool:
+    """Whether a flight has all channels in one stream with one step in each unbroken piece."""
+    if not all(name in flight for name in channels) or len({flight.stream_of(name) for name in channels}) != 1:
+        return False
+    steps = [np.diff(piece.time(channels[0])) for piece in flight.split()]
+    every = np.concatenate(steps)
+    return bool(every.size and np.ptp(every) <= 1e-6 * every.mean() + 1e-9 + 2.0 * np.spacing(abs(flight.epoch or 0.0)))
 
 
 def _telling(data: xr.Dataset) -> xr.Dataset:

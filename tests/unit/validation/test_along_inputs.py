@@ -61,7 +61,7 @@ def test_its_model_is_validated_and_reported_beside_the_fit(tmp_path: Path) -> N
     assert not poor.good
     page = sp.report(_fit(), checked, path=tmp_path / "report.html").read_text(encoding="utf-8")
     assert "J_rms" in page
-    with pytest.raises(SwashError, match="published: is compared with nothing"):
+    with pytest.raises(SwashError, match="published: is nothing for"):
         sp.validate(_fit(), _flight(), published=rolling())
 
 
