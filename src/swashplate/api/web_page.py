@@ -11,13 +11,12 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.links.live.replay import flight_at
 from swashplate.links.live.single_page import LOGGED_RATE, single_page
-from swashplate.links.live.world import NOT_HELD, World
+from swashplate.links.live.world import MOST_DRAWS, NOT_HELD, World
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.surroundings import input_delays
 from swashplate.models.vehicle import Vehicle
 
-MOST_DRAWS = 20
 LONGEST_LOGGED = 180.0
 """Seconds of a flight that a page takes along."""
 

@@ -16,7 +16,7 @@ from swashplate.flights.jumps import OUTLIER, attitudes, jumps
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
 from swashplate.flights.motion_signs import input_signs, sign_problem, sign_words
 from swashplate.flights.schema import channel, is_known
-from swashplate.flights.time_base import StreamSummary, time_base
+from swashplate.flights.time_base import StreamSummary, jittering, time_base
 from swashplate.shown import Shown
 from swashplate.text_table import TextTable, screen_width
 
@@ -248,7 +248,7 @@ def _looked(
 def _told(flight: Flight, streams: Sequence[StreamSummary], channels: Sequence[ChannelSummary]) -> list[str]:
     labels = {channel: name for name, group in attitudes(flight).items() for channel in group}
     outliers = {labels.get(summary.name, summary.name): summary.outliers for summary in channels if summary.outliers}
-    told = [text for stream in streams for text in stream.problems]
+    told = [*(text for stream in streams for text in stream.problems), *jittering(streams)]
     told += [text for summary in channels for text in _channel_problems(summary)]
     return told + _shared_problems(channels, outliers)
 

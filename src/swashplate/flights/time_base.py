@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,18 +45,13 @@ class StreamSummary:
 
     @property
     def problems(self) -> list[str]:
-        """What is wrong with it, in words."""
-        problems = []
-        if self.gaps:
-            problems.append(
-                f"{self.name}: {self.gaps} gap{'s' * (self.gaps != 1)} in the time stamps, the longest "
-                f"{1e3 * self.longest_gap:.0f} ms (usual step {1e3 / self.rate:.1f} ms)"
-            )
-        if self.jitter * self.rate > _JITTER:
-            problems.append(
-                f"{self.name}: time stamps jitter by {1e3 * self.jitter:.2f} ms; bring them to one rate before a fit"
-            )
-        return problems
+        """What is wrong with it alone, in words: its gaps (`jittering` tells the rest of all streams together)."""
+        if not self.gaps:
+            return []
+        return [
+            f"{self.name}: {self.gaps} gap{'s' * (self.gaps != 1)} in the time stamps, the longest "
+            f"{1e3 * self.longest_gap:.0f} ms (usual step {1e3 / self.rate:.1f} ms)"
+        ]
 
     @property
     def notes(self) -> list[str]:
@@ -68,6 +64,17 @@ class StreamSummary:
         if self.pause:
             told.append(f"{self.name}: written in some modes only; it pauses for up to {self.pause:.3g} s in others")
         return told
+
+
+def jittering(streams: Iterable[StreamSummary]) -> list[str]:
+    """What to say of streams whose stamps jitter, in one sentence; nothing where none does."""
+    uneven = [stream for stream in streams if stream.jitter * stream.rate > _JITTER]
+    if not uneven:
+        return []
+    least, most = (f"{1e3 * chosen(stream.jitter for stream in uneven):.2f}" for chosen in (min, max))
+    by = most if least == most else f"{least} to {most}"
+    names = ", ".join(stream.name for stream in uneven)
+    return [f"{names}: time stamps jitter by {by} ms; bring them to one rate before a fit"]
 
 
 def time_base(name: str, data: xr.Dataset, switched: Array) -> StreamSummary:

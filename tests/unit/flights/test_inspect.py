@@ -117,6 +117,10 @@ def test_jitter_is_the_scatter_of_the_steps() -> None:
     found = inspect(Flight({"log": stream(time, {"x": np.sin(time)})}))
     assert found.streams[0].jitter == pytest.approx(0.001, rel=0.05)
     assert any("jitter by 1.0" in problem for problem in found.problems)
+    even = stream(np.arange(2000) / 100.0, {"even": np.arange(2000.0)})
+    both = Flight({"log": stream(time, {"x": np.sin(time)}), "slow": stream(2.0 * time, {"y": time}), "even": even})
+    told = [problem for problem in inspect(both).problems if "jitter" in problem]
+    assert [text.partition(":")[0] for text in told] == ["log, slow"], "one sentence for all, none for the even one"
 
 
 def test_constant_missing_and_outlying_channels_are_named() -> None:

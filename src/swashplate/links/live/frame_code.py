@@ -18,7 +18,7 @@ from swashplate.engine.trace import traced_force, traced_placing
 from swashplate.errors import ExportError
 from swashplate.extras import missing
 from swashplate.links.live.pilots import WANTED
-from swashplate.links.live.world import World
+from swashplate.links.live.world import MOST_DRAWS, World
 
 EXPORTS = ("frame", "buffer", "delays")
 """What the module shows, beside its memory."""
@@ -80,7 +80,7 @@ def frame_code(world: World) -> str:
             "ASKED": len(WANTED),
             "GAINS": world.pilot.gain_count,
             "DRAWN": law.draws,
-            "CRAFTS": 2 + len(world.draws),
+            "CRAFTS": 2 + max(MOST_DRAWS, len(world.draws)),
             "STEP": repr(world.period / len(back)),
         },
     )

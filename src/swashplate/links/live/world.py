@@ -23,6 +23,8 @@ from swashplate.simulation.wind import GustFilter, Gusts, filters_of_gusts
 
 PHYSICS_RATE = 500.0
 """Runge-Kutta steps per second [Hz], in the air."""
+MOST_DRAWS = 20
+"""Drawn models that the code has a place for, and an exported page at most."""
 FAN_SECONDS = 2.0
 """How long drawn models fly on their own."""
 OPENS: Mode = "attitude"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -45,7 +46,9 @@ def test_without_a_compiler_a_fitted_vehicle_flies_and_other_equations_name_the_
     monkeypatch.setattr(compiler, "ziglang", lambda: None)
     monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
     fitted = sp.vehicle("coax").with_values({"tau_f_upper": 0.7, "linkage_lower": 0.2})
-    assert web_assembly(source(fitted))[:4] == b"\0asm"
+    card = replace(fitted.card, observer={"nuisance": {"delay_motor": 0.06, "delay_servo": 0.03}})
+    late = World(fitted.with_card(card), draws=[fitted] * 5)
+    assert web_assembly(frame_code(late))[:4] == b"\0asm", "with its delays and the models drawn from its fit"
     with pytest.raises(MissingLibraryError, match=r"swashplate\[compiler\]"):
         web_assembly(source(sp.vehicle("thirteen_state")))
     with pytest.raises(MissingLibraryError):
