@@ -6,7 +6,7 @@ body, x forward, y left, z up; `motor_motor_m1..4` 0 to 65535; `pwr_pm_vbat` [V]
 
 Read into NED and FRD. `roll pitch yaw` and what the autopilot estimated, demanded and computed are left out: the
 attitude is the quaternion's. What is in the file stays as logged: the delay between motors and motion differs from
-flight to flight (0 to 100 ms), the voltage has ten new values a second, each held.
+flight to flight (0 to 100 ms), the voltage has ten values a second, joined by straight lines.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _FULL = 65535.0  # the motors' command is a 16-bit share of the battery's voltag
 _LARGEST = {"room": 100.0, "cell": 25.0}  # m; V
 _NOTES = (
     "streams were joined by the host's clock: motors lead the motion by a delay that is each flight's own (0-100 ms)",
-    "the voltage has ten values a second, each held until the next",
+    "the voltage has ten values a second, joined by straight lines",
     "motor_1..4 are shares of the battery's voltage (65535 = 1); they saturate at 1",
     "logged_vx.. and logged_wx.. are the file's smoothed velocities and turning in the room's axes",
     "x y z is the tracked point, not the centre of gravity",
