@@ -71,10 +71,6 @@ class InProcess:
         self._work, self._stop, self._waiting = work, stop_after, deque[CampaignTask]()
         self.did: list[CampaignTask] = []
 
-    @property
-    def turned_away(self) -> dict[str, str]:
-        return {}
-
     def submit(self, task: CampaignTask) -> None:
         self._waiting.append(task)
 

@@ -215,8 +215,7 @@ def test_a_campaign_opens_no_door(folder: Path) -> None:
             opened = doors(process.pid)
         finally:
             process.terminate()
-    locks = {("unix", f"swashplate-core-{core}") for core in os.sched_getaffinity(0)}  # bound, nobody can connect
-    assert opened <= locks
+    assert opened == set()
 
 
 def test_a_page_is_one_door_of_this_machine(folder: Path) -> None:

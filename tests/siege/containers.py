@@ -15,8 +15,6 @@ from typing import Any
 
 import h5py
 import numpy as np
-import pyarrow as pa
-from pyarrow import parquet
 from scipy.io import savemat
 
 import made_autopilot_logs
@@ -24,7 +22,7 @@ import made_blackbox_logs
 import made_logs
 import swashplate as sp
 from made_telemetry import telemetry
-from swashplate.api.campaigns.result_files import LARGEST, NUMPY, PARQUET, unpacked
+from swashplate.api.campaigns.result_files import ENDING, unpacked
 from swashplate.errors import FlightError
 from swashplate.flights import growing
 from swashplate.flights.foreign_process import JOBS
@@ -134,7 +132,7 @@ def _growing(content: bytes, path: Path) -> object:
 
 
 def _archive(content: bytes, path: Path) -> object:
-    return _kinds(unpacked(path, content))
+    return _kinds(unpacked(content, task="task"))
 
 
 def _table(content: bytes, path: Path) -> object:
@@ -208,21 +206,6 @@ def _hdf5(*, matlab: bool) -> tuple[bytes, ...]:
         opened.create_group("s").create_dataset("p", data=np.arange(8.0).reshape(2, 4), chunks=(1, 4), compression=1)
         opened["s/text"] = "a text"
     return ((b"MATLAB 7.3 MAT-file".ljust(512, b"\0") if matlab else b"") + file.getvalue(),)
-
-
-def _results(ending: str) -> tuple[bytes, ...]:
-    table = {"seed": np.arange(3), "verdict": np.array(["found", "lost", "ä"]), "tau": np.linspace(0.0, 1.0, 3)}
-    if ending == NUMPY:
-        file = io.BytesIO()
-        np.savez(file, **table)  # type: ignore[arg-type]
-        return (file.getvalue(), stored_result(NUMPY))
-    made = [stored_result(PARQUET)]
-    for how in ({"compression": "none", "use_dictionary": False}, {"compression": "snappy"}, {"compression": "zstd"}):
-        nested = {} if how.get("use_dictionary") is False else {"list": pa.array([[1, 2], None, [3]])}
-        file = io.BytesIO()
-        parquet.write_table(pa.table({**table, **nested}), file, **how)  # type: ignore[arg-type]
-        made.append(file.getvalue())
-    return tuple(made)
 
 
 def _csv() -> tuple[bytes, ...]:
@@ -306,13 +289,6 @@ CONTAINERS: Mapping[str, Callable[[], Container]] = {
         forge=forged.by_metadata(targets.BAG_MARK),
         job=True,
     ),
-    "Parquet": _of(
-        PARQUET,
-        lambda: _results(PARQUET),
-        _job("parquet", most=LARGEST),
-        use=use_result,
-        job=True,
-    ),
-    "NumPy's archive (zip)": _of(NUMPY, lambda: _results(NUMPY), _archive, use=use_result, caught=True),
+    "NumPy's archive (zip)": _of(ENDING, lambda: (stored_result(),), _archive, use=use_result, caught=True),
 }
 """By name, made when asked for. gzip and xz: no reader opens them (tests/unit/flights/test_no_log.py)."""

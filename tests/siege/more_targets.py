@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.api.campaigns.plan import plan_campaign, planned_in
-from swashplate.api.campaigns.result_files import NUMPY, PARQUET, packed
+from swashplate.api.campaigns.result_files import ENDING, packed
 from swashplate.api.campaigns.store import PLAN, RESULTS, CampaignStore
 from swashplate.links.ardupilot.gains import read_parameter_file
 from swashplate.models.published import read_published
@@ -40,9 +40,9 @@ def _use_campaign(path: Path) -> None:
     plan_campaign(path)
 
 
-def stored_result(ending: str) -> bytes:
+def stored_result() -> bytes:
     table = {"seed": np.arange(4), "verdict": np.array(["found", "lost"] * 2), "tau": np.linspace(0.0, 1.0, 4)}
-    return packed(table, ending=ending, task="task")
+    return packed(table, task="task")
 
 
 def use_result(path: Path) -> None:
@@ -56,7 +56,7 @@ def _plan() -> bytes:
     with tempfile.TemporaryDirectory() as name:
         (Path(name) / "a.toml").write_text(CAMPAIGN)
         made = plan_campaign(Path(name) / "a.toml")
-        return json.dumps({"kind": "campaign-plan", "schema": 2, **made.stored()}).encode()
+        return json.dumps({"kind": "campaign-plan", "schema": 3, **made.stored()}).encode()
 
 
 def _use_plan(path: Path) -> None:
@@ -77,6 +77,5 @@ MORE: Mapping[str, Callable[[], Target]] = {
     "published derivatives": _of(".csv", lambda: PUBLISHED, read_published),
     "campaign": _of(".toml", lambda: (CAMPAIGN.encode(),), _use_campaign),
     "plan of a campaign": _of(".json", lambda: (_plan(),), _use_plan),
-    "result of a task": _of(PARQUET, lambda: (stored_result(PARQUET),), use_result),
-    "result of a task without the extra": _of(NUMPY, lambda: (stored_result(NUMPY),), use_result),
+    "result of a task": _of(ENDING, lambda: (stored_result(),), use_result),
 }

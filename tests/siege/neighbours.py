@@ -19,8 +19,6 @@ from typing import Any
 from .found import Found, progress
 from .plain import COMMANDS, Machine, machine
 
-EXPLAINED = ("'\\x00swashplate-core-", "b'\\x00swashplate-core-")
-"""Bound names: the locks of cores that workers of campaigns hold; nobody can connect to them."""
 ASKED = ("uname",)
 """Programs that libraries start by name (h5py): `swash` has only absolute folders on its PATH."""
 _SYSTEM = ("/lib", "/usr/lib", "/usr/local/lib", "/opt", "/proc/self")
@@ -53,7 +51,7 @@ def wrong(first: Sequence[Event], second: Sequence[Event], places: Mapping[str, 
                 found[f"others may look into {'the folder of a random name'} that it makes ({more:o})"] = None
             if name != os.devnull and not any(path.is_relative_to(place) for place in places.values()):
                 found[f"writes to {name}"] = None
-        elif event == "os.mkfifo" or (event == "socket.bind" and not name.startswith(EXPLAINED)):
+        elif event in ("os.mkfifo", "socket.bind"):
             found[f"can be reached: {event} {name}"] = None
         elif event == "socket.connect" and more != "AF_UNIX":
             found[f"connects to {name}"] = None

@@ -301,7 +301,7 @@ def test_neighbours_in_short() -> None:
         (("open", "/etc/odd", False), "writes to /etc/odd"),
         (("open", "/c/swashplate/c/a.so", True), ""),
         (("socket.bind", "('127.0.0.1', 0)", "AF_INET"), "can be reached"),
-        (("socket.bind", "'\\x00swashplate-core-0'", "AF_UNIX"), ""),
+        (("socket.bind", "'\\x00swashplate-core-0'", "AF_UNIX"), "can be reached"),
         (("socket.connect", "('1.2.3.4', 80)", "AF_INET"), "connects to"),
         (("ctypes.dlopen", "/o/planted.so", ""), ""),
         (("ctypes.dlopen", "/home/else/planted.so", ""), "loads /home/else/planted.so"),

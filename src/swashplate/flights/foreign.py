@@ -25,7 +25,7 @@ from swashplate.own_python import own_python
 from swashplate.systems import OUT_OF_TIME, resource
 from swashplate.threads import ONE_THREAD
 
-Job = Literal["hdf5", "rosbag", "parquet"]
+Job = Literal["hdf5", "rosbag"]
 Told = dict[str, Any]
 
 _LAST = {"foreign", "failed", "refused", "limit"}
@@ -56,7 +56,7 @@ class ProcessLimits:
         )
 
 
-BYTES_A_SECOND: Final[dict[Job, int]] = {"hdf5": 20 << 20, "rosbag": 512 << 10, "parquet": 20 << 20}
+BYTES_A_SECOND: Final[dict[Job, int]] = {"hdf5": 20 << 20, "rosbag": 512 << 10}
 """Of a file, that its library reads at least: a fifth of what it does on a slow processor."""
 
 

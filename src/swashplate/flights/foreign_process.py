@@ -26,7 +26,6 @@ Frame = tuple[dict[str, Any], bytes]
 JOBS = {
     "hdf5": "swashplate.flights.hdf5_frames",
     "rosbag": "swashplate.flights.readers.rosbag_frames",
-    "parquet": "swashplate.api.campaigns.parquet_frames",
 }
 
 _SQLITE_WROTE = {("apsw", "IOError"), ("apsw", "FullError")}

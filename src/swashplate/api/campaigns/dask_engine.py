@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import queue
 import socket
 import time
@@ -18,10 +19,10 @@ from swashplate.api.campaigns.scheduler import DaskScheduler
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
 from swashplate.errors import CampaignError
 from swashplate.extras import library
+from swashplate.threads import ONE_THREAD
 
 _CONNECT = 15.0  # s until a scheduler that does not answer is not there
 _COUNTED = 2.0  # s that a number of workers is believed
-_BRIEF = 10.0  # s from a worker's joining in which one that works here does not go
 _GONE = 20.0  # s without a scheduler until it is gone
 
 
@@ -49,8 +50,6 @@ class DaskEngine:
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._tasks: dict[Any, CampaignTask] = {}
         self._client: Any = None
-        self.turned_away: dict[str, str] = {}
-        self._joined: dict[str, float] = {}
         self._lost_for, self._counted, self._count = 0.0, float("-inf"), 1
         self._killed = distributed.scheduler.KilledWorker
         try:
@@ -68,7 +67,6 @@ class DaskEngine:
                 "three need certificates that the same one has signed.",
             ) from None
         self._check_workers()
-        self._client.subscribe_topic("all", self._heard)
 
     @property
     def workers(self) -> int:
@@ -81,26 +79,10 @@ class DaskEngine:
     @property
     def words(self) -> str:
         place = f"of the scheduler {self._address}"
-        told = f" ({len(self.turned_away)} came and went)" if self.turned_away else ""
         count = self.workers
         if not count:
-            return f"no worker {place}{told}, it waits for one"
-        return f"{count} worker{'s' if count > 1 else ''} {place}{told}"
-
-    def _heard(self, event: tuple[float, Any]) -> None:
-        """What the scheduler says of a worker that joined late: one that cannot read a task closes without a word."""
-        at, told = event
-        if not isinstance(told, dict):
-            return
-        address = str(told.get("worker"))
-        if told.get("action") == "add-worker":
-            self._joined[address] = at
-        elif told.get("action") == "remove-worker" and address in self._joined:
-            lasted = at - self._joined.pop(address)
-            if lasted < _BRIEF and not told.get("expected"):
-                self.turned_away[address] = (
-                    f"went {lasted:.1f} s after it had joined; swashplate may be missing there: its own log says why"
-                )
+            return f"no worker {place}, it waits for one"
+        return f"{count} worker{'s' if count > 1 else ''} {place}"
 
     def _known(self) -> dict[str, Any]:
         return dict(self._client.scheduler_info(n_workers=-1)["workers"])
@@ -215,7 +197,7 @@ def _program() -> dict[str, str]:
 
 def _done(work: Work, task: CampaignTask) -> tuple[Columns | None, str, bool]:
     """On a worker: a task done, or in words why not, and whether no worker like this one can do it."""
-    program.prepare()
+    os.environ |= ONE_THREAD
     try:
         program.check_program(task.program, where="a worker")
     except CampaignError as error:

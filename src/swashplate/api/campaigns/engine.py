@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -50,11 +50,6 @@ class TaskEngine(Protocol):
     @property
     def words(self) -> str:
         """What it is, for a person."""
-        ...
-
-    @property
-    def turned_away(self) -> Mapping[str, str]:
-        """Workers that joined and soon went, by address, in words."""
         ...
 
     def submit(self, task: CampaignTask) -> None:

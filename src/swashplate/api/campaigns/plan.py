@@ -35,7 +35,7 @@ class CampaignPlan:
     """What a campaign is to compute.
 
     Attributes:
-        text: of its file. place: the file's folder.
+        text: of its file.
         of: its kind. document: what the file says, defaults filled in.
         tasks: all of them, in the order of their rows.
         first_seconds, task_seconds, task_bytes: of the first task when it was done once and once more (None: not
@@ -43,7 +43,6 @@ class CampaignPlan:
     """
 
     text: str
-    place: Path
     of: str
     document: Mapping[str, Any]
     tasks: tuple[CampaignTask, ...]
@@ -67,7 +66,6 @@ class CampaignPlan:
         files = self.tasks[0].files if self.tasks else {}
         return {
             "of": self.of,
-            "place": str(self.place),
             "document": dict(self.document),
             "files": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
             "program": dict(self.tasks[0].program) if self.tasks else {},
@@ -143,7 +141,7 @@ def planned_in(store: CampaignStore) -> CampaignPlan:
     files = {name: store.input(digest) for name, digest in plan["files"].items()}
     parts = tuple(Portion(*portion) for portion in plan["portions"])
     tasks = made_tasks(plan["of"], matters(plan["document"]), parts, files=files, program=plan["program"])
-    return CampaignPlan(store.text(), Path(plan["place"]), plan["of"], plan["document"], tasks)
+    return CampaignPlan(store.text(), plan["of"], plan["document"], tasks)
 
 
 def changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
@@ -194,7 +192,7 @@ def _planned(text: str, place: Path, *, where: str) -> CampaignPlan:
         )
     whole = json.loads(json.dumps(msgspec.to_builtins(settings)))  # lists as a store gives them back
     tasks = made_tasks(str(document["of"]), matters(whole), parts, files=files, program=program())
-    return CampaignPlan(text, place, str(document["of"]), whole, tasks)
+    return CampaignPlan(text, str(document["of"]), whole, tasks)
 
 
 def _kind(name: Any, *, where: str) -> CampaignKind:

@@ -32,7 +32,7 @@ class _Lane:
 
 
 class ProcessPool:
-    """Processes that are spawned, each pinned to a core; a dead one is replaced, and its task told as such.
+    """Processes that are spawned, of one thread each; a dead one is replaced, and its task told as such.
 
     Args:
         work: what is done with a task.
@@ -51,10 +51,6 @@ class ProcessPool:
     @property
     def words(self) -> str:
         return f"{self.workers} processes of this machine"
-
-    @property
-    def turned_away(self) -> dict[str, str]:
-        return {}  # they are this program's own
 
     def submit(self, task: CampaignTask) -> None:
         self._waiting.append(task)
@@ -122,7 +118,6 @@ def _serve(pipe: Connection, work: Work) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the client ends it
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     program.end_with_parent()
-    program.prepare()
     while True:
         try:
             task = pipe.recv()

@@ -1,14 +1,12 @@
-"""What a worker's process is: which versions compute, on which core, with which settings of the libraries."""
+"""What a worker's process is: which versions compute."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import platform
-import socket
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib import metadata, resources
 from pathlib import Path
@@ -16,15 +14,8 @@ from pathlib import Path
 from swashplate.compiled import NATIVE, can_compile, loaded
 from swashplate.errors import CampaignError, SwashError
 from swashplate.extras import version_of
-from swashplate.threads import ONE_THREAD
 
 _LIBRARIES = ("swashplate", "casadi", "numpy", "scipy")
-_FIRST_PROCESSES = 0xEFFFFFFC
-"""Number of the namespace of processes that Linux starts with (`PROC_PID_INIT_INO`); containers have others."""
-_LOCK = "\0swashplate-core-"
-"""What the names of locks begin with; the zero byte keeps them off the disk (abstract sockets of Linux)."""
-_held: list[tuple[int, socket.socket | None]] = []
-"""The core that this process has pinned itself to, and its lock."""
 
 
 def program() -> dict[str, str]:
@@ -86,48 +77,6 @@ def check_program(wanted: Mapping[str, str], *, where: str) -> None:
             where=where,
             hint="Install the same versions there, and run `swash campaign resume`.",
         )
-
-
-def prepare() -> int | None:
-    """Make this process a worker: one thread, and one core of its own; returns the core. A second call does nothing.
-
-    Cores are shared out by locks, one a core, among all workers of a machine whoever started them: the lock goes when
-    the process ends, however it ends. Where all are taken, two workers share one. In a container no core is chosen:
-    workers of two containers would all choose the first, so the machine shares its cores out itself.
-    """
-    if _held:
-        return _held[0][0]
-    os.environ |= ONE_THREAD
-    if not hasattr(os, "sched_setaffinity") or _in_container():
-        return None
-    cores = sorted(os.sched_getaffinity(0))
-    _held.append(next(_free(cores), (cores[os.getpid() % len(cores)], None)))
-    core = _held[0][0]
-    for thread in [int(name) for name in os.listdir("/proc/self/task")] if os.path.isdir("/proc/self/task") else [0]:
-        with contextlib.suppress(OSError):
-            os.sched_setaffinity(thread, {core})
-    return core
-
-
-def _in_container() -> bool:
-    """Whether this process sees only a part of the machine's processes: what it locks, other containers do not see."""
-    try:
-        return os.stat("/proc/self/ns/pid").st_ino != _FIRST_PROCESSES
-    except OSError:
-        return True
-
-
-def _free(cores: list[int]) -> Iterator[tuple[int, socket.socket]]:
-    """A core that no other worker holds, with its lock: a socket's name that only one process of a machine can have."""
-    for core in cores:
-        lock = socket.socket(socket.AF_UNIX)
-        try:
-            lock.bind(f"{_LOCK}{core}")
-        except OSError:
-            lock.close()
-            continue
-        yield core, lock
-        return
 
 
 def end_with_parent() -> None:

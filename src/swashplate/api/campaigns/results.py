@@ -15,11 +15,12 @@ import xarray as xr
 from swashplate import atomic
 from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings, settings_of
 from swashplate.api.campaigns.plan import planned_in
-from swashplate.api.campaigns.result_files import PARQUET, packed
+from swashplate.api.campaigns.result_files import tabulated
 from swashplate.api.campaigns.shares import quantile
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import Columns
 from swashplate.errors import CampaignError
+from swashplate.extras import library
 from swashplate.reporting.campaign import FailedTask, Shape, WorstRow, compose_campaign
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
@@ -39,7 +40,6 @@ class Campaign(Shown):
         names: of its tasks, in the order of their rows. rows: numbers of each task's. done: those whose result is here.
         failed: tasks that were given up, by name.
         at_work: who computes it now, in words; "" for nobody.
-        turned_away: workers that joined and soon went, by address, in words.
     """
 
     folder: Path
@@ -50,7 +50,6 @@ class Campaign(Shown):
     done: frozenset[str]
     failed: Mapping[str, Mapping[str, Any]] = field(repr=False)
     at_work: str = ""
-    turned_away: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
@@ -124,9 +123,6 @@ class Campaign(Shown):
             told += f", the results of {len(self.refused)} refused"
         if self.failed:
             told += f", {len(self.failed)} given up"
-        if self.turned_away:
-            address, words = next(iter(self.turned_away.items()))
-            told += f", {len(self.turned_away)} workers came and went (the first, {address}, {words})"
         left = len(self.names) - len(self.done) - len(self.failed) + len(self.refused)
         if left and not self.at_work:
             told += f"; `swash campaign resume {self.folder}` goes on"
@@ -184,19 +180,20 @@ class Campaign(Shown):
             MissingLibraryError: for .parquet without the extra `scale`.
             WriteError: where it cannot be written.
         """
-        place = Path(path)
+        import pandas as pd
+
+        place, table = Path(path), tabulated(self.table)
         if place.suffix == ".nc":
-            data = xr.Dataset({name: ("row", values) for name, values in self.table.items()})
+            data = xr.Dataset({name: ("row", values) for name, values in table.items()})
             stream = io.BytesIO()
             data.to_netcdf(stream, engine="h5netcdf")
             return atomic.write_bytes(place, stream.getvalue())
-        if place.suffix == PARQUET:
-            return atomic.write_bytes(place, packed(self.table, ending=PARQUET))
+        if place.suffix == ".parquet":
+            library("pyarrow", what="a table in Parquet")
+            return atomic.write_bytes(place, pd.DataFrame(table).to_parquet(engine="pyarrow", index=False))
         if place.suffix != ".csv":
-            raise CampaignError(f"ends in '{place.suffix}', expected .nc, .csv or {PARQUET}.", where=place)
-        lines = [",".join(self.table)]
-        lines += [",".join(map(_cell, row)) for row in zip(*self.table.values(), strict=True)]
-        return atomic.write_text(place, "\n".join(lines) + "\n")
+            raise CampaignError(f"ends in '{place.suffix}', expected .nc, .csv or .parquet.", where=place)
+        return atomic.write_text(place, pd.DataFrame(table).to_csv(index=False, na_rep="nan"))
 
     def __repr__(self) -> str:
         told = [
@@ -236,16 +233,5 @@ def campaign_results(folder: str | Path) -> Campaign:
     names = tuple(task.name for task in plan.tasks)
     failed = {name: told for name, told in store.failed().items() if name in set(names)}
     done = store.done() & set(names)
-    away = store.turned_away()
     rows = tuple(range(t.portion.first, t.portion.first + t.portion.count) for t in plan.tasks)
-    return Campaign(
-        Path(folder), plan.of, plan.document, names, rows, done, failed, at_work=store.owner, turned_away=away
-    )
-
-
-def _cell(value: Any) -> str:
-    text = repr(value.item()) if hasattr(value, "item") else str(value)
-    if isinstance(value, str | np.str_):
-        text = str(value)
-        return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n') else text
-    return text
+    return Campaign(Path(folder), plan.of, plan.document, names, rows, done, failed, at_work=store.owner)

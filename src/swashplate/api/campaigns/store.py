@@ -16,22 +16,20 @@ from typing import Any
 import msgspec
 
 from swashplate import atomic, documents, systems
-from swashplate.api.campaigns.result_files import ENDINGS, LARGEST, packed, unpacked, usual_ending
+from swashplate.api.campaigns.result_files import ENDING, LARGEST, packed, unpacked
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
-from swashplate.errors import CampaignError, MissingLibraryError
+from swashplate.errors import CampaignError
 from swashplate.files import read_bytes
 
 FILE, PLAN, LOCK = "campaign.toml", "plan.json", "lock"
 RESULTS, FAILED, INPUTS = "results", "failed", "inputs"
-TURNED_AWAY = "turned-away.json"
-_SCHEMA = 2
+_SCHEMA = 3
 
 
 class _Plan(msgspec.Struct):
     """What `CampaignPlan.stored` writes."""
 
     of: str
-    place: str
     document: dict[str, Any]
     files: dict[str, str]
     program: dict[str, str]
@@ -41,9 +39,8 @@ class _Plan(msgspec.Struct):
 class CampaignStore:
     """Results by the names of their tasks.
 
-    A result is one file, `results/NAME.parquet` (`.npz` without the extra `scale`), that appears by rename when it is
-    complete and is never written again: a task that two workers have done after all is in the table once. What failed
-    for good is `failed/NAME.json`.
+    A result is one file, `results/NAME.npz`, that appears by rename when it is complete and is never written again: a
+    task that two workers have done after all is in the table once. What failed for good is `failed/NAME.json`.
 
     Args:
         folder: of the campaign; it need not be there.
@@ -111,7 +108,7 @@ class CampaignStore:
     # ---- results ---------------------------------------------------------------------------------------------------
     def done(self) -> frozenset[str]:
         """Names of the tasks whose result is here."""
-        return self._names(RESULTS, *ENDINGS)
+        return self._names(RESULTS, ENDING)
 
     def failed(self) -> dict[str, dict[str, Any]]:
         """What failed for good, by the task's name: see `give_up`."""
@@ -120,17 +117,16 @@ class CampaignStore:
             failures[name] = documents.read_document(self.folder / FAILED / f"{name}.json", form="json")
         return failures
 
-    def _names(self, folder: str, *endings: str) -> frozenset[str]:
+    def _names(self, folder: str, ending: str) -> frozenset[str]:
         place = self.folder / folder
         if not place.is_dir():
             return frozenset()
         names = (Path(entry.name) for entry in os.scandir(place))
-        return frozenset(n.stem for n in names if n.suffix in endings and not n.name.startswith("."))
+        return frozenset(n.stem for n in names if n.suffix == ending and not n.name.startswith("."))
 
-    def _result(self, name: str) -> Path | None:
-        """The file of a task's result, where it is here."""
-        paths = (self.folder / RESULTS / f"{name}{ending}" for ending in ENDINGS)
-        return next((path for path in paths if path.exists()), None)
+    def _result(self, name: str) -> Path:
+        """The file of a task's result."""
+        return self.folder / RESULTS / f"{name}{ENDING}"
 
     def keep(self, task: CampaignTask, columns: Columns) -> None:
         """Write a task's result, once: where it is there already, nothing happens.
@@ -138,14 +134,13 @@ class CampaignStore:
         Raises:
             WriteError: a full disk and the like; nothing of this result is left then, and everything before it is.
         """
-        if self._result(task.name):
+        if self._result(task.name).exists():
             return
-        ending = usual_ending()
         try:
-            content = packed(columns, ending=ending, task=task.name)
+            content = packed(columns, task=task.name)
         except CampaignError as error:
             raise CampaignError(error.problem, where=f"task {task.name}", channel=error.channel) from None
-        atomic.write_bytes(self.folder / RESULTS / f"{task.name}{ending}", content)
+        atomic.write_bytes(self._result(task.name), content)
         (self.folder / FAILED / f"{task.name}.json").unlink(missing_ok=True)
 
     def give_up(self, task: CampaignTask, words: Sequence[str]) -> None:
@@ -154,24 +149,13 @@ class CampaignStore:
         told = {"first": portion.first, "count": portion.count, "seed": portion.seed, "of": portion.of}
         atomic.write_json(self.folder / FAILED / f"{task.name}.json", {**told, "tries": list(words)})
 
-    def turn_away(self, workers: Mapping[str, str]) -> None:
-        """Write which workers joined and went, beside those of earlier runs; nothing for none."""
-        if workers:
-            atomic.write_json(self.folder / TURNED_AWAY, {**self.turned_away(), **workers})
-
-    def turned_away(self) -> dict[str, str]:
-        """Workers that joined and went, by address, in words."""
-        path = self.folder / TURNED_AWAY
-        return documents.read_document(path, form="json") if path.is_file() else {}
-
     def columns(self, name: str) -> Columns:
         """The result of a task.
 
         Raises:
             CampaignError: a file that cannot be read, that is no result, another task's, or whose values were changed.
-            MissingLibraryError: a result in Parquet, without the extra `scale`.
         """
-        return self._unpacked(*self._content(name), name)
+        return _unpacked(*self._content(name), name)
 
     def forget_refused(self, names: Iterable[str]) -> tuple[str, ...]:
         """Remove results that are not what was computed, so that their tasks are done again; returns these names.
@@ -183,32 +167,18 @@ class CampaignStore:
         for name in names:
             path, content = self._content(name)
             try:
-                self._unpacked(path, content, name)
+                _unpacked(path, content, name)
             except CampaignError:
                 path.unlink(missing_ok=True)
                 refused.append(name)
         return tuple(refused)
 
     def _content(self, name: str) -> tuple[Path, bytes]:
-        path = self._result(name) or self.folder / RESULTS / f"{name}{usual_ending()}"
+        path = self._result(name)
         try:
             return path, read_bytes(path, most=LARGEST)
         except OSError as error:
             raise CampaignError(f"cannot be read: {error.strerror}.", where=path, hint="Check the disk.") from None
-
-    @staticmethod
-    def _unpacked(path: Path, content: bytes, name: str) -> Columns:
-        try:
-            return unpacked(path, content, task=name)
-        except MissingLibraryError:
-            raise
-        except Exception as error:  # whatever the libraries raise on damaged bytes is the file's fault
-            words = str(getattr(error, "problem", error)).rstrip(".")
-            raise CampaignError(
-                f"is no result of its task: {words or type(error).__name__}.",
-                where=path,
-                hint="`swash campaign resume` does the task again.",
-            ) from None
 
     # ---- lock ------------------------------------------------------------------------------------------------------
     @contextmanager
@@ -252,6 +222,14 @@ class CampaignStore:
         finally:
             os.close(descriptor)
         return ""
+
+
+def _unpacked(path: Path, content: bytes, name: str) -> Columns:
+    try:
+        return unpacked(content, task=name)
+    except Exception as error:  # whatever the libraries raise on damaged bytes is the file's fault
+        words, hint = str(error).rstrip(".") or type(error).__name__, "`swash campaign resume` does the task again."
+        raise CampaignError(f"is no result of its task: {words}.", where=path, hint=hint) from None
 
 
 def _locked(descriptor: int) -> bool:

@@ -18,7 +18,7 @@ from swashplate.api.campaigns.scheduler import DaskScheduler
 from swashplate.api.campaigns.store import FAILED, CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
 from swashplate.api.saying import Say
-from swashplate.errors import CampaignError, WriteError
+from swashplate.errors import CampaignError
 
 if TYPE_CHECKING:
     from swashplate.api.verbs.campaign import ResumeCampaign, RunCampaign
@@ -144,8 +144,6 @@ def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int]
     finally:
         with suppress(KeyboardInterrupt):
             engine.close()
-        with suppress(WriteError):  # a full disk has been said already
-            store.turn_away(engine.turned_away)
 
 
 def _told(say: Say, made: CampaignPlan, engine: TaskEngine, standing: CampaignStanding) -> None:

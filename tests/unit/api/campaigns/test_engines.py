@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import shutil
 import subprocess
 import sys
 import time
@@ -22,7 +21,7 @@ from swashplate.api.campaigns import program
 from swashplate.api.campaigns.dask_engine import DaskEngine
 from swashplate.api.campaigns.engine import TRIES, CampaignStanding, TaskEngine, carry_out
 from swashplate.api.campaigns.pool import ProcessPool
-from swashplate.api.campaigns.result_files import usual_ending
+from swashplate.api.campaigns.result_files import ENDING
 from swashplate.api.campaigns.scheduler import DaskScheduler
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
@@ -94,20 +93,12 @@ def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
     good = tuple(task for task in every if task.portion.first != 4)
     assert made_campaigns.bits(store.folder) == expected(good, tmp_path / "here")
     assert [told["tries"] for told in store.failed().values()] == [["ValueError: row 4 cannot be done"] * TRIES]
-    for at, action, address in ((1.0, "add-worker", "a"), (2.5, "remove-worker", "a"), (3.0, "add-worker", "b"),
-                                (60.0, "remove-worker", "b"), (61.0, "remove-worker", "c")):  # fmt: skip
-        engine._heard((at, {"action": action, "worker": address, "expected": False}))
-    assert list(engine.turned_away) == ["a"], "one that worked for a minute, and one that was there before, are none"
-    assert engine.turned_away["a"].startswith("went 1.5 s after it had joined; swashplate may be missing there")
-    assert engine.words == f"1 worker of the scheduler {dask.address} (1 came and went)"
     with monkeypatch.context() as scheduler:
         scheduler.setattr(engine._client, "scheduler_info", lambda n_workers: {"workers": {}})
         scheduler.setattr(engine, "_counted", float("-inf"))
         assert engine.workers == 0
-        assert engine.words == f"no worker of the scheduler {dask.address} (1 came and went), it waits for one"
+        assert engine.words == f"no worker of the scheduler {dask.address}, it waits for one"
     engine._counted = float("-inf")
-    store.turn_away(engine.turned_away)
-    assert store.turned_away() == engine.turned_away
     other = tuple(replace(task, program=dict(task.program) | {"numpy": "1.0"}) for task in made_campaigns.tasks(2))
     monkeypatch.undo()
     with pytest.raises(CampaignError, match=r"another program: numpy is \S+, expected 1\.0"):
@@ -152,55 +143,10 @@ def test_a_full_disk_ends_it_with_what_is_done(tmp_path: Path, monkeypatch: pyte
             done(every, made_campaigns.InProcess(made_campaigns.numbers), tmp_path)
     store = CampaignStore(tmp_path)
     assert len(store.done()) == 3
-    assert sorted(path.suffix for path in (tmp_path / "results").iterdir()) == [usual_ending()] * 3
+    assert sorted(path.suffix for path in (tmp_path / "results").iterdir()) == [ENDING] * 3
     left = tuple(task for task in every if task.name not in store.done())
     store, _ = done(left, made_campaigns.InProcess(made_campaigns.numbers), tmp_path)
     assert made_campaigns.bits(store.folder) == expected(every, tmp_path / "here")
-
-
-BECOMES_A_WORKER = (
-    "from swashplate.api.campaigns import program; import os; core = program.prepare();"
-    "assert program.prepare() == core; print(core, sorted(os.sched_getaffinity(0)),"
-    " os.environ['OMP_NUM_THREADS'], flush=True); input()"
-)
-
-
-def test_workers_share_out_the_cores_and_have_one_thread(tmp_path: Path) -> None:
-    if program._in_container():
-        pytest.skip("in a container a worker takes no core of its own")
-    found, started = [], []
-    for number in range(min(2, len(os.sched_getaffinity(0)))):
-        own = tmp_path / str(number)  # as where a queue gives each job a temporary folder of its own
-        own.mkdir()
-        environment = {**os.environ, "TMPDIR": str(own)}
-        locks = (
-            f"from swashplate.api.campaigns import program; program._LOCK += 'tests-{os.getpid()}-';"  # nobody else's
-        )
-        command = [sys.executable, "-c", locks + BECOMES_A_WORKER]
-        started.append(
-            subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
-        )
-    for process in started:
-        assert process.stdout is not None
-        core, _, rest = process.stdout.readline().strip().partition(" ")
-        assert rest == f"[{core}] 1"
-        found.append(int(core))
-    for process in started:
-        process.communicate("\n", timeout=300)
-    assert len(set(found)) == len(found)
-
-
-def test_a_worker_in_a_container_is_left_to_the_machine() -> None:
-    inside = ["unshare", "--pid", "--fork", "--mount-proc"]
-    if (
-        shutil.which("unshare") is None
-        or subprocess.run([*inside, "true"], capture_output=True, check=False).returncode
-    ):
-        pytest.skip("no namespace of processes can be made here (unshare)")
-    found = subprocess.run(
-        [*inside, sys.executable, "-c", BECOMES_A_WORKER], input="\n", capture_output=True, text=True, check=True
-    ).stdout
-    assert found == f"None {sorted(os.sched_getaffinity(0))} 1\n"
 
 
 def waited_for(engine: TaskEngine) -> None:
@@ -263,7 +209,6 @@ def test_a_worker_that_joins_late_without_the_package_costs_nothing_but_time(tmp
         finally:
             late.terminate()
             late.wait()
-    assert engine.turned_away, "nobody is told of it"
     assert store.failed() == {}
     assert made_campaigns.bits(store.folder) == expected(every, tmp_path / "here")
 
