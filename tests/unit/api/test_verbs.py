@@ -8,9 +8,12 @@ import typing
 from importlib import import_module
 from typing import Any
 
+import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.flights.conditioning.uniform_records import is_uniform
+from swashplate.flights.flight import Flight, stream
 from swashplate.reporting.figures.sections import SECTIONS
 from swashplate.reporting.report import Reportable
 
@@ -72,3 +75,17 @@ def test_units_and_bounds_stand_in_help_and_in_the_check() -> None:
     assert "    computation: time from a reading to its command [ms]." in sp.check_controller.__doc__
     with pytest.raises(sp.SwashError, match="computation: is -1, expected at least 0 ms"):
         sp.check_controller("coax", "c.toml", computation=-1.0)
+
+
+def test_respond_takes_a_flight_at_one_rate_as_it_is_and_conditions_any_other() -> None:
+    time = np.arange(0.0, 40.0, 0.02)
+    command = np.sin(2.0 * np.pi * (0.2 + 0.05 * time) * time)
+    answer = np.convolve(command, np.full(10, 0.1))[: time.size]
+    asked = {"inputs": "mixer_roll", "outputs": "p", "band": (0.5, 3.0)}
+    even = Flight({"log": stream(time, {"mixer_roll": command, "p": answer})})
+    uneven = Flight({"log": stream(time + 2e-3 * np.sin(time), {"mixer_roll": command, "p": answer})})
+    assert is_uniform(even, ["mixer_roll", "p"])
+    assert not is_uniform(uneven, ["mixer_roll", "p"])
+    assert not is_uniform(even, ["mixer_roll", "q"])
+    assert [one.history for one in sp.respond(even, **asked).data] == [()]
+    assert sp.respond(uneven, **asked).band("p", "mixer_roll")
