@@ -32,7 +32,12 @@ def filled(name: str, blanks: Mapping[str, object]) -> str:
         name: of the file.
         blanks: what stands for @WORD@, by word.
     """
-    return re.sub(r"@(\w+)@", lambda blank: str(blanks[blank[1]]), _template(name))
+    return fill(_template(name), blanks)
+
+
+def fill(text: str, blanks: Mapping[str, object]) -> str:
+    """A text with its blanks filled, as `filled`."""
+    return re.sub(r"@(\w+)@", lambda blank: str(blanks[blank[1]]), text)
 
 
 Precision = Literal["double", "single"]

@@ -186,10 +186,10 @@ def looped(code: Statements, steps: Sequence[int], *, real: str, precision: Prec
     count, n = len(steps), len(outputs)
     lines: list[str] = []
     for search in searches(code, count, first=n):
-        lines += [f"  {_named(s).text(real, precision)}" for s in search.before]
+        lines += [f"  {named(s).text(real, precision)}" for s in search.before]
         if search.sought:
             lines += _loop(search, steps, real, precision)
-    stores = [f"  {outputs[o]}[{p}] = {_renamed(t)};" for (o, p), t in code.outputs.items() if o < n]
+    stores = [f"  {outputs[o]}[{p}] = {renamed(t)};" for (o, p), t in code.outputs.items() if o < n]
     head = [f"  {real} {', '.join(f'root{i} = root[{i}]' for i in range(count))};", "  int step;"]
     kept = [f"  root[{i}] = root{i};" for i in range(count)]
     return "\n".join([*head, *lines, *kept, *stores]) + "\n"
@@ -257,15 +257,14 @@ def _rounds(texts: Sequence[tuple[str, str, str]], needs: _Needs, count: int) ->
     return rounds
 
 
-def _renamed(text: str) -> str:
-    for kind in ("root", "guess"):
-        if text.startswith(f"{kind}["):
-            return f"root{text[len(kind) + 1 : -1]}"
-    return text
+def renamed(text: str) -> str:
+    """A root or its guess is a number of its own."""
+    return re.sub(r"^(root|guess)\[(\d+)\]$", r"root\2", text)
 
 
-def _named(s: Statement) -> Statement:
-    return Statement(s.name, s.operation, tuple(map(_renamed, s.reads)))
+def named(s: Statement) -> Statement:
+    """A statement that reads roots and guesses so."""
+    return Statement(s.name, s.operation, tuple(map(renamed, s.reads)))
 
 
 def _loop(search: Search, steps: Sequence[int], real: str, precision: Precision) -> list[str]:
@@ -274,13 +273,13 @@ def _loop(search: Search, steps: Sequence[int], real: str, precision: Precision)
     small = literal(SETTLED[precision], precision)
     settled = " && ".join(f"{size}(move{i}) <= {small} * {size}(root{i})" for i in sought)
     most = max(steps[i] for i in sought)
-    begin = " ".join(f"root{i} = {_renamed(start)};" for i, start in zip(sought, search.start, strict=True))
+    begin = " ".join(f"root{i} = {renamed(start)};" for i, start in zip(sought, search.start, strict=True))
     quotients = zip(sought, search.value, search.slope, strict=True)
     return [
         f"  for (step = known ? -{most} : 0; step < {most}; ++step) {{",
         f"    if (step == 0) {{ {begin} }}",
-        *(f"    {_named(s).text(real, precision)}" for s in search.inside),
-        *(f"    const {real} move{i} = {_renamed(value)} / {_renamed(slope)};" for i, value, slope in quotients),
+        *(f"    {named(s).text(real, precision)}" for s in search.inside),
+        *(f"    const {real} move{i} = {renamed(value)} / {renamed(slope)};" for i, value, slope in quotients),
         *(f"    root{i} -= move{i};" for i in sought),
         f"    if ({settled}) break;",
         "  }",

@@ -12,20 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from swashplate.engine.c_expression import Statement, Statements
-from swashplate.engine.c_loops import searches
-
-VECTORS = """#if defined(__AVX512F__)
-enum { V = 8 };
-#elif defined(__AVX__)
-enum { V = 4 };
-#else
-enum { V = 2 };
-#endif
-typedef double vec __attribute__((vector_size(V * sizeof(double))));
-typedef long long bits __attribute__((vector_size(V * sizeof(long long))));
-static inline __attribute__((unused)) vec kept(vec d, int here) { return (vec)((bits)d & -(long long)(here != 0)); }
-"""
-"""The types of the tangents, and slopes that count or do not."""
+from swashplate.engine.c_loops import named, renamed, searches
 
 
 class Tangents:
@@ -71,24 +58,16 @@ class Tangents:
 
     def rooted(self, code: Statements, count: int) -> tuple[list[str], Statements]:
         """A function with `count` roots that are known (an array `root`), and the function that reads them by name."""
-        lines = [f"const double root{i} = root[{i}], guess{i} = root[{i}];" for i in range(count)]
+        lines = [f"const double root{i} = root[{i}];" for i in range(count)]
         for search in searches(code, count, first=1):
-            lines += self.body([_named(s) for s in search.before])
-            lines += self.body([_named(s) for s in search.inside])
+            lines += self.body([named(s) for s in search.before])
+            lines += self.body([named(s) for s in search.inside])
             for i, value, slope in zip(search.sought, search.value, search.slope, strict=True):
-                moved = self.of(_renamed(value))
+                moved = self.of(renamed(value))
                 if moved is not None:
-                    lines.append(f"const vec d_root{i} = {moved} * (-1 / {_renamed(slope)});")
+                    lines.append(f"const vec d_root{i} = {moved} * (-1 / {renamed(slope)});")
                     self._made[f"root{i}"] = f"d_root{i}"
-        return lines, Statements((), {place: _renamed(text) for place, text in code.outputs.items()})
-
-
-def _renamed(text: str) -> str:
-    return re.sub(r"^(root|guess)\[(\d+)\]$", r"\1\2", text)
-
-
-def _named(s: Statement) -> Statement:
-    return Statement(s.name, s.operation, tuple(map(_renamed, s.reads)))
+        return lines, Statements((), {place: renamed(text) for place, text in code.outputs.items()})
 
 
 def _moved(s: Statement, moved: Sequence[str | None]) -> str | None:

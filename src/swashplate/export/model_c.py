@@ -11,16 +11,12 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from swashplate.engine.c_expression import FIXED, REAL, Precision, array, body, printed, split, statements, words
+from swashplate.engine.c_expression import FIXED, REAL, Precision, array, body, fill, printed, split, statements, words
 from swashplate.engine.c_loops import looped
 from swashplate.export.traced import Traced, Variable, late_notes
-
-if TYPE_CHECKING:
-    from swashplate.export.traced import Traced
 
 
 @dataclass(frozen=True)
@@ -99,9 +95,9 @@ def model_code(model: Traced, *, precision: Precision = "double") -> ModelCode:
     return ModelCode(
         model.name,
         precision,
-        _filled(_heading(model) + _HEADER, {**blanks, **guard}),
-        _filled(_SOURCE, {**blanks, **equations}),
-        _filled(_EXAMPLE, {**blanks, "SHOWN": str(min(len(model.states), 12))}),
+        fill(_heading(model) + _HEADER, {**blanks, **guard}),
+        fill(_SOURCE, {**blanks, **equations}),
+        fill(_EXAMPLE, {**blanks, "SHOWN": str(min(len(model.states), 12))}),
     )
 
 
@@ -115,7 +111,7 @@ def frame_code(model: Traced, told: object) -> str:
     names = ("x", "rates", "g")
     text = body(told, real=f"{model.name}_real", precision="double", inputs=names, outputs=["told"])
     blanks = {**_blanks(model, "double"), **_equations(model, "double"), "TOLD": _used(text, names)}
-    return _filled(_ALONE + _RATES + _STEP + _FRAME, blanks)
+    return fill(_ALONE + _RATES + _STEP + _FRAME, blanks)
 
 
 def _blanks(model: Traced, precision: Precision) -> dict[str, str]:
@@ -125,10 +121,6 @@ def _blanks(model: Traced, precision: Precision) -> dict[str, str]:
         "TYPE": REAL[precision],
         **{f"N_{kind.upper()}S": str(len(variables)) for kind, variables in _variables(model).items()},
     }
-
-
-def _filled(text: str, blanks: Mapping[str, str]) -> str:
-    return re.sub(r"@(\w+)@", lambda match: blanks[match[1]], text)
 
 
 def _variables(model: Traced) -> dict[str, tuple[Variable, ...]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from swashplate.engine.c_expression import ROOTS, Statements, filled, printed, split, statements
 from swashplate.engine.c_loops import looped
-from swashplate.engine.c_tangents import VECTORS, Tangents
+from swashplate.engine.c_tangents import Tangents
 from swashplate.engine.equations import Equations
 from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
@@ -97,7 +97,7 @@ def sample_source(equations: Equations, sample: Sample, following: Following | N
     else:
         lines, stored = moving.body(rest.body), rest
     blanks = {
-        "VECTORS": VECTORS,
+        "VECTORS": filled("vectors.h", {}),
         "N": str(n),
         "M": str(m),
         "P": str(len(vehicle.parameter_names) + 2),

@@ -2,6 +2,8 @@
 
     dx/dt = A x + B u(t - tau) + shift (+ gusts),    y = C x + D u(t - tau) + bias + v
 
+Inputs run straight between samples. Where a computer held them, tau has half a sample of that hold in it (decision 2).
+
 Output error takes all noise for measurement noise (Jategaonkar 2015, ch. 4; Klein and Morelli 2006, ch. 6). Prediction
 error corrects the state by K times the last innovation and fits K too: the innovations form, which knows any stationary
 gusts and measurement noise, also where both come in by an accelerometer (Ljung 1999, sec. 7.3). Filter error has K

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from rolling import SAME, TRUTH
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.result import Estimate
+from swashplate.identification.identify import identify
 from swashplate.identification.time.linear_filter import FilterErrors
 from swashplate.identification.time.linear_likelihood import LinearErrors
 from swashplate.identification.time.linear_problem import linear_records, torn
 from swashplate.identification.time.linear_simulation import driven
-from swashplate.models.linear.state_space_file import structure
+from swashplate.models.linear.state_space_file import parse, structure
+from swashplate.simulation.discretisation import first_order_hold
 
 MODEL = structure("rotor_body").with_values(
     {"Lb": 300.0, "Ma": 80.0, "tau_f": 0.07, "Ba": 0.5, "Ab": -0.5, "Blat": 0.2, "Blon": -0.05, "Alat": 0.05,
@@ -83,3 +87,25 @@ def test_a_fit_far_from_the_one_that_it_comes_from_says_so() -> None:
     assert "1 of the model's parameters" in words
     assert "Lb 300 before, 270 now" in words
     assert torn([near, unknown], start) == []
+
+
+def test_the_delay_of_a_held_input_has_half_a_sample_of_the_hold_in_it() -> None:
+    """Two samples of delay, held and straight: the fit is exact for a straight input, and says 2.5 of a held one."""
+    delayed = SAME.replace("[parameters]", '[delays]\nstick = "late"\n[parameters]\nlate = {value = 0.03, lower = 0.0}')
+    model, dt, random = parse(delayed).with_values(TRUTH), 0.02, np.random.default_rng(4)
+    stick = 0.2 * np.sin((np.arange(400) * dt) ** 2)  # up to 2.5 Hz
+    a, b, c, _ = model.explicit()
+    late, found = np.concatenate([[stick[0]] * 2, stick[:-2]]), []
+    phi, g0, g1 = first_order_hold(a, b, dt)
+    for slope in (0.0, 1.0):
+        x = [np.zeros(2)]
+        for now, then in pairwise(late):
+            x.append(phi @ x[-1] + g0[:, 0] * now + slope * g1[:, 0] * (then - now))
+        seen = np.array(x) @ c.T + random.standard_normal((400, 3)) * [0.002, 0.06, 0.004]
+        columns = {"stick": stick, **dict(zip(model.outputs, seen.T, strict=True))}
+        flown = Flight({"uniform": stream(np.arange(400) * dt, columns, {"stick": "1"})})
+        found.append(identify(model, flown, method="output-error", shifts=False)["late"])
+    held, straight = found
+    assert straight.value == pytest.approx(2.0 * dt, abs=5.0 * straight.sigma)
+    assert held.value == pytest.approx(2.5 * dt, abs=0.05 * dt)  # lines between samples are flatter than the hold
+    assert held.value - 2.0 * dt > 20.0 * held.sigma
