@@ -101,8 +101,14 @@ def _wander(random: np.random.Generator, count: int, dt: float, over: float) -> 
 SHAPES = {"automatic": automatic, "by hand": by_hand}
 
 
-def fly(model: StateSpaceModel, questions: Sequence[Question], *, seconds: float = SECONDS) -> list[Flight]:
-    """The flights, one per question, all at once; channel `truth_reference` holds what was asked of the swept input."""
+def fly(
+    model: StateSpaceModel, questions: Sequence[Question], *, seconds: float = SECONDS, size: float = 1.0
+) -> list[Flight]:
+    """The flights, one per question, all at once; channel `truth_reference` holds what was asked of the swept input.
+
+    Args:
+        model: the truth. questions: the records. seconds: length of each. size: of all that the pilot does.
+    """
     a, b, c, d = model.explicit()
     n, m, dt, many = len(model.states), len(model.inputs), 1.0 / RATE, len(questions)
     weights = np.diag([LOOP.get(state, 1e-4) for state in model.states])
@@ -123,13 +129,13 @@ def fly(model: StateSpaceModel, questions: Sequence[Question], *, seconds: float
     sizes = np.array([NOISE[name] for name in model.outputs])
     for f, question in enumerate(questions):
         random = np.random.default_rng(question.seed)
-        swept[:, f] = SHAPES[question.kind](question, time)
+        swept[:, f] = size * SHAPES[question.kind](question, time)
         place = model.inputs.index(question.axis)
         mixing = 0.15 * random.standard_normal(m)
         mixing[place] = 1.0
         asked[:, f] = swept[:, f, None] * mixing
         if question.kind == "by hand":
-            asked[:, f] += corrections(question, time, model.inputs)
+            asked[:, f] += size * corrections(question, time, model.inputs)
         shake[:, f] = question.gust * np.stack([_wander(random, count, dt, 1.5) for _ in range(3)], axis=1)
         noise[:, f] = sizes * random.standard_normal((count, len(sizes)))
     late = np.array([model.delay(model.outputs[0], name) / dt for name in model.inputs])

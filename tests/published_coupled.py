@@ -36,6 +36,8 @@ SLOWEST = 0.4
 """Modes that are asked for are faster than this [rad/s] and inside what was swept."""
 NEAR, DEARER = 0.05, 1.3
 """What is asked: relative error of each mode, and J over that of the true structure."""
+SIZE = r50.AMPLITUDE["lateral"] / gusty_sweeps.SIZES["lateral"]
+"""Of what the pilot does: small sweeps leave nothing coherent below 2 rad/s in gusts."""
 STICKS = {"theta0": ("collective", 0.1), "B1": ("longitudinal", 0.1), "A1": ("lateral", 0.1), "theta0T": ("pedal", 0.2)}
 
 
@@ -101,11 +103,12 @@ def own_states(parts: Mapping[str, object] | list[str] | tuple[str, ...]) -> set
 
 
 def responses_of(published: Published, kind: str, *, gust: float, seed: int) -> FrequencyResponse:
-    """From four sweeps of two minutes, one an axis."""
+    """From eight sweeps of two minutes, two an axis, as large as the published ones of the R-50."""
     model = published.model
-    asked = [gusty_sweeps.Question(axis, kind, gust, 100 * seed + k) for k, axis in enumerate(model.inputs)]
+    axes = list(model.inputs) * 2
+    asked = [gusty_sweeps.Question(axis, kind, gust, 100 * seed + k) for k, axis in enumerate(axes)]
     return respond(
-        gusty_sweeps.fly(model, asked),
+        gusty_sweeps.fly(model, asked, size=SIZE),
         inputs=model.inputs,
         outputs=model.outputs,
         band=gusty_sweeps.BANDS[kind],
@@ -119,7 +122,7 @@ class Found:
 
     Attributes:
         picked: parts. J, own: J_ave of the pick and of the true structure, on the pick's responses.
-        worst, own_worst: largest relative error of a mode that is asked for, of both.
+        worst, own_worst: largest relative error of a mode that is asked for, of both; None for true numbers.
         invented, missed: parts with states of their own.
     """
 
@@ -127,7 +130,7 @@ class Found:
     J: float
     own: float
     worst: float
-    own_worst: float
+    own_worst: float | None
     invented: tuple[str, ...]
     missed: tuple[str, ...]
 
@@ -151,7 +154,7 @@ def search_and_judge(published: Published, responses: FrequencyResponse, *, fast
         J=pick.cost,
         own=cost,
         worst=worst_mode(pick.fit.solution.eigenvalues(), true, fastest=fastest),
-        own_worst=worst_mode(modes, true, fastest=fastest),
+        own_worst=None if modes is None else worst_mode(modes, true, fastest=fastest),
         invented=tuple(sorted(own_states(pick.parts) - published.parts)),
         missed=tuple(sorted(published.parts - own_states(pick.parts))),
     )
@@ -161,15 +164,17 @@ def _there(model: StateSpaceModel, values: Mapping[str, float]) -> dict[str, flo
     return {name: value for name, value in values.items() if name in model.parameters}
 
 
-def own_fit(published: Published, responses: FrequencyResponse, targets: tuple[Target, ...]) -> tuple[float, Array]:
-    """J_ave and modes of the true structure fitted from the truth; of the true numbers where none is free."""
+def own_fit(
+    published: Published, responses: FrequencyResponse, targets: tuple[Target, ...]
+) -> tuple[float, Array | None]:
+    """J_ave and modes of the true structure fitted from the truth; J_ave of its numbers, None where none is free."""
     if published.model.free:
         every = {f"{output}/{name}" for output in responses.outputs for name in responses.inputs}
         left = tuple(sorted(every - {f"{t.output}/{t.input}" for t in targets}))
         fit = fit_state_space(published.model, responses, starts=1, without=left)
         return fit.cost, fit.solution.eigenvalues()
     known = answers(published.model, targets)
-    return float(np.mean([cost_of(h, t) for h, t in zip(known, targets, strict=True)])), published.model.eigenvalues()
+    return float(np.mean([cost_of(h, t) for h, t in zip(known, targets, strict=True)])), None
 
 
 def worst_mode(found: Array, true: Array, *, fastest: float) -> float:
