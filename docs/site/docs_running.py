@@ -212,7 +212,7 @@ def stand_ins() -> Iterator[None]:
     def validating(*given: Any, **options: Any) -> Any:
         asked = inspect.signature(validate).bind(*given, **options).arguments
         small = {**options, "every": 0.5, "horizons": (0.5, 1.0)}
-        key = ("validate", type(asked["model"]).__name__, asked["flights"].provenance.source)
+        key = ("validate", type(asked["vehicle"]).__name__, asked["flight"].provenance.source)
         return _once(key, lambda: validate(*given, **small))
 
     with mock.patch.multiple(sp, read=reading, identify=identifying, validate=validating):
