@@ -65,6 +65,7 @@ def build_up(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> 
         or options.induced_factor
         or options.ground_effect != "none",
         "tail rotors in the main rotor's wake": options.tail_in_wake,
+        "fuselages in cross flow": options.cross_flow,
     }
     for words, chosen in without.items():
         if chosen:

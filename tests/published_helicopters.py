@@ -96,16 +96,20 @@ KNOT = 1.689 * 0.3048
 """m/s, as Padfield's U_0 in Y_r has it."""
 
 
-def lynx_published(knots: int) -> dict[str, float]:
+def padfield(name: str, knots: int, *, sense: float = 1.0) -> dict[str, float]:
     """Padfield's A and B without their kinematic terms; the attitude is in A's gravity terms."""
-    path = Path(__file__).parent / "oracle" / "lynx" / f"padfield_{knots:02d}kn.csv"
+    path = Path(__file__).parent / "oracle" / name / f"padfield_{knots:02d}kn.csv"
     with path.open(encoding="utf-8") as lines:
         gravity = {row[""]: row for row in csv.DictReader(line for line in lines if not line.startswith("#"))}
     roll = -math.atan2(float(gravity["w"]["phi"]), float(gravity["v"]["phi"]))
     pitch = math.asin(-float(gravity["w"]["theta"]) / 9.81 / math.cos(roll))
     speed = knots * KNOT
     flight = {"u": speed * math.cos(pitch), "v": 0.0, "w": speed * math.sin(pitch) * math.cos(roll)}
-    return read_published(path, flight=flight)
+    return read_published(path, sense=sense, flight=flight)
+
+
+def lynx_published(knots: int) -> dict[str, float]:
+    return padfield("lynx", knots)
 
 
 def r50_identified(data: Path) -> dict[str, float]:

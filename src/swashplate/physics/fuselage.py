@@ -56,3 +56,37 @@ def slender_body_moment(
     u, v, w = air_velocity
     half = 0.5 * density * u
     return Vector(0.0, half * (pitch * (w - downwash) + pitch_zero * u), -half * yaw * v)
+
+
+def cross_flow_loads(
+    air_velocity: Vector,
+    downwash: Scalar,
+    *,
+    areas: Vector,
+    pitch: Scalar,
+    yaw: Scalar,
+    pitch_zero: Scalar,
+    density: Scalar,
+    xp: Backend,
+) -> tuple[Vector, Vector]:
+    """Force [N] and moment [N m] of a long body whose numbers hold for air from ahead, in air from anywhere.
+
+    Air that comes across a body separates from it and pushes it its own way (cross-flow principle, Allen and Perkins
+    1951, NACA 1048). So the drag ahead has the speed ahead alone; a side speed turns the air of the downwash, which
+    pushes with the area for air from below, not with the slope in air from ahead; and Munk's moments, which need
+    attached flow, vanish across the body. The share of the slopes and moments is the square of the cosine of the angle
+    between air and body. In air from ahead this is `flat_plate_drag` and `slender_body_moment`.
+
+    Args: as of those two; areas.z is for air from below or above.
+    """
+    u, v, w = air_velocity
+    through = w - downwash
+    square = u * u + v * v + through * through + 1e-9
+    ahead = u * u / square
+    pressure = -0.5 * density * xp.sqrt(square)
+    side = areas.z + ahead * (areas.y - areas.z)
+    force = Vector(-0.5 * density * areas.x * xp.abs(u) * u, pressure * side * v, pressure * areas.z * through)
+    moment = slender_body_moment(
+        air_velocity, downwash, pitch=ahead * pitch, yaw=ahead * yaw, pitch_zero=pitch_zero, density=density
+    )
+    return force, moment

@@ -47,7 +47,7 @@ from swashplate.simulation.trim import trim
 
 MEASURED: Mapping[str, Mapping[str, float]] = {
     "heave": {"UH-60A": 0.05, "Lynx": 0.03, "R-50": 0.37, "HeLion": 0.02},
-    "forces by speed": {"UH-60A": 0.33, "Lynx": 0.15, "R-50": 0.54, "HeLion": 1.57},
+    "forces by speed": {"UH-60A": 0.34, "Lynx": 0.15, "R-50": 0.54, "HeLion": 1.57},
     "roll and pitch by speed": {"Lynx": 0.07, "R-50": 1.31, "HeLion": 0.69},
     "roll and pitch by rates": {"UH-60A": 0.49, "Lynx": 0.03, "HeLion": 1.06},
     "yaw and tail rotor": {"UH-60A": 0.28, "Lynx": 0.14},

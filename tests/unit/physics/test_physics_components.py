@@ -13,7 +13,7 @@ from swashplate.models.coax import SENSE_LOWER, SENSE_UPPER
 from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend, newton
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body
-from swashplate.physics.fuselage import slender_body_moment
+from swashplate.physics.fuselage import cross_flow_loads, flat_plate_drag, slender_body_moment
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar, upper_tip_path_plane
@@ -146,3 +146,25 @@ def test_air_turns_a_slender_body_across_its_way(air: Vector) -> None:
     )
     whole = 1.2 * np.cross(np.array(k) * np.array(air), np.array(air))
     np.testing.assert_allclose((moment.y, moment.z), whole[1:], rtol=1e-12, atol=1e-9)
+
+
+def test_a_fuselage_in_cross_flow_is_pushed_the_airs_way() -> None:
+    """Ahead it is the plates and Munk's moment to first order; in air across it a drag along the air, and no moment."""
+    areas, volumes = Vector(1.0, 4.0, 2.5), {"pitch": 22.0, "yaw": 17.0, "pitch_zero": -2.0}
+
+    def loads(air: Vector, downwash: float) -> tuple[Vector, Vector]:
+        return cross_flow_loads(air, downwash, areas=areas, density=1.2, xp=FloatBackend(), **volumes)
+
+    ahead = Vector(50.0, 0.05, -0.05)
+    force, moment = loads(ahead, 0.0)
+    plates = flat_plate_drag(ahead, 0.0, areas=areas, density=1.2, xp=FloatBackend())
+    np.testing.assert_allclose(force, plates, rtol=1e-5)
+    np.testing.assert_allclose(moment, slender_body_moment(ahead, 0.0, density=1.2, **volumes), rtol=1e-5)
+
+    force, moment = loads(Vector(0.0, 3.0, 1.0), 10.0)
+    speed = math.hypot(3.0, 9.0)
+    np.testing.assert_allclose(force, [0.0, -0.6 * 2.5 * speed * 3.0, 0.6 * 2.5 * speed * 9.0], rtol=1e-9)
+    assert moment == Vector(0.0, 0.0, 0.0)
+    creeping = Vector(0.01, 0.0, 0.0)
+    munk = slender_body_moment(creeping, 10.0, density=1.2, **volumes)
+    assert abs(loads(creeping, 10.0)[1].y) < 1e-3 * abs(munk.y), "no M_u in the downwash of a hover"

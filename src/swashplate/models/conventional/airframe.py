@@ -34,6 +34,7 @@ def airframe(
     collective: Scalar | None = None,
     *,
     tail_in_wake: bool = False,
+    cross_flow: bool = False,
 ) -> Airframe:
     """Tail rotor, horizontal tail, fin and fuselage in the wakes of the two rotors.
 
@@ -48,6 +49,7 @@ def airframe(
         sense: +1 for a counter-clockwise main rotor.
         collective: of the main rotor [rad], which an all-moving tail follows; None where the tail stands still.
         tail_in_wake: the main rotor's wake reaches the tail rotor too, as far below the hub as that stands.
+        cross_flow: the fuselage's loads in air from anywhere are `fuselage.cross_flow_loads`.
     """
     blowing, fading = awake
     p, q, r = rates
@@ -132,14 +134,17 @@ def airframe(
     )
     areas = Vector(par.fuselage_area_x, par.fuselage_area_y, par.fuselage_area_z)
     through = par.fuselage_wake * wake
-    turned = fuselage.slender_body_moment(
-        air,
-        through,
-        pitch=par.fuselage_pitch_volume,
-        yaw=par.fuselage_yaw_volume,
-        pitch_zero=par.fuselage_pitch_zero,
-        density=density,
-    )
+    volumes = {
+        "pitch": par.fuselage_pitch_volume,
+        "yaw": par.fuselage_yaw_volume,
+        "pitch_zero": par.fuselage_pitch_zero,
+        "density": density,
+    }
+    if cross_flow:
+        pushed, turned = fuselage.cross_flow_loads(air, through, areas=areas, xp=xp, **volumes)
+    else:
+        pushed = fuselage.flat_plate_drag(air, through, areas=areas, density=density, xp=xp)
+        turned = fuselage.slender_body_moment(air, through, **volumes)
     side, lift = sense * cc * thrust, -sc * thrust
     # Velocity and moments at these places are written out: products with their zeros would cost a tenth of a step.
     return Airframe(
@@ -149,6 +154,6 @@ def airframe(
             Vector(fin[0], fin[1], 0.0),
             Vector(par.fin_height * fin[1], -par.fin_height * fin[0], -par.fin_arm * fin[1]),
         ),
-        Contribution(fuselage.flat_plate_drag(air, through, areas=areas, density=density, xp=xp), turned),
+        Contribution(pushed, turned),
         tail.torque,
     )

@@ -189,6 +189,7 @@ def loads(
         sense,
         sticks.theta0 if options.stabilator else None,
         tail_in_wake=options.tail_in_wake,
+        cross_flow=options.cross_flow,
     )
 
     # Rotor speed, and the shaft's reaction on the fuselage beyond the rotors' own drag.

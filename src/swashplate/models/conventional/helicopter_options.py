@@ -40,6 +40,8 @@ class HelicopterOptions(NamedTuple):
             first order alone makes too fast: 2 % at a flapping frequency of 1.04 per turn, 45 % at 1.9.
         tail_in_wake: the main rotor's wake reaches the tail rotor where flight sweeps it there, as it does the
             tailplane.
+        cross_flow: air across the fuselage pushes it its own way (`fuselage.cross_flow_loads`); off, drag and slopes
+            for air from ahead are taken in the downwash too, as in the packaged cards' tables.
         stabilator: the horizontal tail's incidence follows air speed, collective and pitch rate (`stabilator_*`), in
             place of `tailplane_incidence`.
 
@@ -68,6 +70,7 @@ class HelicopterOptions(NamedTuple):
     stabilator: bool = False
     stiff_blades: bool = False
     tail_in_wake: bool = False
+    cross_flow: bool = False
     ground_effect: str = "none"
 
     @property
@@ -106,6 +109,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
             "stabilator",
             "stiff_blades",
             "tail_in_wake",
+            "cross_flow",
         ),
         (True, False),
     ),

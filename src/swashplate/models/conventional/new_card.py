@@ -22,7 +22,7 @@ class Usual(NamedTuple):
 
 
 class SizeClass(NamedTuple):
-    """A class of helicopters: what is in it, the packaged cards that are scaled for it, and its statistics."""
+    """A class of helicopters: what is in it, the packaged cards that are scaled for it, its statistics and switches."""
 
     name: str
     words: str
@@ -30,6 +30,7 @@ class SizeClass(NamedTuple):
     radius_below: float
     members: tuple[str, ...]
     usual: Callable[[float, float], Mapping[str, Usual]]
+    options: Mapping[str, str | bool] = {}
 
 
 class DefaultClass(NamedTuple):
@@ -124,6 +125,9 @@ def _micro(mass: float, radius: float) -> Mapping[str, Usual]:
     }
 
 
+_OF_TABLES = {"cross_flow": True}
+"""Fuselages of full size are known by slopes in air from ahead, small ones by areas of the cross flow."""
+
 CLASSES: Mapping[str, SizeClass] = {
     entry.name: entry
     for entry in (
@@ -131,7 +135,7 @@ CLASSES: Mapping[str, SizeClass] = {
         SizeClass("600", "model helicopters with blades of about 600 mm", 6.5, 0.74, ("raptor50",), _small),
         SizeClass("90", "the largest model helicopters: engines of 15 cm^3", 30.0, 1.1, ("xcell60", "helion"), _small),
         SizeClass("rmax", "unmanned helicopters for work, as R-MAX and R-50", 300.0, 2.5, ("rmax", "r50"), _small),
-        SizeClass("full-size", "with a pilot on board", math.inf, math.inf, ("lynx",), _full_size),
+        SizeClass("full-size", "with a pilot on board", math.inf, math.inf, ("lynx",), _full_size, _OF_TABLES),
     )
 }
 """From the smallest; what is not below a class' mass (radius) belongs to a larger one."""
@@ -212,9 +216,11 @@ def new_card(
     if like is not None and size_class is not None:
         raise CardError("takes a class or a packaged helicopter to scale, not both.", where=title)
     usual = {name: Usual(float(ADDED[name][1]), None, "the usual number") for name in _WAKES}
+    switched: Mapping[str, str | bool] = {}
     if like is None:
         chosen = known_class(size_class or default_class(mass, radius).name)
         usual |= chosen.usual(mass, radius)
+        switched = chosen.options
     members = (like,) if like is not None else chosen.members
     patterns = [_pattern(member) for member in members]
     source = f"guess: {' and '.join(members)} scaled to {radius:g} m and {mass:g} kg"
@@ -230,7 +236,7 @@ def new_card(
             parameters.setdefault(name, Parameter(stood, UNITS[name], words, "assumed"))
     trust = "Nothing yet: every number marked assumed is a guess. Measure them, and write how into source and status."
     parts = {name: value for name, value in patterns[0].options.items() if name not in _TABLES}
-    options = {**parts, "rotation": rotation, "yaw_at_blades": True, "precession_torque": True}
+    options = {**parts, **switched, "rotation": rotation, "yaw_at_blades": True, "precession_torque": True}
     return Card("conventional", title, trust, options, parameters)
 
 
