@@ -10,6 +10,7 @@ import pytest
 from commands import swash
 
 from swashplate.flights.datasets import REGISTRY
+from swashplate.flights.example_logs import FOLDER as EXAMPLES
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 from swashplate.models.card import packaged_cards
@@ -90,7 +91,10 @@ def test_a_vehicle_as_json_and_its_hover() -> None:
 
 def test_data_sets_are_listed_with_where_they_are() -> None:
     rows = json.loads(swash("data", "list", "--json").out)
-    assert {(row["name"], row["file"]) for row in rows} == {(n, f) for n, data in REGISTRY.items() for f in data.files}
+    shipped = {("examples", file.name) for file in EXAMPLES.glob("*.bin")}
+    listed = {(n, f) for n, data in REGISTRY.items() for f in data.files} | shipped
+    assert {(row["name"], row["file"]) for row in rows} == listed
+    assert len(shipped) == 3
     text = swash("data", "list").out
     assert all(row["file"] in text for row in rows)
 

@@ -47,7 +47,7 @@ def test_the_whole_command_gives_the_same_map_and_says_what_it_does_not_know(sha
             entry = found.model.card.parameters[name]
             assert abs(entry.value - value) < 2.0 * (entry.sigma or 0.0)
     assert len(found.details.results[0].left_out) == 6
-    doubts = [check.words for check in found.details.results[0].checks if not check.good]
+    doubts = [check.text for check in found.details.results[0].checks if not check.good]
     assert any("the voltage was not recorded" in words for words in doubts)
 
 

@@ -34,7 +34,7 @@ from swashplate.identification.time.linear_residual import (
     physics_shifts,
 )
 from swashplate.identification.time.output_error import OutputError
-from swashplate.identification.time.record_fit import RecordEstimator, Told
+from swashplate.identification.time.record_fit import Interpreted, RecordEstimator
 from swashplate.identification.time.residual_fit import fit_residual
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.residual import PREFIX
@@ -110,7 +110,7 @@ class FlightProblem:
         solved = solved_at(likelihood, optimum)
         return solved if horizon is None else solved_ahead(solved, horizon, solver, settling=SETTLING)
 
-    def tell(self, solved: Solved) -> Told[Vehicle]:
+    def interpret(self, solved: Solved) -> Interpreted[Vehicle]:
         likelihood, residual, row = cast(FlightLikelihood, solved.likelihood), self.residual, solved.whole
         table, pieces, vehicle = likelihood.table, self.pieces, self.start
         began = begun(vehicle, residual) if residual is not None and table is not self.table else vehicle
@@ -147,7 +147,7 @@ class FlightProblem:
                 vehicle, identified, {name: sum(values) / len(values) for name, values in trims.items()}
             )
         free, left_out = "full" if self.question.free is None else self.question.free, self.question.leave_out
-        return Told(
+        return Interpreted(
             identified,
             parameters,
             own,

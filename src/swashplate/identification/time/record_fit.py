@@ -55,7 +55,7 @@ class TimeDetails:
 
 
 @dataclass(frozen=True)
-class Told(Generic[Model]):
+class Interpreted(Generic[Model]):
     """What a problem makes of the numbers that a search found.
 
     Attributes:
@@ -79,7 +79,7 @@ class Told(Generic[Model]):
     nuisance: Nuisance | None = None
 
 
-class Problem(Protocol[Model]):
+class FitProblem(Protocol[Model]):
     """What is sought, how it is searched, and what is made of what the search finds."""
 
     @property
@@ -101,12 +101,12 @@ class Problem(Protocol[Model]):
         """The optimum of the likelihood, or of the errors ahead that it leads to."""
         ...
 
-    def tell(self, solved: Solved) -> Told[Model]:
+    def interpret(self, solved: Solved) -> Interpreted[Model]:
         """What the optimum says."""
         ...
 
 
-def fit(problem: Problem[Model], solver: Solver, *, horizon: Horizon | None = None) -> Result[Model, Any]:
+def fit(problem: FitProblem[Model], solver: Solver, *, horizon: Horizon | None = None) -> Result[Model, Any]:
     """The optimum of a problem as what every identification returns.
 
     Args:
@@ -119,35 +119,35 @@ def fit(problem: Problem[Model], solver: Solver, *, horizon: Horizon | None = No
     """
     began = time.perf_counter()
     solved, data = problem.solve(solver, horizon), sources_of(problem.flights)
-    told, optimum = problem.tell(solved), solved.optimum
+    interpreted, optimum = problem.interpret(solved), solved.optimum
     prior = solved.row.prior(optimum.row)[2]
-    names = tuple(e.name for e in told.estimates if e.free)
+    names = tuple(e.name for e in interpreted.estimates if e.free)
     k = len(names)
     covariance = solved.scaled(solved.plain)[:k, :k]
     return Result(
         method=problem.method,
-        solution=told.solution,
+        solution=interpreted.solution,
         start=problem.start,
-        estimates=told.estimates,
+        estimates=interpreted.estimates,
         names=names,
         covariance=covariance,
         covariance_corrected=solved.scaled(solved.corrected)[:k, :k],
         correlation=correlation_of(covariance),
-        details=told.details,
+        details=interpreted.details,
         history=optimum.history,
         converged=optimum.converged,
-        problems=(*told.problems, *scale_words(data), *told.notes),
-        failed=bool(told.problems),
-        warnings=tuple(told.warnings),
+        problems=(*interpreted.problems, *scale_words(data), *interpreted.notes),
+        failed=bool(interpreted.problems),
+        warnings=tuple(interpreted.warnings),
         directions=accuracy.blind_directions(
             names, accuracy.marginal_information(optimum.information, prior, solved.places[:k])
         ),
-        constants=told.constants,
-        noise=told.noise,
-        nuisance=told.nuisance,
+        constants=interpreted.constants,
+        noise=interpreted.noise,
+        nuisance=interpreted.nuisance,
         comparisons=solved.likelihood.comparisons(solved.whole),
         data=data,
-        settings={**told.settings, **told_horizon(horizon)},
+        settings={**interpreted.settings, **told_horizon(horizon)},
         seconds=time.perf_counter() - began,
         fitted=Fitted(solved.likelihood, solved.whole) if horizon is None else None,
     )
@@ -189,11 +189,11 @@ class RecordProblem(Generic[Model]):
         solved = solved_at(self.likelihood, optimum, known=known)
         return solved if horizon is None else solved_ahead(solved, horizon, solver)
 
-    def tell(self, solved: Solved) -> Told[Model]:
+    def interpret(self, solved: Solved) -> Interpreted[Model]:
         estimates, problems = estimates_of(solved, self.start, self.table)
         free = [e for e in estimates if e.free]
         names = [piece.name for piece in self.likelihood.records]
-        return Told(
+        return Interpreted(
             self.identified({e.name: e for e in estimates}),
             estimates,
             constants(solved, names, ("initial", "nuisance", "noise")),
@@ -260,7 +260,7 @@ class RecordKind(Protocol[Model]):
         """Why it is none of its models; "" where it is."""
         ...
 
-    def problem(self, model: Model, flights: Sequence[Flight], question: Question, *, method: str) -> Problem[Model]:
+    def problem(self, model: Model, flights: Sequence[Flight], question: Question, *, method: str) -> FitProblem[Model]:
         """The likelihood of the flights' records, by the method's gain."""
         ...
 

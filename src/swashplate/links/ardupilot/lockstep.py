@@ -12,12 +12,12 @@ import os
 import socket
 import sys
 from copy import deepcopy
-from typing import Any
 
 import numpy as np
 
 from swashplate.compiled import loaded
 from swashplate.engine.c_expression import body, filled
+from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
 from swashplate.errors import SwashError
 from swashplate.links.ardupilot.answer import form, in_order
@@ -160,6 +160,6 @@ def _source(plant: Plant, sensing: Sensing) -> tuple[str, int]:
     return filled("lockstep.c", blanks), len(values)
 
 
-def _c(function: Any, inputs: tuple[str, ...], outputs: list[str]) -> str:
+def _c(function: Graph, inputs: tuple[str, ...], outputs: list[str]) -> str:
     nods = "".join(f"  (void){name};\n" for name in inputs)  # strict compilers ask for one where it is not read
     return body(function, real="double", precision="double", inputs=inputs, outputs=outputs) + nods
