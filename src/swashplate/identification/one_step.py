@@ -21,7 +21,8 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.identification.core import accuracy
-from swashplate.identification.core.result import Result, bounds_of
+from swashplate.identification.core.parameters import bounds_of
+from swashplate.identification.core.result import Result
 from swashplate.identification.time.estimates import LAGS
 from swashplate.models.traits import PhysicalEffect
 

@@ -12,8 +12,9 @@ from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.identification.core import accuracy, nuts
 from swashplate.identification.core.parameter_row import Row
+from swashplate.identification.core.parameters import bounds_of
 from swashplate.identification.core.posterior_draws import LEAST_ESS, SPLIT_RHAT, Posterior, normal_within
-from swashplate.identification.core.result import Fitted, Result, bounds_of
+from swashplate.identification.core.result import Fitted, Result
 from swashplate.identification.core.whitened import Chains, effective, split_rhat
 
 METHODS = ("laplace", "nuts")

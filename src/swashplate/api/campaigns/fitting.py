@@ -20,8 +20,8 @@ from swashplate.api.question import default_of
 from swashplate.api.verbs.identify import FitVehicle
 from swashplate.arrays import Array
 from swashplate.errors import CampaignError, SwashError
-from swashplate.identification.core.parameters import parameterize
-from swashplate.identification.core.result import Result, bounds_of
+from swashplate.identification.core.parameters import bounds_of, parameterize
+from swashplate.identification.core.result import Result
 from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
 from swashplate.models.vehicle import Vehicle

@@ -16,6 +16,7 @@ from swashplate.filtering.disturbances import SEPARATE
 from swashplate.filtering.nuisance import PUSHES, USUAL_PUSH, Nuisance
 from swashplate.models.card import Card
 from swashplate.models.linear.expressions import Expression, parse_tie
+from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.traits import Choice
 from swashplate.models.traits import Free as Free
 from swashplate.models.vehicle import Vehicle
@@ -355,3 +356,18 @@ def _known(vehicle: Vehicle, names: Iterable[str]) -> None:
             channel=", ".join(unknown),
             hint=f"Parameters are listed by 'swash vehicle show {vehicle.name}'.",
         )
+
+
+def parameter_table(model: Vehicle | StateSpaceModel) -> Mapping[str, Any]:
+    """A model's parameters by name: of a vehicle they stand in its card."""
+    return model.card.parameters if isinstance(model, Vehicle) else model.parameters
+
+
+def bounds_of(model: Any, names: Sequence[str]) -> tuple[Array, Array]:
+    """What physics allows of a model's parameters, (p,) each; infinite where nothing is said."""
+    table = parameter_table(model)
+    low, high = (
+        np.array([usual if (bound := getattr(table[n], side)) is None else bound for n in names], dtype=np.float64)
+        for side, usual in (("lower", -np.inf), ("upper", np.inf))
+    )
+    return low, high

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,7 @@ from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.core.parameters import bounds_of
 from swashplate.identification.core.posterior_draws import Posterior, normal_within
 from swashplate.identification.core.records import Compared, Comparison
 from swashplate.identification.core.sources import DataSource
@@ -378,17 +379,6 @@ def _percent(sigma: float, value: float) -> str:
 
 def _number(value: float) -> str:
     return f"{value:.2g}" if np.isfinite(value) else ""
-
-
-def bounds_of(model: Any, names: Sequence[str]) -> tuple[Array, Array]:
-    """What physics allows of a model's parameters, (p,) each; infinite where nothing is said."""
-    card = getattr(model, "card", None)
-    table: Mapping[str, Any] = (card if card is not None else model).parameters
-    low, high = (
-        np.array([usual if (bound := getattr(table[n], side)) is None else bound for n in names], dtype=np.float64)
-        for side, usual in (("lower", -np.inf), ("upper", np.inf))
-    )
-    return low, high
 
 
 def correlation_of(covariance: Array) -> Array:

@@ -16,8 +16,8 @@ from swashplate.identification.core import accuracy
 from swashplate.identification.core.likelihood import Likelihood
 from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.parameters import Parameterization
-from swashplate.identification.core.result import Constant, Estimate, bounds_of
+from swashplate.identification.core.parameters import Parameterization, bounds_of, parameter_table
+from swashplate.identification.core.result import Constant, Estimate
 from swashplate.identification.core.scoring import Optimum, Solver, Sought, minimise
 
 LAGS = 1.0
@@ -142,7 +142,7 @@ def estimates_of(
         start: the model before the fit, a vehicle or a state-space model.
         table: with ties and where priors come from (None: neither).
     """
-    known = (start.card if hasattr(start, "card") else start).parameters
+    known = parameter_table(start)
     sources = {} if table is None else {free.name: free.source for free in table.free}
     entries, scales = [solved.row.entries[i] for i in solved.places], solved.row.scale[solved.places]
     sigma, corrected = (np.sqrt(np.maximum(np.diag(solved.scaled(c)), 0.0)) for c in (solved.plain, solved.corrected))
@@ -180,7 +180,7 @@ def estimates_of(
 
 
 def _tied(solved: Solved, start: Any, table: Parameterization) -> list[Estimate]:
-    card, values, made = start.card.parameters, solved.identified(table), []
+    card, values, made = parameter_table(start), solved.identified(table), []
     numbers = np.array([solved.numbers[name] for name in table.names])
     for name, expression in table.ties:
         gradient = np.array([_slope(table, numbers, name, i) for i in range(len(numbers))])

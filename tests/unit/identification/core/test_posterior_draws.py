@@ -12,8 +12,8 @@ import xarray as xr
 import report_samples
 import swashplate as sp
 from swashplate.errors import IdentificationError
+from swashplate.identification.core.parameters import bounds_of
 from swashplate.identification.core.posterior_draws import Posterior, adjusted
-from swashplate.identification.core.result import bounds_of
 
 NAMES = ("a", "b", "delay[0]")
 
