@@ -71,7 +71,7 @@ class LinearKind:
             flights,
             identified,
             settings if question.gusts is None else {**settings, "gusts": question.gusts},
-            words=lambda estimates: torn(estimates, model),
+            words=lambda estimates: (*torn(estimates, model), *hold_remarks(model, delays, pieces)),
             begin=likelihood.begun() if near else None,
             around=near,
         )
@@ -150,6 +150,21 @@ def torn(estimates: Sequence[Estimate], start: StateSpaceModel) -> list[str]:
         f"({'; '.join(worst[:3])}): both cannot be right. Gusts that last, in a loop, bias a fit in time whose noise "
         "is white; validate both models on another flight."
     ]
+
+
+def hold_remarks(
+    model: StateSpaceModel, delays: Sequence[Expression | None], records: Sequence[Record]
+) -> tuple[str, ...]:
+    """What fitted delays count of a hold that no log tells of (decision 2): nothing where none is free."""
+    fitted = sorted({name for delay in delays if delay for name in delay.names & set(model.free)})
+    if not fitted:
+        return ()
+    half = max(0.5 * float(np.median(np.diff(record.time))) for record in records)
+    return (
+        f"{', '.join(fitted)}: inputs were taken straight between samples. Where a computer held its commands, this "
+        f"delay is half of that hold longer than the aircraft's ({1e3 * half:.3g} ms if each was held until the next "
+        "sample), which its bound does not know; a simulation or a design that holds commands counts that half twice.",
+    )
 
 
 def _delay_of(model: StateSpaceModel, outputs: Sequence[str], input: str) -> Expression | None:

@@ -15,7 +15,7 @@ from swashplate.identification.core.result import Estimate
 from swashplate.identification.identify import identify
 from swashplate.identification.time.linear_filter import FilterErrors
 from swashplate.identification.time.linear_likelihood import LinearErrors
-from swashplate.identification.time.linear_problem import linear_records, torn
+from swashplate.identification.time.linear_problem import hold_remarks, linear_records, torn
 from swashplate.identification.time.linear_simulation import driven
 from swashplate.models.linear.state_space_file import parse, structure
 from swashplate.simulation.discretisation import first_order_hold
@@ -104,8 +104,12 @@ def test_the_delay_of_a_held_input_has_half_a_sample_of_the_hold_in_it() -> None
         seen = np.array(x) @ c.T + random.standard_normal((400, 3)) * [0.002, 0.06, 0.004]
         columns = {"stick": stick, **dict(zip(model.outputs, seen.T, strict=True))}
         flown = Flight({"uniform": stream(np.arange(400) * dt, columns, {"stick": "1"})})
-        found.append(identify(model, flown, method="output-error", shifts=False)["late"])
+        result = identify(model, flown, method="output-error", shifts=False)
+        assert any(words.startswith("late: ") and "(10 ms" in words for words in result.warnings)
+        found.append(result["late"])
     held, straight = found
+    pieces, delays = linear_records(model, [flown], model.outputs, biases=())
+    assert hold_remarks(MODEL, delays, pieces) == ()  # that has no delay to fit
     assert straight.value == pytest.approx(2.0 * dt, abs=5.0 * straight.sigma)
     assert held.value == pytest.approx(2.5 * dt, abs=0.05 * dt)  # lines between samples are flatter than the hold
     assert held.value - 2.0 * dt > 20.0 * held.sigma
