@@ -30,14 +30,14 @@ def filled(name: str, blanks: Mapping[str, object]) -> str:
 
     Args:
         name: of the file.
-        blanks: what stands for @WORD@, by word.
+        blanks: what stands for @WORD@, by word; @NAME.c@ and @NAME.h@ are templates themselves, with the same blanks.
     """
-    return fill(_template(name), blanks)
 
+    def part(blank: re.Match[str]) -> str:
+        inner = blank[1].endswith((".c", ".h"))
+        return filled(blank[1], blanks).rstrip("\n") if inner else str(blanks[blank[1]])
 
-def fill(text: str, blanks: Mapping[str, object]) -> str:
-    """A text with its blanks filled, as `filled`."""
-    return re.sub(r"@(\w+)@", lambda blank: str(blanks[blank[1]]), text)
+    return re.sub(r"@([\w.]+)@", part, _template(name))
 
 
 Precision = Literal["double", "single"]

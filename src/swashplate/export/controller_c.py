@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from swashplate.atomic import write_text
-from swashplate.control.kinds import TracedStep, kind_of
+from swashplate.control.kinds import kind_of
+from swashplate.engine.c_expression import array, filled, words
 from swashplate.engine.law import REFERENCES, print_function
 from swashplate.extras import library
 from swashplate.simulation.controller import Controller
@@ -62,12 +63,34 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
     function = traced.function
     printed, calls = print_function(function, precision)
     size = 8 if precision == "double" else 4
+    memory, measured, commands = len(traced.start), len(traced.measured), len(traced.commands)
+    work = int(function.sz_w())
+    blanks = {
+        "RATE": f"{controller.rate:g}",
+        "REAL": precision,
+        "VEHICLE": words(traced.about),
+        "LATE": _late(controller),
+        "MEASURED_NAMES": "\n *            ".join(textwrap.wrap(", ".join(traced.measured), 100)),
+        "REFERENCE_NAMES": ", ".join(REFERENCES),
+        "COMMAND_NAMES": ", ".join(traced.commands),
+        "MEMORY_NAMES": traced.memory,
+        "MEMORY": memory,
+        "MEASURED": measured,
+        "COMMANDS": commands,
+        "AFTER": memory + commands,
+        "WORK": memory + commands + max(work, 1),
+        "WHOLES": max(int(function.sz_iw()), 1),
+        "ARGUMENTS": max(int(function.sz_arg()), 3),
+        "RESULTS": max(int(function.sz_res()), 1),
+        "TRACED": printed,
+        "START": array("swash_memory", traced.start, "double" if precision == "double" else "single", kind=precision),
+    }
     return ControllerCode(
-        source=_heading(controller, traced, precision) + printed + _ending(traced, precision),
+        source=filled("controller.c", blanks),
         operations=operations_of(function),
         calls=calls,
-        work_bytes=int(function.sz_w()) * size,
-        memory_bytes=len(traced.start) * size,
+        work_bytes=work * size,
+        memory_bytes=memory * size,
         precision=precision,
     )
 
@@ -81,65 +104,7 @@ def operations_of(function: Any) -> int:
     return sum(scalar.instruction_id(i) not in copied for i in range(scalar.n_instructions()))
 
 
-def _heading(controller: Controller, traced: TracedStep, precision: Precision) -> str:
-    counts = len(traced.start), len(traced.measured), len(traced.commands)
-    lines = textwrap.wrap(", ".join(traced.measured), 100)
-    return f"""/* One step of a swashplate controller, to be called at {controller.rate:g} Hz.
- *
- *   void swash_step({precision} memory[{counts[0]}], const {precision} measured[{counts[1]}],
- *                   const {precision} reference[8], {precision} command[{counts[2]}]);
- *
- * vehicle    {traced.about.replace("*/", "* /")}
- * late       {_late(controller)}
- * measured   {f"{chr(10)} *            ".join(lines)}
- *            [SI, radians, forward-right-down and north-east-down]
- * reference  {", ".join(REFERENCES)}
- * command    {", ".join(traced.commands)}
- * memory     {traced.memory}; starts as swash_memory says
- *
- * swash_step keeps its temporaries in a static array: one caller at a time. swash_step_in takes them from its
- * caller, {precision} work[SWASH_WORK], which need not survive between steps; with a memory and a work of its own
- * each caller may interrupt every other.
- */
-#define SWASH_WORK {counts[0] + counts[2] + max(int(traced.function.sz_w()), 1)}
-"""
-
-
 def _late(controller: Controller) -> str:
     """From reading to action, as it was designed for."""
     waits = ", ".join(f"{n} {1e3 * d:g} ms" for n, d in controller.delays.items() if d)
     return f"{waits}, computation included" if waits else "designed for commands that act at once"
-
-
-def _ending(traced: TracedStep, precision: Precision) -> str:
-    f, n, m = traced.function, len(traced.start), len(traced.commands)
-    suffix = "f" if precision == "float" else ""
-    # Dots keep them floating numbers; 17 digits bring a double back as it was.
-    start = ",\n  ".join(f"{value!r}{suffix}" for value in traced.start)
-    integers = int(f.sz_iw())
-    return f"""
-const {precision} swash_memory[{n}] = {{
-  {start}
-}};
-
-void swash_step_in({precision} memory[{n}], const {precision} measured[{len(traced.measured)}],
-                   const {precision} reference[8], {precision} command[{m}], {precision} work[SWASH_WORK]) {{
-  int iw[{max(integers, 1)}];
-  const {precision} *arg[{max(int(f.sz_arg()), 3)}];
-  {precision} *res[{max(int(f.sz_res()), 1)}];
-  int i;
-  arg[0] = memory;
-  arg[1] = measured;
-  arg[2] = reference;
-  res[0] = work;
-  swash_traced(arg, res, iw, work + {n + m}, 0);
-  for (i = 0; i < {n}; ++i) memory[i] = work[i];
-  for (i = 0; i < {m}; ++i) command[i] = work[{n} + i];
-}}
-
-void swash_step({precision} memory[{n}], const {precision} measured[{len(traced.measured)}],
-                const {precision} reference[8], {precision} command[{m}]) {{
-  static {precision} work[SWASH_WORK];
-  swash_step_in(memory, measured, reference, command, work);
-}}
-"""

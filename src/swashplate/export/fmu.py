@@ -8,13 +8,13 @@ import platform
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib import resources
 from xml.etree import ElementTree
 
 import numpy as np
 
 from swashplate.atomic import scratch_folder
 from swashplate.compiler import compiler, shared_library
+from swashplate.engine.c_expression import filled
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced, Variable
 from swashplate.flights.base_units import base_units
@@ -33,7 +33,7 @@ class FmuVariable:
 
 
 def entries(model: Traced, *, step: float) -> list[FmuVariable]:
-    """Every variable in the order of the value references in runtime/fmu2.c; `step` is the internal one [s]."""
+    """Every variable in the order of the value references in `templates/fmu2.c`; `step` is the internal one [s]."""
     n = len(model.states)
     variables = [FmuVariable(v.name, v, "output", "continuous", "exact") for v in model.states]
     variables += [
@@ -179,7 +179,7 @@ def fmu(model: Traced, *, version: str) -> tuple[bytes, str]:
         ExportError: where the compiler refuses the sources.
     """
     code, step = model_code(model), internal_step(model)
-    texts = {f"{model.name}.c": code.source, f"{model.name}.h": code.header, _WRAPPER: wrapper(_WRAPPER)}
+    texts = {f"{model.name}.c": code.source, f"{model.name}.h": code.header, _WRAPPER: filled(_WRAPPER, {})}
     listed = (f"{model.name}.c", _WRAPPER)
     texts[_CONFIG] = _config(model, "", step)
     unsigned = description(model, guid="", version=version, sources=listed, step=step)
@@ -202,11 +202,6 @@ def fmu(model: Traced, *, version: str) -> tuple[bytes, str]:
     return _packed(content), message
 
 
-def wrapper(name: str) -> str:
-    """The text of one of our C files that stand around every model."""
-    return (resources.files("swashplate.export") / "runtime" / name).read_text(encoding="utf-8")
-
-
 def internal_step(model: Traced) -> float:
     """Length of an internal Runge-Kutta step [s]: 2 ms, or half the fastest mode's time constant at the start."""
     rows = ([v.start for v in kind] for kind in (model.states, model.inputs, model.surroundings, model.parameters))
@@ -216,33 +211,11 @@ def internal_step(model: Traced) -> float:
 
 
 def _config(model: Traced, guid: str, step: float) -> str:
-    functions = ("step", "rates", "outputs", "start_x", "start_u", "start_s", "start_p")
-    kinds = ("states", "inputs", "surroundings", "parameters", "outputs")
-    lines = [
-        "/* What fmu2.c needs to know of the model. */",
-        f'#include "{model.name}.h"',
-        *(f"#define model_{name} {model.name}_{name}" for name in functions),
-        *(f"#define N_{kind.upper()} {model.name}_n_{kind}" for kind in kinds),
-        f"#define MODEL_STEP {step!r}",
-        f'#define MODEL_GUID "{guid}"',
-        *_delays(model),
-        "#ifdef FMI2_STATIC_LINKING",
-        f"#define FMI2_FUNCTION_PREFIX {model.name}_",
-        "#endif",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _delays(model: Traced) -> list[str]:
-    """The longest delay, room to remember the inputs for so long, and the delay of each."""
-    if not model.delays:
-        return []
-    listed = ", ".join(repr(float(delay)) for delay in model.delays)
-    return [
-        f"#define MODEL_LATE {max(model.delays)!r}",
-        f"#define N_PAST {_PAST}",
-        f"static const double model_delays[] = {{{listed}}};",
-    ]
+    delays = ""
+    if model.delays:
+        listed = ", ".join(repr(float(delay)) for delay in model.delays)
+        delays = filled("fmu_delays.h", {"LONGEST": repr(max(model.delays)), "PAST": _PAST, "DELAYS": listed})
+    return filled(_CONFIG, {"NAME": model.name, "STEP": repr(step), "GUID": guid, "DELAYS": delays})
 
 
 def _binary(texts: Mapping[str, str], sources: tuple[str, ...]) -> bytes:

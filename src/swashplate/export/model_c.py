@@ -14,7 +14,18 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swashplate.engine.c_expression import FIXED, REAL, Precision, array, body, fill, printed, split, statements, words
+from swashplate.engine.c_expression import (
+    FIXED,
+    REAL,
+    Precision,
+    array,
+    body,
+    filled,
+    printed,
+    split,
+    statements,
+    words,
+)
 from swashplate.engine.c_loops import looped
 from swashplate.export.traced import Traced, Variable, late_notes
 
@@ -90,14 +101,15 @@ def model_code(model: Traced, *, precision: Precision = "double") -> ModelCode:
         precision: "double", or "single" for processors without double precision.
     """
     blanks = _blanks(model, precision)
-    guard = {"GUARD": f"{model.name.upper()}_H", "ENUMS": _enums(model)}
     equations = {**_equations(model, precision), **_functions(model, precision), "ARRAYS": _arrays(model, precision)}
     return ModelCode(
         model.name,
         precision,
-        fill(_heading(model) + _HEADER, {**blanks, **guard}),
-        fill(_SOURCE, {**blanks, **equations}),
-        fill(_EXAMPLE, {**blanks, "SHOWN": str(min(len(model.states), 12))}),
+        filled(
+            "model.h", blanks | {"GUARD": f"{model.name.upper()}_H", "ENUMS": _enums(model), "HEADING": _heading(model)}
+        ),
+        filled("model.c", blanks | equations),
+        filled("model_example.c", blanks | {"SHOWN": min(len(model.states), 12)}),
     )
 
 
@@ -110,8 +122,9 @@ def frame_code(model: Traced, told: object) -> str:
     """
     names = ("x", "rates", "g")
     text = body(told, real=f"{model.name}_real", precision="double", inputs=names, outputs=["told"])
-    blanks = {**_blanks(model, "double"), **_equations(model, "double"), "TOLD": _used(text, names)}
-    return fill(_ALONE + _RATES + _STEP + _FRAME, blanks)
+    return filled(
+        "model_frame.c", _blanks(model, "double") | _equations(model, "double") | {"TOLD": _used(text, names)}
+    )
 
 
 def _blanks(model: Traced, precision: Precision) -> dict[str, str]:
@@ -197,169 +210,4 @@ def _heading(model: Traced) -> str:
         "forward-right-down, local axes north-east-down. No allocation, no static variables that change.",
     ]
     wrapped = (part for line in lines for part in (textwrap.wrap(line, 112) or [""]))
-    return "/*\n" + "".join(f" * {part}".rstrip() + "\n" for part in wrapped) + " */\n"
-
-
-_HEADER = """#ifndef @GUARD@
-#define @GUARD@
-
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-typedef @TYPE@ @REAL@;
-
-#define @NAME@_n_states @N_STATES@
-#define @NAME@_n_inputs @N_INPUTS@
-#define @NAME@_n_surroundings @N_SURROUNDINGS@
-#define @NAME@_n_parameters @N_PARAMETERS@
-#define @NAME@_n_outputs @N_OUTPUTS@
-
-@ENUMS@
-
-/* Where a flight may start: states, inputs and surroundings in steady flight, and the card's parameters. */
-extern const @REAL@ @NAME@_start_x[];
-extern const @REAL@ @NAME@_start_u[];
-extern const @REAL@ @NAME@_start_s[];
-extern const @REAL@ @NAME@_start_p[];
-
-/* Derivatives of the states. Arguments everywhere: x states, u inputs, s surroundings, p parameters. */
-void @NAME@_rates(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *rates);
-
-/* What is measured beside the states. */
-void @NAME@_outputs(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *outputs);
-
-/* Derivatives of the rates by states, A, and by inputs, B; full matrices, row by row. */
-void @NAME@_jacobians(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *A, @REAL@ *B);
-
-/* One step of dt seconds: classical Runge-Kutta of order 4, inputs and surroundings held. x is replaced. */
-void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif
-"""
-
-_ARRAYS = """#include "@NAME@.h"
-
-#include <math.h>
-
-@ARRAYS@
-"""
-
-_RATES = """/* Of the rates what no state moves, c. */
-static void fixed(const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *c) {
-@FIXED@}
-
-/* The rates, given c. root: what is found by iteration, from the guesses in it where known is not 0. */
-static void moving(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, const @REAL@ *c,
-                   @REAL@ *root, int known, @REAL@ *rates) {
-@MOVING@}
-
-void @NAME@_rates(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *rates) {
-  @REAL@ c[@N_CONSTANTS@], root[@N_ROOTS@] = {0};
-  fixed(u, s, p, c);
-  moving(x, u, s, p, c, root, 0, rates);
-}
-
-"""
-
-_READINGS = """\
-void @NAME@_outputs(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *outputs) {
-@OUTPUTS@}
-
-static void slopes(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *A, @REAL@ *B) {
-@JACOBIANS@}
-
-void @NAME@_jacobians(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *A, @REAL@ *B) {
-  int i;
-  for (i = 0; i < @NAME@_n_states * @NAME@_n_states; ++i) A[i] = 0;
-  for (i = 0; i < @NAME@_n_states * @NAME@_n_inputs; ++i) B[i] = 0;
-  slopes(x, u, s, p, A, B);
-}
-
-"""
-
-_STEP = """void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt) {
-  @REAL@ k[@NAME@_n_states], sum[@NAME@_n_states], at[@NAME@_n_states], c[@N_CONSTANTS@], root[@N_ROOTS@] = {0};
-  const @REAL@ half = dt / 2, sixth = dt / 6;
-  int i;
-  fixed(u, s, p, c);
-  moving(x, u, s, p, c, root, 0, k);
-  for (i = 0; i < @NAME@_n_states; ++i) {
-    sum[i] = k[i];
-    at[i] = x[i] + half * k[i];
-  }
-  moving(at, u, s, p, c, root, 1, k);
-  for (i = 0; i < @NAME@_n_states; ++i) {
-    sum[i] += 2 * k[i];
-    at[i] = x[i] + half * k[i];
-  }
-  moving(at, u, s, p, c, root, 1, k);
-  for (i = 0; i < @NAME@_n_states; ++i) {
-    sum[i] += 2 * k[i];
-    at[i] = x[i] + dt * k[i];
-  }
-  moving(at, u, s, p, c, root, 1, k);
-  for (i = 0; i < @NAME@_n_states; ++i) x[i] += sixth * (sum[i] + k[i]);
-}
-"""
-
-_SOURCE = _ARRAYS + _RATES + _READINGS + _STEP
-
-_ALONE = """#include <math.h>
-
-typedef @TYPE@ @REAL@;
-#define @NAME@_n_states @N_STATES@
-void @NAME@_rates(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *rates);
-void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt);
-
-"""
-
-_FELT = """static void readings(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *outputs) {
-@OUTPUTS@}
-"""
-
-_FRAME = """
-static void tell(const @REAL@ *x, const @REAL@ *rates, const @REAL@ *g, @REAL@ *told) {
-@TOLD@}
-
-void @NAME@_frame(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, const @REAL@ *g, @REAL@ dt, int steps,
-                  @REAL@ *told);
-
-/* Steps under held inputs, and what is told of where they lead. */
-void @NAME@_frame(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, const @REAL@ *g, @REAL@ dt, int steps,
-                  @REAL@ *told) {
-  @REAL@ rates[@NAME@_n_states];
-  int i;
-  for (i = 0; i < steps; ++i) @NAME@_step(x, u, s, p, dt);
-  @NAME@_rates(x, u, s, p, rates);
-  tell(x, rates, g, told);
-}
-"""
-
-_EXAMPLE = """/* Flies @NAME@ for ten seconds from its start and prints the first states, one line a second.
- *
- *   cc -O2 -std=c99 @NAME@_example.c @NAME@.c -lm && ./a.out
- */
-#include <stdio.h>
-
-#include "@NAME@.h"
-
-int main(void) {
-  @REAL@ x[@NAME@_n_states];
-  int i, k;
-  for (i = 0; i < @NAME@_n_states; ++i) x[i] = @NAME@_start_x[i];
-  for (k = 0; k <= 1000; ++k) {
-    if (k % 100 == 0) {
-      printf("%5.1f s", k * 0.01);
-      for (i = 0; i < @SHOWN@; ++i) printf(" %9.4f", (double)x[i]);
-      printf("\\n");
-    }
-    @NAME@_step(x, @NAME@_start_u, @NAME@_start_s, @NAME@_start_p, (@REAL@)0.01);
-  }
-  return 0;
-}
-"""
+    return "/*\n" + "".join(f" * {part}".rstrip() + "\n" for part in wrapped) + " */"

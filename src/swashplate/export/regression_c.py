@@ -1,17 +1,15 @@
 """A recursive Fourier regression as C99: one file with its constants in front, for a small processor.
 
-Memory is two structures of the caller's; nothing is allocated. The loops stand in `runtime/recursive_regression.c`.
+Memory is two structures of the caller's; nothing is allocated. The loops stand in `templates/regression.c`.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from importlib import resources
 
 import numpy as np
 
-from swashplate.engine.c_expression import REAL, Precision, identifier, literal, words
+from swashplate.engine.c_expression import REAL, Precision, filled, identifier, literal, words
 from swashplate.errors import ExportError
 from swashplate.identification.recursive import fourier_regression
 from swashplate.identification.recursive.equation import BIAS
@@ -73,13 +71,6 @@ def regression_code(
         raise ExportError("are for Python only: its C is plain least squares.", channel="instruments")
     e, called, real = plan.equation, identifier(name), REAL[precision]
     channels, unknowns, lines = len(e.channels), len(e.names), plan.last - plan.first + 1
-    sizes = {
-        "CHANNELS": channels,
-        "UNKNOWNS": unknowns,
-        "LINES": lines,
-        "SUMS": channels + 2,
-        "WINDOW": 2 * plan.last + 1,
-    }
     turned = np.exp(-2j * np.pi * plan.spacing * plan.dt)
     constants = {
         "ZERO": 0.0,
@@ -98,25 +89,30 @@ def regression_code(
         "LEAST_LEFT": fourier_regression.LEAST_LEFT,
         "LEAST_FREEDOM": fourier_regression.LEAST_FREEDOM,
     }
-    upper = called.upper()
-    header = _header(plan, called, real, {key: sizes[key] for key in sizes})
-    defines = [f"#define {key} {upper}_{key}" for key in sizes]
-    defines += [f"#define {key} {literal(value, precision)}" for key, value in constants.items()]
-    defines += [
-        f"#define FIRST {plan.first}",
-        f"#define AROUND {plan.around}",
-        f"#define DERIVATIVE {int(e.derivative)}",
-    ]
-    defines += [f"#define REAL {real}", f"#define SQRT {'sqrt' if precision == 'double' else 'sqrtf'}"]
-    body = (resources.files("swashplate.export") / "runtime" / "recursive_regression.c").read_text(encoding="utf-8")
-    text = "\n".join([f'#include "{called}.h"', "#include <math.h>", "", *defines, "", _tables(plan, precision), body])
+    blanks = {
+        "NAME": called,
+        "UPPER": called.upper(),
+        "REAL": real,
+        "SQRT": "sqrt" if precision == "double" else "sqrtf",
+        "CHANNELS": channels,
+        "UNKNOWNS": unknowns,
+        "LINES": lines,
+        "SUMS": channels + 2,
+        "WINDOW": 2 * plan.last + 1,
+        "FIRST": plan.first,
+        "AROUND": plan.around,
+        "DERIVATIVE": int(e.derivative),
+        **{key: literal(value, precision) for key, value in constants.items()},
+        **_tables(plan, precision),
+        **_about(plan),
+    }
     size = 8 if precision == "double" else 4
     numbers = 2 * (channels + 2) * lines + 2 * (2 * plan.last + 1) + 2 + channels
     work = 2 * lines * (unknowns + 2) + 4 * unknowns**2 + 4 * unknowns
     return RegressionCode(
         name=called,
-        header=header,
-        source=re.sub(r"\bNAME_", f"{called}_", text),
+        header=filled("regression.h", blanks),
+        source=filled("regression.c", blanks),
         memory_bytes=numbers * size + 8,
         work_bytes=work * size,
         table_bytes=(2 * (channels + 1) * lines + lines + channels) * size + 4 * (channels + unknowns),
@@ -125,69 +121,37 @@ def regression_code(
     )
 
 
-def _header(plan: RegressionPlan, name: str, real: str, sizes: dict[str, int]) -> str:
-    e, upper = plan.equation, name.upper()
-    forgets = "nothing" if np.isinf(plan.memory) else f"what is {plan.memory:g} s old counts e times less"
-    counts = "\n".join(f"#define {upper}_{key} {value}" for key, value in sizes.items())
-    return f"""/* {words(e.text)}
- *
- * samples    {1.0 / plan.dt:g} per second: {words(", ".join(e.channels))}
- * unknowns   {words(", ".join(e.names))}
- * lines      {plan.hertz[0]:g} to {plan.hertz[-1]:g} Hz, {plan.spacing:g} Hz apart
- * forgets    {forgets}
- *
- * Call NAME_begin once, NAME_step with every sample and the seconds since the one before, and NAME_estimate whenever
- * numbers are wanted. NAME_step returns 0 while it is frozen (no number, a gap, a clock that jumped); NAME_estimate
- * returns 0, and leaves values and covariance as they may be, while the stream does not tell the unknowns apart.
- */
-#ifndef {upper}_H
-#define {upper}_H
-
-{counts}
-
-typedef struct {{
-  {real} sums[{upper}_SUMS][{upper}_LINES][2], window[{upper}_WINDOW][2], turned[2], last[{upper}_CHANNELS];
-  int begun;
-}} {name}_memory;
-
-typedef struct {{
-  {real} right[{upper}_LINES][{upper}_UNKNOWNS][2], left[{upper}_LINES][2];
-  {real} power[{upper}_LINES], spare[{upper}_LINES];
-  {real} normal[{upper}_UNKNOWNS][{upper}_UNKNOWNS], lower[{upper}_UNKNOWNS][{upper}_UNKNOWNS];
-  {real} inverse[{upper}_UNKNOWNS][{upper}_UNKNOWNS], middle[{upper}_UNKNOWNS][{upper}_UNKNOWNS];
-  {real} moment[{upper}_UNKNOWNS], size[{upper}_UNKNOWNS], row[{upper}_UNKNOWNS][2];
-}} {name}_work;
-
-void {name}_begin({name}_memory *e);
-int {name}_step({name}_memory *e, {real} elapsed, const {real} sample[{upper}_CHANNELS]);
-int {name}_estimate(const {name}_memory *e, {name}_work *w, {real} values[{upper}_UNKNOWNS],
-  {real} covariance[{upper}_UNKNOWNS][{upper}_UNKNOWNS]);
-
-#endif
-""".replace("NAME_", f"{name}_")
+def _about(plan: RegressionPlan) -> dict[str, str]:
+    """What the header says of it."""
+    e = plan.equation
+    return {
+        "EQUATION": words(e.text),
+        "RATE": f"{1.0 / plan.dt:g}",
+        "CHANNEL_NAMES": words(", ".join(e.channels)),
+        "UNKNOWN_NAMES": words(", ".join(e.names)),
+        "BAND": f"{plan.hertz[0]:g} to {plan.hertz[-1]:g} Hz, {plan.spacing:g} Hz apart",
+        "FORGETS": "nothing" if np.isinf(plan.memory) else f"what is {plan.memory:g} s old counts e times less",
+    }
 
 
-def _tables(plan: RegressionPlan, precision: Precision) -> str:
-    e, real = plan.equation, REAL[precision]
+def _tables(plan: RegressionPlan, precision: Precision) -> dict[str, str]:
+    e = plan.equation
 
     def row(values: object) -> str:
         return ", ".join(literal(float(value), precision) for value in np.ravel(np.asarray(values)))
 
     places = [e.channels.index(name) for name in e.regressors.values()]
-    column = [*places, *([len(e.channels)] if BIAS in e.names else [])]
-    factors = ",\n  ".join(
-        "{" + ", ".join(f"{{{row([f.real, f.imag])}}}" for f in channel) + "}" for channel in (*plan.factors, plan.hold)
-    )
-    return f"""static const int held[CHANNELS] = {{{", ".join(str(int(name in plan.held)) for name in e.channels)}}};
-static const int column[UNKNOWNS] = {{{", ".join(map(str, column))}}};
-static const {real} known[CHANNELS] = {{{row([e.known.get(name, 0.0) for name in e.channels])}}};
-static const {real} omega[LINES] = {{{row(2.0 * np.pi * plan.hertz)}}};
-static const {real} factors[CHANNELS + 1][LINES][2] = {{
-  {factors}}};
-"""
+    factors = (", ".join(f"{{{row([f.real, f.imag])}}}" for f in channel) for channel in (*plan.factors, plan.hold))
+    return {
+        "HELD": ", ".join(str(int(name in plan.held)) for name in e.channels),
+        "COLUMNS": ", ".join(map(str, [*places, *([len(e.channels)] if BIAS in e.names else [])])),
+        "KNOWN": row([e.known.get(name, 0.0) for name in e.channels]),
+        "OMEGA": row(2.0 * np.pi * plan.hertz),
+        "FACTORS": ",\n  ".join(f"{{{each}}}" for each in factors),
+    }
 
 
-# ---- what it costs: the loops of runtime/recursive_regression.c, read line by line ----------------------------------
+# ---- what it costs: the loops of templates/regression.c, read line by line -------------------------------------------
 _TURN = 6
 """Operations of a complex product."""
 

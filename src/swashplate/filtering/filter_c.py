@@ -97,7 +97,6 @@ def sample_source(equations: Equations, sample: Sample, following: Following | N
     else:
         lines, stored = moving.body(rest.body), rest
     blanks = {
-        "VECTORS": filled("vectors.h", {}),
         "N": str(n),
         "M": str(m),
         "P": str(len(vehicle.parameter_names) + 2),

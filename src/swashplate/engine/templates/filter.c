@@ -1,7 +1,8 @@
 #include <math.h>
 #include <string.h>
 
-@VECTORS@
+@vectors.h@
+
 enum { N = @N@, M = @M@, W = M + 4, P = @P@, G = @G@, Y = @Y@, S = @S@, A = @A@, D = @D@, R = @R@, CP = @CP@, C = @C@ };
 static const int pushed[D] = {@PUSHED@};
 static const double fractions[4] = {0, 0.5, 0.5, 1}, weights[4] = {1. / 6, 1. / 3, 1. / 3, 1. / 6};

@@ -1,3 +1,39 @@
+#include "@NAME@.h"
+#include <math.h>
+
+#define CHANNELS @UPPER@_CHANNELS
+#define UNKNOWNS @UPPER@_UNKNOWNS
+#define LINES @UPPER@_LINES
+#define SUMS @UPPER@_SUMS
+#define WINDOW @UPPER@_WINDOW
+#define ZERO @ZERO@
+#define ONE @ONE@
+#define TWO @TWO@
+#define HALF @HALF@
+#define THREE_HALVES @THREE_HALVES@
+#define TURN_RE @TURN_RE@
+#define TURN_IM @TURN_IM@
+#define KEEP @KEEP@
+#define KEEP_SQUARED @KEEP_SQUARED@
+#define HALF_STEP @HALF_STEP@
+#define SHORTEST @SHORTEST@
+#define LONGEST @LONGEST@
+#define LEAST_PIVOT @LEAST_PIVOT@
+#define LEAST_LEFT @LEAST_LEFT@
+#define LEAST_FREEDOM @LEAST_FREEDOM@
+#define FIRST @FIRST@
+#define AROUND @AROUND@
+#define DERIVATIVE @DERIVATIVE@
+#define REAL @REAL@
+#define SQRT @SQRT@
+
+static const int held[CHANNELS] = {@HELD@};
+static const int column[UNKNOWNS] = {@COLUMNS@};
+static const @REAL@ known[CHANNELS] = {@KNOWN@};
+static const @REAL@ omega[LINES] = {@OMEGA@};
+static const @REAL@ factors[CHANNELS + 1][LINES][2] = {
+  @FACTORS@};
+
 /* Recursive Fourier regression, after the constants that stand above. No allocation; of the C library only sqrt.
  *
  * Sums of a step are those of swashplate's Python, operation by operation (Morelli 2000, J. Guidance 23(5)); bounds are
@@ -11,7 +47,7 @@ static void turn(const REAL by[2], REAL value[2]) {
   value[0] = re;
 }
 
-void NAME_begin(NAME_memory *e) {
+void @NAME@_begin(@NAME@_memory *e) {
   int i, k;
   for (i = 0; i < SUMS; ++i)
     for (k = 0; k < LINES; ++k) e->sums[i][k][0] = e->sums[i][k][1] = ZERO;
@@ -21,7 +57,7 @@ void NAME_begin(NAME_memory *e) {
   e->begun = 0;
 }
 
-int NAME_step(NAME_memory *e, REAL elapsed, const REAL sample[CHANNELS]) {
+int @NAME@_step(@NAME@_memory *e, REAL elapsed, const REAL sample[CHANNELS]) {
   const REAL base[2] = {TURN_RE, TURN_IM};
   REAL before[CHANNELS], begin[2], end[2], then[2] = {ONE, ZERO}, here[2] = {ONE, ZERO}, back;
   int i, m, ran = e->begun;
@@ -65,13 +101,13 @@ int NAME_step(NAME_memory *e, REAL elapsed, const REAL sample[CHANNELS]) {
   return 1;
 }
 
-static void transform(const NAME_memory *e, int channel, int k, REAL value[2]) {
+static void transform(const @NAME@_memory *e, int channel, int k, REAL value[2]) {
   value[0] = e->sums[channel][k][0];
   value[1] = e->sums[channel][k][1];
   turn(factors[channel][k], value);
 }
 
-static void rows(const NAME_memory *e, NAME_work *w) {
+static void rows(const @NAME@_memory *e, @NAME@_work *w) {
   int i, k;
   for (k = 0; k < LINES; ++k) {
     REAL z[2], part[2];
@@ -101,7 +137,7 @@ static void rows(const NAME_memory *e, NAME_work *w) {
 }
 
 /* Inverse of the scaled normal equations by their Cholesky factor; 0 where a pivot says that they are singular. */
-static int inverted(NAME_work *w) {
+static int inverted(@NAME@_work *w) {
   int i, j, k;
   for (i = 0; i < UNKNOWNS; ++i) {
     for (j = 0; j <= i; ++j) {
@@ -131,7 +167,7 @@ static int inverted(NAME_work *w) {
   return 1;
 }
 
-int NAME_estimate(const NAME_memory *e, NAME_work *w, REAL values[UNKNOWNS], REAL covariance[UNKNOWNS][UNKNOWNS]) {
+int @NAME@_estimate(const @NAME@_memory *e, @NAME@_work *w, REAL values[UNKNOWNS], REAL covariance[UNKNOWNS][UNKNOWNS]) {
   const REAL length = e->window[0][0];
   REAL squares = ZERO, count, freedom;
   int i, j, k, l;

@@ -1,0 +1,3 @@
+#define MODEL_LATE @LONGEST@
+#define N_PAST @PAST@
+static const double model_delays[] = {@DELAYS@};
