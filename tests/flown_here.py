@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,7 @@ from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live import world as begins
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.pilots import WANTED, Mode
+from swashplate.links.live.sensors import BODY
 from swashplate.links.live.world import FAN_SECONDS, OPENS, page_gusts
 from swashplate.models.doubts import doubts
 from swashplate.models.vehicle import Vehicle
@@ -88,7 +89,7 @@ class World(begins.World):
 
     Args:
         vehicle, controller, believed, draws: as of the package's `World`.
-        seed: of the gusts.
+        seed: of the gusts and of the sensors' noise.
     """
 
     def __init__(
@@ -107,6 +108,7 @@ class World(begins.World):
         self._force = traced_force(equations_of(vehicle)) if self.pilot.feels else None
         self._p = parameter_row(vehicle, self.environment)
         self._drawn = [parameter_row(one, self.environment) for one in draws]
+        self.normal: Callable[[], float] = np.random.default_rng(seed).standard_normal
         self._limits = np.array(vehicle.input_limits).T
         self._maneuver: tuple[Maneuver, int] | None = None
         self.reset()
@@ -121,8 +123,12 @@ class World(begins.World):
         if self.setting.ghost:
             self._crafts["ghost"] = self._fresh()
         self._turbulence: Turbulence | None = None
-        self._target = np.array(self.trim.state[[0, 1, 2, 8]])
+        self._take()
         self._begin_fan()
+
+    def _take(self) -> None:
+        """Hold the place and the heading that the sensors read now."""
+        self._target = self.sensors[0].read(self._crafts["own"].x)[[0, 1, 2, 8]].copy()
 
     def _begin_fan(self) -> None:
         self._fan: list[Craft | None] = [self._crafts["own"].copied() for _ in self._drawn]
@@ -146,7 +152,7 @@ class World(begins.World):
             for craft in self._crafts.values():
                 craft.memory = np.array(self.pilot.memory)
             self._begin_fan()
-            self._target = self._crafts["own"].x[[0, 1, 2, 8]].copy()
+            self._take()
 
     def set_ghost(self, on: bool) -> None:
         """A second copy with the decoupling the other way, from where the first one is now."""
@@ -189,10 +195,10 @@ class World(begins.World):
         before = self._crafts["own"].x
         if self._fan and (self.ticks - self._fan_begun) * self.period >= FAN_SECONDS:
             self._begin_fan()
-        flying = [(craft, self._p, self.setting.decoupled != (name == "ghost")) for name, craft in self._crafts.items()]
-        flying += [(c, p, self.setting.decoupled) for c, p in zip(self._fan, self._drawn, strict=True) if c is not None]
-        for craft, p, decoupled in flying:
-            self._advance(craft, p, self.pilot.gains[self.setting.mode, decoupled], wanted, around, added)
+        flying = [(craft, 0, self.setting.decoupled != (name == "ghost")) for name, craft in self._crafts.items()]
+        flying += [(c, i, self.setting.decoupled) for i, c in enumerate(self._fan, start=1) if c is not None]
+        for craft, which, decoupled in flying:
+            self._advance(craft, which, self.pilot.gains[self.setting.mode, decoupled], wanted, around, added)
         self._fan = [None if c is None or self._lost(c.x) else c for c in self._fan]
         own = self._crafts["own"]
         self._check(own, before)
@@ -204,15 +210,22 @@ class World(begins.World):
             self.set_ghost(False)
         self.ticks += 1
 
-    def _advance(self, craft: Craft, p: Array, gains: Array, wanted: Array, around: Array, added: Array) -> None:
-        """One controller step of a copy: the law, then `_substeps` of physics with its inputs held."""
+    def _advance(self, craft: Craft, which: int, gains: Array, wanted: Array, around: Array, added: Array) -> None:
+        """One controller step of a copy: sensors, law, then `_substeps` of physics with its inputs held.
+
+        Args:
+            which: 0 for the model itself, k for the k-th drawn one.
+        """
+        p, back, sensors = [self._p, *self._drawn][which], self.steps_back[which], self.sensors[which]
         columns = np.arange(craft.past.shape[1])
-        acting = craft.past[len(craft.past) - 1 - self.steps_back[-1], columns]
-        told = np.concatenate([craft.x, self._feel(craft.x, acting, around, p), around[-1:]])
+        acting = craft.past[len(craft.past) - 1 - back[-1], columns]
+        read = sensors.read(craft.x).copy()
+        read[:BODY] += np.array(sensors.sigma) * [self.normal() for _ in range(BODY)]
+        told = np.concatenate([read, self._feel(craft.x, acting, around, p), around[-1:]])
         craft.memory, command = self.pilot.decide(craft.memory, told, wanted, gains)
         craft.inputs = np.clip(command + added, *self._limits)
         craft.past = np.concatenate([craft.past[1:], craft.inputs[None]])
-        sent = craft.past[len(craft.past) - 1 - self.steps_back, columns]
+        sent = craft.past[len(craft.past) - 1 - back, columns]
         rows = np.concatenate([sent, np.tile(around, (len(sent), 1))], axis=1)
         rows = np.concatenate([rows, rows[-1:]])
         plan = FlightPlan(craft.x[:, None], p[:, None], rows[:, :, None], 1.0 / self._rate, keep=self.substeps)
@@ -253,7 +266,7 @@ class World(begins.World):
         setting, law, s = self.setting, self.pilot, self.setting.sticks
         row = dict.fromkeys(WANTED, 0.0)
         if setting.mode == "raw":
-            self._target = self._crafts["own"].x[[0, 1, 2, 8]].copy()
+            self._take()
             row.update(yaw=s["yaw"], heave=s["heave"])
         else:
             height = self._target[2] - self.period * law.climb * s["heave"]

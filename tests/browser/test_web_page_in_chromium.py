@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +22,7 @@ from swashplate.api.verbs.export import ExportModel
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.web.libraries import PAGE
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.frames import Euler, Vector, local_to_body
 
@@ -28,6 +30,8 @@ FLY = """plan => {
   const { connection } = swash, { flight } = connection;
   connection.runs = false;
   flight.reset();
+  let seed = 1;
+  Math.random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
   for (let k = 0; k < plan.sticks.length; k += 1) {
     flight.setting.sticks = Object.fromEntries(plan.axes.map((axis, i) => [axis, plan.sticks[k][i]]));
     if (k === plan.maneuver) flight.flyManeuver("3211", "roll", 1);
@@ -36,7 +40,7 @@ FLY = """plan => {
     flight.step();
   }
   const result = { x: [...flight.places[0].x], u: [...flight.places[0].inputs], trouble: flight.trouble };
-  return { ...result, air: flight.airSpeed() };
+  return { ...result, air: flight.airSpeed(), fan: flight.fanned()?.x ?? [] };
 }"""
 MANEUVER, BLOW, MODE = 300, 500, 700
 
@@ -88,7 +92,20 @@ def air_speed(world: World) -> float:
     return float(np.linalg.norm(np.array([u, v, w]) - np.array(wind)))
 
 
+def same_normals() -> Callable[[], float]:
+    """Normal draws as the page makes them of the uniform ones of `FLY`: Lehmer's with Park and Miller's numbers."""
+    seed = 1
+
+    def uniform() -> float:
+        nonlocal seed
+        seed = seed * 48271 % 2147483647
+        return seed / 2147483647
+
+    return lambda: math.sqrt(-2.0 * math.log(1.0 - uniform())) * math.cos(2.0 * math.pi * uniform())
+
+
 def flown_here(world: World, plan: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    world.normal = same_normals()
     for k, sticks in enumerate(plan["sticks"]):
         world.setting.sticks = dict(zip(STICKS, sticks, strict=True))
         if k == MANEUVER:
@@ -103,24 +120,37 @@ def flown_here(world: World, plan: dict[str, Any]) -> tuple[np.ndarray, np.ndarr
     return np.array(own[0]), np.array(own[1])
 
 
-@pytest.mark.parametrize("name", ["coax", "raptor50", "crazyflie", "late"])
+def fitted(**nuisance: float) -> Vehicle:
+    """A CoaX with delays and sensors as a fit remembers them."""
+    coax = sp.vehicle("coax")
+    usual = {"delay_motor": 0.0417, "delay_servo": 0.0233, "lever_x": 0.02, "lever_z": -0.05, "level_psi": 0.1}
+    noise = {"sensor_position": 3e-4, "sensor_angle": 1.5e-3, "sensor_rate": 0.04}
+    return coax.with_card(replace(coax.card, observer={"nuisance": {**usual, **nuisance}, "noise": noise}))
+
+
+@pytest.mark.parametrize("name", ["coax", "raptor50", "crazyflie", "fitted"])
 def test_it_flies_as_here_with_the_network_off(browser: Any, name: str, tmp_path: Path) -> None:
-    """The last one with delays as a fit of the CoaX remembers them."""
-    vehicle = sp.vehicle("coax" if name == "late" else name)
-    if name == "late":
-        fitted = {**vehicle.card.observer, "nuisance": {"delay_motor": 0.0617, "delay_servo": 0.0333}}
-        vehicle = vehicle.with_card(replace(vehicle.card, observer=fitted))
-    (file,) = sp.export_model(vehicle, "web", name=name).save(tmp_path)
+    """The last one with delays, sensors and their noise as identified, and two drawn models with others."""
+    vehicle = fitted() if name == "fitted" else sp.vehicle(name)
+    draws = [fitted(delay_servo=0.01), fitted(level_theta=0.05)] if name == "fitted" else []
+    (file,) = sp.export_model(vehicle, "web", name=name, draws=draws).save(tmp_path)
     assert file.stat().st_size < 1_000_000
     page, said = opened(browser, file)
-    world = World(vehicle)
-    assert world.delays.any() == (name == "late")
+    world = World(vehicle, draws=draws)
+    assert world.delays.any() == (name == "fitted")
+    assert world.not_held == ""
+    shown = "a point (20, 0, -50) mm ahead, right and below" if draws else "the true states"
+    assert shown in page.locator("#sensors").text_content()
     plan = plan_of(world)
     found = page.evaluate(FLY, plan)
     x, u = flown_here(world, plan)
     assert found["trouble"] == world.trouble == ""
     np.testing.assert_allclose(found["x"], x, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(found["u"], u, rtol=1e-9, atol=1e-9)
+    fan = [row[:12] for row in world.moment().fan if row is not None]
+    assert len(fan) == len(draws)
+    np.testing.assert_allclose(found["fan"], np.reshape(fan, (-1, 12)) if fan else [], rtol=1e-9, atol=1e-9)
+    assert all(np.abs(row - x[:12]).max() > 1e-3 for row in fan), "each with delays and sensors of its own"
     assert found["air"] == pytest.approx(air_speed(world), rel=1e-9)
     assert not chromium.complaints(said)
 

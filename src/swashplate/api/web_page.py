@@ -11,7 +11,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.links.live.replay import flight_at
 from swashplate.links.live.single_page import LOGGED_RATE, single_page
-from swashplate.links.live.world import MOST_DRAWS, NOT_HELD, World
+from swashplate.links.live.world import MOST_DRAWS, World
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.surroundings import input_delays
@@ -47,7 +47,7 @@ def web(request: ExportRequest) -> Export:
         {f"{request.name}.html": page.encode()},
         (
             f"Inside: {inside}. Open it by double-click.",
-            *(() if world.holds else (f"Careful: the page's own pilot {NOT_HELD} (--controller).",)),
+            *((f"Careful: the page's own pilot {world.not_held} (--controller).",) if world.not_held else ()),
         ),
     )
 

@@ -18,12 +18,12 @@ import numpy as np
 from swashplate.arrays import Array, Values
 from swashplate.engine.equations import Equations, equations_of
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import Nuisance, tracked_pose
 from swashplate.filtering.riccati import blocks, diagonal
-from swashplate.flights.schema import POSITION, RATES
+from swashplate.flights.schema import ATTITUDE, POSITION, RATES
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, Scalar
-from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
+from swashplate.physics.frames import Euler, Vector
 from swashplate.simulation.discretisation import held_series
 
 N_DISTURBANCES = len(DISTURBED)
@@ -77,19 +77,11 @@ class StochasticModel:
     # ---- what is seen ------------------------------------------------------------------------------------------
     def measure(self, x: Scalar, nuisance: Nuisance, xp: Backend) -> Scalar:
         """The measured channels of a state, whose entries come first."""
-        here = {name: x[self.vehicle.index(name)] for name in self.output_names}
-        attitude = Euler(*(x[self.vehicle.index(name)] for name in ("phi", "theta", "psi")))
-        lever = body_to_local(Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z), attitude, xp)
-        tracked = turned_about_z(attitude, nuisance.level_psi, xp)
-        seen = {
-            "x": x[self.vehicle.index("x")] + lever.x,
-            "y": x[self.vehicle.index("y")] + lever.y,
-            "z": x[self.vehicle.index("z")] + lever.z,
-            "phi": tracked.phi + nuisance.level_phi,
-            "theta": tracked.theta + nuisance.level_theta,
-            "psi": tracked.psi,
-        }
-        return xp.arrays.stack([seen.get(name, here[name]) for name in self.output_names])
+        here = {name: x[self.vehicle.index(name)] for name in (*POSITION, *ATTITUDE, *self.output_names)}
+        place, attitude = Vector(*map(here.get, POSITION)), Euler(*map(here.get, ATTITUDE))
+        shown = [part._asdict() for part in tracked_pose(place, attitude, nuisance, xp)]
+        seen = {**here, **shown[0], **shown[1]}
+        return xp.arrays.stack([seen[name] for name in self.output_names])
 
     @property
     def disturbed(self) -> list[int]:

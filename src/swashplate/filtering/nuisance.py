@@ -10,7 +10,8 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import DISTURBED, on_axes
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Scalar
+from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 
 
 def commands_moved(vehicle: Vehicle, dt: float, inputs: Array, nuisance: Nuisance) -> tuple[Array, Array]:
@@ -79,6 +80,14 @@ class Nuisance(NamedTuple):
     push_p: Scalar = 0.0
     push_q: Scalar = 0.0
     push_r: Scalar = 0.0
+
+
+def tracked_pose(place: Vector, attitude: Euler, nuisance: Nuisance, xp: Backend) -> tuple[Vector, Euler]:
+    """Place of the tracked point, and attitude of the tracked body, of a vehicle's."""
+    lever = body_to_local(Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z), attitude, xp)
+    phi, theta, psi = turned_about_z(attitude, nuisance.level_psi, xp)
+    shifted = Vector(place.x + lever.x, place.y + lever.y, place.z + lever.z)
+    return shifted, Euler(phi + nuisance.level_phi, theta + nuisance.level_theta, psi)
 
 
 DELAYS = ("delay_servo", "delay_motor")

@@ -77,7 +77,7 @@ def flown(name: str, size: float = 1.0) -> Flown:
         inputs.append(world.moment().crafts["own"][1].copy())
     assert not world.trouble
     late = int(world.steps_back.max())
-    assert np.all(world.steps_back == late), "whole periods"
+    assert np.all(world.steps_back[0] == late), "whole periods"
     acting = np.concatenate([np.tile(world.trim.inputs, (late, 1)), inputs])[:PERIODS]
     return Flown(world, sticks, np.array(inputs), acting, np.array(states))
 

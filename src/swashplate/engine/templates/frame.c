@@ -1,25 +1,39 @@
 
-/* One period of a controller for the live page in one file: the law on what it is told, its commands as late as they act,
+/* One period of a controller for the live page in one file: the law on what sensors read, its commands as late as they act,
    and the steps of physics until it decides again. Numbers are exchanged through the arrays below. */
 @FLIGHT@
 @TRACED@
 enum {
   INPUTS = W - 4, PERIOD = @PERIOD@, DEPTH = @DEPTH@, CARRIED = @CARRIED@, ASKED = @ASKED@, GAINS = @GAINS@,
-  DRAWN = @DRAWN@, CRAFTS = @CRAFTS@, HEARD = SEEN + 4 + DRAWN
+  DRAWN = @DRAWN@, CRAFTS = @CRAFTS@, HEARD = SEEN + 4 + DRAWN, BODY = @BODY@, PLACED = @PLACED@
 };
-typedef struct { double x[SEEN], past[DEPTH][INPUTS], carried[CARRIED + 1], inputs[INPUTS]; } Craft;
+typedef struct { double x[SEEN], past[DEPTH][INPUTS], carried[CARRIED + 1], inputs[INPUTS], read[SEEN]; } Craft;
 static Craft crafts[CRAFTS];
-static double card[CRAFTS][P], asked[ASKED], gains[GAINS + 1], around[4], added[INPUTS], limits[2][INPUTS], draws[DRAWN + 1];
-static int back[PERIOD][INPUTS];
+static double card[CRAFTS][P], sensors[CRAFTS][PLACED + BODY], asked[ASKED], gains[GAINS + 1], around[4], added[INPUTS],
+  limits[2][INPUTS], draws[DRAWN + BODY];
+static int back[CRAFTS][PERIOD][INPUTS];
 
-/* Where an array is: 0 to 3 of a craft (state, past commands, what the law carries, inputs), 4 its card, then those that
-   all share. */
+/* Where an array is: 0 to 6 of a craft (state, past commands, what the law carries, inputs, its card, its sensors, what
+   they read), then those that all share. */
 double *buffer(int which, int craft) {
-  double *own[] = {crafts[craft].x, crafts[craft].past[0], crafts[craft].carried, crafts[craft].inputs, card[craft]};
+  Craft *it = crafts + craft;
+  double *own[] = {it->x, it->past[0], it->carried, it->inputs, card[craft], sensors[craft], it->read};
   double *all[] = {asked, gains, around, added, limits[0], draws};
-  return which < 5 ? own[which] : all[which - 5];
+  return which < 7 ? own[which] : all[which - 7];
 }
-int *delays(void) { return back[0]; }
+int *delays(int craft) { return back[craft][0]; }
+
+static void tracked(const double *x, const double *s, double *row) {
+@SENSORS@}
+
+/* What the sensors of a craft read where it is, without their noise. */
+void sense(int which) {
+  Craft *craft = crafts + which;
+  int placed = 0;
+  for (int j = 0; j < PLACED; ++j) placed |= sensors[which][j] != 0;
+  memcpy(craft->read, craft->x, sizeof craft->x);
+  if (placed) tracked(craft->x, sensors[which], craft->read);
+}
 
 #if QUATERNION
 static void placed(const double *x, double *row) {
@@ -46,10 +60,12 @@ void frame(int which) {
   Craft *craft = crafts + which;
   double heard[HEARD], rows[PERIOD + 1][W], start[N + SEEN], states[2][SEEN], told[CARRIED + INPUTS];
   memset(heard, 0, sizeof heard);
-  memcpy(heard, craft->x, sizeof craft->x);
+  sense(which);
+  memcpy(heard, craft->read, sizeof craft->read);
+  for (int j = 0; j < BODY; ++j) heard[j] += sensors[which][PLACED + j] * draws[DRAWN + j];
 #if @FEELS@
   double acting[W];
-  for (int j = 0; j < INPUTS; ++j) acting[j] = craft->past[DEPTH - 1 - back[PERIOD - 1][j]][j];
+  for (int j = 0; j < INPUTS; ++j) acting[j] = craft->past[DEPTH - 1 - back[which][PERIOD - 1][j]][j];
   memcpy(acting + INPUTS, around, sizeof around);
   felt_by(craft->x, acting, card[which], heard + SEEN);
 #endif
@@ -62,7 +78,7 @@ void frame(int which) {
     craft->inputs[j] = craft->past[DEPTH - 1][j] = limited(told[CARRIED + j] + added[j], limits[0][j], limits[1][j]);
   for (int k = 0; k <= PERIOD; ++k) {
     const int row = k < PERIOD ? k : PERIOD - 1;
-    for (int j = 0; j < INPUTS; ++j) rows[k][j] = craft->past[DEPTH - 1 - back[row][j]][j];
+    for (int j = 0; j < INPUTS; ++j) rows[k][j] = craft->past[DEPTH - 1 - back[which][row][j]][j];
     memcpy(rows[k] + INPUTS, around, sizeof around);
   }
 #if QUATERNION

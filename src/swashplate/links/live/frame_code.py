@@ -18,9 +18,10 @@ from swashplate.engine.trace import traced_force, traced_placing
 from swashplate.errors import ExportError
 from swashplate.extras import missing
 from swashplate.links.live.pilots import WANTED
+from swashplate.links.live.sensors import BODY, PLACED, traced_sensors
 from swashplate.links.live.world import MOST_DRAWS, World
 
-EXPORTS = ("frame", "buffer", "delays")
+EXPORTS = ("frame", "buffer", "delays", "sense")
 """What the module shows, beside its memory."""
 _TARGET = ("-target", "wasm32-freestanding", "-nostdlib", "-Wl,--no-entry", "-Wl,--strip-all")
 _OPTIONS = ("-O2", "-fno-math-errno", "-fno-trapping-math", "-w")
@@ -58,7 +59,8 @@ def frame_code(world: World) -> str:
             inputs=["x"],
             outputs=["row"],
         )
-    f, back = law.function, world.steps_back
+    f, period = law.function, world.substeps
+    sensors = body(traced_sensors(), real="double", precision="double", inputs=["x", "s"], outputs=["row"])
     return filled(
         "frame.c",
         {
@@ -74,14 +76,17 @@ def frame_code(world: World) -> str:
             "WHOLES": max(1, int(f.sz_iw())),
             "ARGUMENTS": max(4, int(f.sz_arg())),
             "RESULTS": max(1, int(f.sz_res())),
-            "PERIOD": len(back),
+            "PERIOD": period,
             "DEPTH": world.depth,
             "CARRIED": law.memory,
             "ASKED": len(WANTED),
             "GAINS": world.pilot.gain_count,
             "DRAWN": law.draws,
             "CRAFTS": 2 + max(MOST_DRAWS, len(world.draws)),
-            "STEP": repr(world.period / len(back)),
+            "STEP": repr(world.period / period),
+            "SENSORS": sensors,
+            "BODY": BODY,
+            "PLACED": len(PLACED),
         },
     )
 

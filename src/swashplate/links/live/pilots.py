@@ -110,6 +110,7 @@ class Pilot:
         title: what it is, in words.
         delays: from command to actuator, by input [s], of a designed controller; None for the vehicle's own.
         feels: whether it wants the specific force.
+        reads: whether it reads the model's identified sensors; a controller with sensors of its own does not.
     """
 
     decide: Decide
@@ -124,6 +125,7 @@ class Pilot:
     title: str = ""
     delays: Array | None = None
     feels: bool = False
+    reads: bool = True
 
     @property
     def gain_count(self) -> int:
@@ -262,6 +264,7 @@ def _designed(vehicle: Vehicle, trim: Trim, controller: Controller) -> Pilot:
         title=f"{name}, as designed",
         delays=flown_delays(vehicle, controller),
         feels=decide.law.feels,
+        reads=not decide.law.draws,
     )
 
 

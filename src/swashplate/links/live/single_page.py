@@ -14,6 +14,7 @@ from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.frame_code import frame_code, web_assembly
 from swashplate.links.live.picture import inputs_of, picture, pose_of
+from swashplate.links.live.sensors import BODY
 from swashplate.links.live.world import FAN_SECONDS, World, gust_filters
 from swashplate.links.web.libraries import PAGE
 from swashplate.links.web.single_file import WEB_ASSEMBLY, single_file
@@ -64,7 +65,6 @@ def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
     nominal = world.nominal_voltage
     around = world.environment
     law = pilot.decide.graph(len(vehicle.state_names) + 4, pilot.memory.size, pilot.gain_count)
-    steps = world.steps_back
     own = {"bar": False, "barred": False, "hows": [], "folder": "", "estimates": [], "learns": False, "logged": False}
     return {
         "name": name,
@@ -74,6 +74,7 @@ def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
             "about": vehicle.traits.about,
             "wind": vehicle.traits.wind,
             "controller": pilot.title,
+            "sensors": str(world.sensors[0]) if pilot.reads else "the controller's own sensors",
             "picture": picture(vehicle),
             "inputs": inputs_of(vehicle),
             "modes": list(pilot.modes),
@@ -92,10 +93,11 @@ def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
             "depth": world.depth,
             "carried": pilot.memory.size,
             "gains": pilot.gain_count,
-            "draws": law.draws,
+            "draws": law.draws + BODY,
             "crafts": 2 + len(world.draws),
         },
-        "back": steps.ravel().tolist(),
+        "back": [one.ravel().tolist() for one in world.steps_back],
+        "sensors": [[*one.placed, *one.sigma] for one in world.sensors],
         "trim": {"x": world.trim.state.tolist(), "u": np.asarray(world.trim.inputs).tolist()},
         "carried": np.asarray(pilot.memory).tolist(),
         "card": parameter_row(vehicle, around).tolist(),

@@ -1,4 +1,4 @@
-"""Whether the page's own pilot holds a vehicle whose commands are late: its loop about the hover, sample by sample."""
+"""Whether the page's own pilot holds a vehicle with late commands and identified sensors: its loop about the hover."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from scipy.linalg import expm
 
 from swashplate.arrays import Array
 from swashplate.links.live.pilots import WANTED, Mode, Pilot
+from swashplate.links.live.sensors import Sensors
 from swashplate.simulation.linearize import LinearModel
 
 _GROWS = 1.001
@@ -15,28 +16,29 @@ _GROWS = 1.001
 _STEP = 1e-6
 
 
-def holds(pilot: Pilot, mode: Mode, model: LinearModel, back: NDArray[np.int_]) -> bool:
-    """Whether deviations from the hover fade, or grow no faster than they would were nothing late.
+def holds(pilot: Pilot, mode: Mode, model: LinearModel, back: NDArray[np.int_], sensors: Sensors) -> bool:
+    """Whether deviations from the hover fade, or grow no faster than they would were nothing late and all states seen.
 
     Args:
         pilot: its law. mode: in which it flies.
         model: of the vehicle about the hover.
         back: how many commands ago the one was given that acts in a step, shape (steps of a period, inputs).
+        sensors: what the law reads.
     """
-    fed = _feedback(pilot, mode, model)
-    return _growth(pilot, fed, model, back) <= max(_GROWS, _growth(pilot, fed, model, 0 * back))
+    usual = _growth(pilot, _feedback(pilot, mode, model, Sensors()), model, 0 * back)
+    return _growth(pilot, _feedback(pilot, mode, model, sensors), model, back) <= max(_GROWS, usual)
 
 
-def _feedback(pilot: Pilot, mode: Mode, model: LinearModel) -> Array:
+def _feedback(pilot: Pilot, mode: Mode, model: LinearModel, sensors: Sensors) -> Array:
     """Slopes of what is carried and commanded to what was carried and the states, by differences."""
     x = np.array(model.trim.state, dtype=np.float64)
     wanted = np.zeros(len(WANTED))
-    wanted[:4] = x[[model.states.index(name) for name in ("x", "y", "z", "psi")]]
+    wanted[:4] = sensors.read(x)[[model.states.index(name) for name in ("x", "y", "z", "psi")]]
     at, size = np.concatenate([pilot.memory, x]), pilot.memory.size
     voltage, gains = float(model.trim.environment.voltage or 0.0), pilot.gains[mode, True]
 
     def decided(row: Array) -> Array:
-        told = np.concatenate([row[size:], np.zeros(3), [voltage]])
+        told = np.concatenate([sensors.read(row[size:]), np.zeros(3), [voltage]])
         return np.concatenate(pilot.decide(row[:size], told, wanted, gains))
 
     steps = _STEP * np.eye(at.size)

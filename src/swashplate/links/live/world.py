@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import Mode, Pilot, pilot
+from swashplate.links.live.sensors import Sensors, sensors_of
 from swashplate.links.live.steadiness import holds
 from swashplate.models.surroundings import environment_of, input_delays
 from swashplate.models.vehicle import Vehicle
@@ -31,7 +32,7 @@ OPENS: Mode = "attitude"
 """The mode in which a page opens, where the law flies it."""
 HELD: tuple[Mode, ...] = ("attitude", "velocity", "position")
 """The modes in which the pilot holds the hover by itself."""
-NOT_HELD = "does not hold the hover with the identified delays, a controller made for them would"
+NOT_HELD = "does not hold the hover with the identified {cause}, a controller made for them would"
 REMEMBERED = 0.3
 """Seconds of commands that the code keeps at least, so that a fit's delays need no code of their own."""
 _GUST_LENGTH, _GUST_SPEED = 5.0, 2.0
@@ -53,9 +54,11 @@ class World:
         start_height: of its hover [m]. trim: the hover. pilot: the law. mode: in which it begins.
         substeps: of physics in one period of the law. period: of the law [s].
         delays: from command to actuator [s], by input.
-        steps_back: how many periods ago the input was given that acts in a step, shape (substeps, n_inputs).
+        steps_back: how many periods ago the input was given that acts in a step, shape (1 + drawn models, substeps,
+            n_inputs).
+        sensors: what the pilot reads, of it and of each drawn model.
         depth: how many commands the code keeps.
-        holds: whether the own pilot holds the hover with these delays.
+        not_held: why the page's own pilot does not hold the hover, in words; "" where it does.
 
     Raises:
         SwashError: where it has no hover, or the controller is for another vehicle.
@@ -81,19 +84,36 @@ class World:
         rate = 1.0 / LONGEST_STEP if vehicle.card.options.get("ground") else PHYSICS_RATE
         self.substeps = round(rate / self.pilot.rate)
         self.period = self.substeps / rate
-        known = self.pilot.delays
-        if known is None:
-            by_name = input_delays(vehicle)
-            known = np.array([by_name.get(name, 0.0) for name in vehicle.input_names])
-        self.delays = np.zeros(known.size) if at_once else known
-        self.steps_back = steps_back(self.delays, self.substeps, rate)
+        flying = (vehicle, *draws)
+        late = [np.zeros(len(vehicle.input_names)) if at_once else self._delays_of(one) for one in flying]
+        self.delays = late[0]
+        self.steps_back = np.stack([steps_back(one, self.substeps, rate) for one in late])
+        self.sensors = [sensors_of(one) if self.pilot.reads else Sensors() for one in flying]
         self.depth = 1 + max(int(np.max(self.steps_back)), round(REMEMBERED / self.period))
-        self.holds = True
-        if controller is None and self.delays.any():
-            model, modes = linearize(vehicle, self.trim), set(HELD) & set(self.pilot.modes)
-            self.holds = all(holds(self.pilot, mode, model, self.steps_back) for mode in modes)
-        if not self.holds:
-            self.pilot = replace(self.pilot, title=f"{self.pilot.title}: {NOT_HELD}")
+        self.not_held = self._not_held() if controller is None else ""
+        if self.not_held:
+            self.pilot = replace(self.pilot, title=f"{self.pilot.title}: {self.not_held}")
+
+    def _delays_of(self, vehicle: Vehicle) -> Array:
+        if self.pilot.delays is not None:
+            return self.pilot.delays
+        known = input_delays(vehicle)
+        return np.array([known.get(name, 0.0) for name in vehicle.input_names])
+
+    def _not_held(self) -> str:
+        """Why the pilot does not hold the hover, in words: the delays alone, the sensors alone, or both."""
+        back, read = self.steps_back[0], self.sensors[0]
+        if not (back.any() or any(read.placed)):
+            return ""
+        model, modes = linearize(self.vehicle, self.trim), set(HELD) & set(self.pilot.modes)
+        for cause, late, shown in (
+            ("delays", back, Sensors()),
+            ("sensors", 0 * back, read),
+            ("delays and sensors", back, read),
+        ):
+            if not all(holds(self.pilot, mode, model, late, shown) for mode in modes):
+                return NOT_HELD.format(cause=cause)
+        return ""
 
     def law_for(self, vehicle: Vehicle) -> Pilot:
         """The pilot's law, made for the numbers of some vehicle of the same kind.

@@ -101,7 +101,7 @@ def test_input_delays_are_flown(thirteen: World) -> None:
 
 def test_delays_that_are_no_whole_controller_steps() -> None:
     late = linear_vehicle(parse(to_toml(structure("thirteen_state")).replace("value = 0.02", "value = 0.034")))
-    back = World(late).steps_back
+    (back,) = World(late).steps_back
     ago = np.arange(5)[:, None] * 2 + 10 * back  # ms from when the input was given to the substep
     assert np.all((ago >= 34) & (ago < 44))
     assert not steps_back(np.zeros(4), 5, 500.0).any()

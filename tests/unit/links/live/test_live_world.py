@@ -24,8 +24,9 @@ from swashplate.links.live import world as live_world
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
-from swashplate.links.live.world import FAN_SECONDS
+from swashplate.links.live.world import FAN_SECONDS, NOT_HELD
 from swashplate.models.card import packaged_cards
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.wind import Gusts, Turbulence, dryden
 
 ROLL_RATE = 9
@@ -347,19 +348,42 @@ def test_a_place_that_the_wind_takes_is_told_and_one_that_is_held_is_not(coax: W
     fresh(coax, "position")
 
 
-@pytest.mark.parametrize(("servo", "holds"), [(0.03, True), (0.08, False)])
-def test_identified_delays_are_flown_and_a_pilot_that_does_not_hold_them_is_told(servo: float, holds: bool) -> None:
+def identified(nuisance: dict[str, float]) -> Vehicle:
+    """A CoaX whose card remembers these numbers of a record."""
+    coax = sp.vehicle("coax")
+    return coax.with_card(replace(coax.card, observer={"nuisance": nuisance}))
+
+
+@pytest.mark.parametrize(("servo", "cause"), [(0.03, ""), (0.08, "delays")])
+def test_identified_delays_are_flown_and_a_pilot_that_does_not_hold_them_is_told(servo: float, cause: str) -> None:
     """The verdict of the linear loop is that of the flight: a kick fades, or grows."""
-    card = sp.vehicle("coax").card
-    late = replace(card, observer={**card.observer, "nuisance": {"delay_motor": 0.06, "delay_servo": servo}})
-    world = World(sp.vehicle("coax").with_card(late))
+    world = World(identified({"delay_motor": 0.06, "delay_servo": servo}))
     assert world.delays.tolist() == [0.06, 0.06, servo, servo]
-    assert world.steps_back[0].tolist() == [6, 6, round(100 * servo), round(100 * servo)]
-    assert world.holds == holds
-    assert ("does not hold the hover" in world.pilot.title) != holds
+    assert world.steps_back[0, 0].tolist() == [6, 6, round(100 * servo), round(100 * servo)]
+    assert world.not_held == (NOT_HELD.format(cause=cause) if cause else "")
+    assert world.pilot.title.endswith(world.not_held)
     fresh(world, "attitude")
     fly(world, 0.2, roll=1.0)
     early = max(np.abs(fly(world, 0.01)[ROLL_RATE]) for _ in range(50))
     fly(world, 4.0)
-    assert (max(np.abs(fly(world, 0.01)[ROLL_RATE]) for _ in range(50)) < early) == holds
+    assert (max(np.abs(fly(world, 0.01)[ROLL_RATE]) for _ in range(50)) < early) == (not cause)
     assert not live_world.World(world.vehicle, at_once=True).delays.any()
+
+
+@pytest.mark.parametrize(
+    ("heading", "delay", "cause"), [(0.6, 0.0, ""), (1.2, 0.0, "sensors"), (0.92, 0.03, "delays and sensors")]
+)
+def test_sensors_that_the_pilot_does_not_hold_the_hover_with_are_told(heading: float, delay: float, cause: str) -> None:
+    """Markers whose heading is not the nose's: the place that is held comes back, or is circled ever wider."""
+    world = World(identified({"level_psi": heading, "delay_servo": delay}))
+    assert world.not_held == (NOT_HELD.format(cause=cause) if cause else "")
+    fresh(world, "position")
+    fly(world, 0.5, roll=1.0)
+
+    def farthest() -> float:
+        places = [fly(world, 0.05)[[X, Y]] - world.moment().target[:2] for _ in range(60)]
+        return float(np.max(np.hypot(*np.transpose(places))))
+
+    early = farthest()
+    fly(world, 6.0)
+    assert (farthest() < early) == (not cause)

@@ -1,6 +1,6 @@
 // One helicopter and what flies beside it, a period of the controller at a time: `links/live/world.py` over WebAssembly.
-const PARTS = ["x", "past", "carried", "inputs", "card", "wanted", "gains", "around", "added", "limits", "draws"];
-const OWN = 5; // of the parts, those that each craft has
+const PARTS = ["x", "past", "carried", "inputs", "card", "sensors", "read", "wanted", "gains", "around", "added", "limits", "draws"];
+const OWN = 7; // of the parts, those that each craft has
 const HELD = 3; // m from a place that is held, beyond which it is not
 const LEAN = Math.PI / 3; // where a linear model tells nothing any more
 
@@ -10,20 +10,26 @@ function normal() {
 
 export class Flight {
   constructor(instance, model, logged = null) {
-    const { frame, buffer, delays, memory } = instance.exports;
+    const { frame, buffer, delays, sense, memory } = instance.exports;
     this.model = model;
     this.logged = logged; // body states, twelve a row, of the flight it was learnt from
     this.period = model.period;
     this.frame = frame;
+    this.sense = sense;
     const { states, hello, sizes } = model, m = hello.inputs.length;
-    const long = { x: states.length, past: sizes.depth * m, carried: sizes.carried, inputs: m, card: model.card.length, wanted: 10,
+    const long = { x: states.length, past: sizes.depth * m, carried: sizes.carried, inputs: m, card: model.card.length,
+      sensors: model.sensors[0].length, read: states.length, wanted: 10,
       gains: sizes.gains, around: 4, added: m, limits: 2 * m, draws: sizes.draws };
     const array = (which, craft) => new Float64Array(memory.buffer, buffer(which, craft), long[PARTS[which]]);
     this.places = Array.from({ length: sizes.crafts }, (_, craft) => Object.fromEntries(PARTS.slice(0, OWN).map((name, i) => [name, array(i, craft)])));
     PARTS.slice(OWN).forEach((name, i) => (this[name] = array(OWN + i, 0)));
-    new Int32Array(memory.buffer, delays(), model.back.length).set(model.back);
     this.limits.set([...hello.inputs.map(({ low }) => low), ...hello.inputs.map(({ high }) => high)]);
-    this.places.forEach(({ card }, i) => card.set(i < 2 ? model.card : model.draws[i - 2]));
+    this.places.forEach(({ card, sensors }, i) => {
+      const drawn = Math.max(0, i - 1); // it and its ghost, then the drawn models
+      card.set(drawn ? model.draws[drawn - 1] : model.card);
+      sensors.set(model.sensors[drawn]);
+      new Int32Array(memory.buffer, delays(i), model.back[drawn].length).set(model.back[drawn]);
+    });
     this.setting = { mode: model.mode, decoupled: true, ghost: false, logged: false, wind: [0, 0, 0], gusts: 0, voltage: model.voltage,
       sticks: { roll: 0, pitch: 0, yaw: 0, heave: 0 } };
     this.place = Object.fromEntries(["x", "y", "z", "u", "v", "w", "phi", "theta", "psi"].map((name) => [name, states.findIndex(([n]) => n === name)]));
@@ -67,8 +73,9 @@ export class Flight {
     for (const part of ["x", "past", "carried", "inputs"]) this.places[to][part].set(this.places[0][part]);
   }
   #take() {
-    const { x } = this.places[0], { place } = this;
-    this.target = [x[place.x], x[place.y], x[place.z], x[place.psi]];
+    this.sense(0);
+    const { read } = this.places[0], { place } = this;
+    this.target = [read[place.x], read[place.y], read[place.z], read[place.psi]];
   }
   #beginFan() {
     this.fan = this.model.draws.map((_, i) => i + 2);

@@ -107,6 +107,7 @@ export class Panel {
     $("fan").textContent = `Thin lines and shaded: ${hello.fan} models that the fit cannot tell from this one, under the same sticks, anew every ${hello.fan_seconds} s.`;
     if (hello.voltages) [$("voltage").min, $("voltage").max] = hello.voltages;
     $("controller").textContent = `Controller: ${hello.controller}, ${hello.rate.toFixed(0)} Hz.`;
+    $("sensors").textContent = `The pilot reads ${hello.sensors}.`;
     $("trust").textContent = `Where the card may be trusted: ${hello.trust}`;
     $("folder").textContent = `Recordings and reports go to the folder ${hello.folder}.`;
     $("folder").hidden = !hello.folder; // a page that flies by itself saves to downloads
