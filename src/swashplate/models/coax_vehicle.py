@@ -126,9 +126,9 @@ def balance(start: Vehicle, identified: Vehicle, trims: Mapping[str, float]) -> 
         Nothing where the fit moved neither trims nor factors of torque and thrust.
     """
     before, after = start.values(), identified.values()
-    moved = {n: getattr(after, n) / getattr(before, n) - 1.0 for n in _BALANCING if getattr(before, n)}
+    changes = {n: getattr(after, n) / getattr(before, n) - 1.0 for n in _BALANCING if getattr(before, n)}
     upper, lower = (trims.get(f"trim_motor_{side}", 0.0) for side in ("upper", "lower"))
-    if not (any(moved.values()) or upper or lower):
+    if not (any(changes.values()) or upper or lower):
         return ()
     motors = CoaxInputs(*hover(after, after.voltage_nominal, _XP)[1])
 
@@ -145,7 +145,7 @@ def balance(start: Vehicle, identified: Vehicle, trims: Mapping[str, float]) -> 
 
     (yaw, climb), (yaw_trimmed, climb_trimmed) = left(False), left(True)
     yaw_left, climb_left = round(yaw_trimmed, 1) + 0.0, round(climb_trimmed, 2) + 0.0  # no minus before a zero
-    factors = ", ".join(f"{name} {100.0 * share:+.1f} %" for name, share in moved.items() if share)
+    factors = ", ".join(f"{name} {100.0 * share:+.1f} %" for name, share in changes.items() if share)
     return (
         f"balance: the numbers before the fit leave {yaw:+.1f} rad/s^2 of yaw and {climb:+.2f} m/s^2 of climb in the "
         f"hover that was flown, {yaw_left:+.1f} and {climb_left:+.2f} with the motor trims found "

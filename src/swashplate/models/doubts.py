@@ -71,17 +71,17 @@ def doubts_along(vehicle: Vehicle, time: Array, x: Array, u: Array, wind: Array,
         x, u, wind: states (n, n_states), inputs (n, n_inputs) and wind (n, 3) by sample.
         voltage: of the battery by sample [V], shape (n,).
     """
-    whole = np.flatnonzero(np.all(np.isfinite(np.column_stack([x, u, wind, voltage])), axis=1))
-    if not whole.size:
+    complete = np.flatnonzero(np.all(np.isfinite(np.column_stack([x, u, wind, voltage])), axis=1))
+    if not complete.size:
         return ()
     usual, first = environment_of(vehicle), dict[str, str]()
-    evenly = np.linspace(0, whole.size - 1, min(_LOOKS, whole.size)).astype(int)
-    for k in whole[np.unique(np.concatenate([evenly, x[whole].argmax(axis=0), x[whole].argmin(axis=0)]))]:
+    evenly = np.linspace(0, complete.size - 1, min(_LOOKS, complete.size)).astype(int)
+    for k in complete[np.unique(np.concatenate([evenly, x[complete].argmax(axis=0), x[complete].argmin(axis=0)]))]:
         blowing = dict(zip(Environment._fields[:3], map(float, wind[k]), strict=True))
         around = usual._replace(**blowing, voltage=float(voltage[k]))
         with suppress(ArithmeticError, ValueError):  # a flight that diverges is told of by others
-            for kind, words in _by_kind(vehicle, x[k], u[k], around).items():
-                first.setdefault(kind, f"At {time[k]:.1f} s {words}")
+            for kind, doubt in _by_kind(vehicle, x[k], u[k], around).items():
+                first.setdefault(kind, f"At {time[k]:.1f} s {doubt}")
     return tuple(first.values())
 
 
@@ -91,7 +91,7 @@ def envelope(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
     Inputs beyond the vehicle's limits, air speed beyond its card's, and where all states are there `doubts_along`
     (inflow, stall, flapping, battery); of a log the battery alone.
     """
-    beyond = [words for name in vehicle.input_names for words in _beyond(vehicle, flight, name)]
+    beyond = [text for name in vehicle.input_names for text in _beyond(vehicle, flight, name)]
     if all(name in flight for name in (*vehicle.state_names, *vehicle.input_names, *_AROUND)):
         x, u, wind = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _AROUND[:3]))
         along = flight.time(vehicle.state_names[0])

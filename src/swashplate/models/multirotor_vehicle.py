@@ -239,11 +239,11 @@ def choices(card: Card) -> Mapping[str, Choice]:
         near("rotor_drag", at["rotor_drag"], "the card, as much again"),
         *(Free(name, 0.4 * sigma, 0.0, sigma, source=_BETWEEN) for name, sigma in PUSHES.items()),
     )
-    told = (
+    summary = (
         "what a flight with logged voltage can tell: thrust, torque, rotors' differences, drive, damping, inertia; and "
         "of each flight the accelerations that it has of its own"
     )
-    return {"full": Choice("full", told, free)}
+    return {"full": Choice("full", summary, free)}
 
 
 def picture(vehicle: Vehicle) -> dict[str, Any]:

@@ -88,18 +88,18 @@ def _listed(head: list[str], rows: list[list[str]], path: str | Path, sense: flo
 def _matrix(rows: list[list[str]], path: str | Path, sense: float) -> dict[str, float]:
     derivatives: dict[str, float] = {}
     for row in rows[1:]:
-        label = _plain(row[0]).removesuffix("dot")
+        label = _bare_symbol(row[0]).removesuffix("dot")
         if label in _ANGLES:
             continue
         for column, cell in zip(rows[0][1:], row[1:], strict=False):
-            if _plain(column) not in _ANGLES:
+            if _bare_symbol(column) not in _ANGLES:
                 name, sign = _name(label + column if len(label) == 1 else "", path, sense, shown=row[0])
                 if (value := _number(cell, path, name)) is not None:
                     derivatives[name] = sign * value
     return derivatives
 
 
-def _plain(text: str) -> str:
+def _bare_symbol(text: str) -> str:
     for mark in "_'{}\\ ":
         text = text.replace(mark, "")
     return text.replace("\N{GREEK SMALL LETTER THETA}", "theta").lower()
@@ -107,7 +107,7 @@ def _plain(text: str) -> str:
 
 def _name(text: str, path: str | Path, sense: float, *, shown: str) -> tuple[str, float]:
     """Our name of a derivative, and the sign that its control has for us."""
-    row, column = _ROWS.get(_plain(text)[:1], ""), _plain(text)[1:]
+    row, column = _ROWS.get(_bare_symbol(text)[:1], ""), _bare_symbol(text)[1:]
     known = column if column in MOTIONS else _CONTROLS.get(column, "")
     if not row or not known:
         raise SwashError(

@@ -133,9 +133,9 @@ def carrying(vehicle: Vehicle, card: Card) -> Vehicle:
         CardError: where the card is for other equations, or its residual is incomplete.
     """
     vehicle = _without_residual(vehicle)
-    made = vehicle.with_card(card)
+    carrier = vehicle.with_card(card)
     if not has_residual(card):
-        return made
+        return carrier
     # The equations' own card has what they fill in where another one is silent.
     return joined(vehicle, replace(card, parameters={**vehicle.card.parameters, **card.parameters}))
 
@@ -145,11 +145,11 @@ def _without_residual(vehicle: Vehicle) -> Vehicle:
     rates, force = vehicle.derivatives, vehicle.specific_force
     if not isinstance(rates, partial) or rates.func is not _derivatives or not isinstance(force, partial):
         return vehicle
-    own = rates.keywords["own"]
-    added = vehicle.parameters._fields[len(own._fields) :]
+    base = rates.keywords["base"]
+    added = vehicle.parameters._fields[len(base._fields) :]
     card = replace(vehicle.card, parameters={n: p for n, p in vehicle.card.parameters.items() if n not in added})
     of = {"derivatives": rates.keywords["of"], "specific_force": force.keywords["of"]}
-    return replace(vehicle, card=card, parameters=own, **of)
+    return replace(vehicle, card=card, parameters=base, **of)
 
 
 def joined(vehicle: Vehicle, card: Card) -> Vehicle:
@@ -169,7 +169,7 @@ def joined(vehicle: Vehicle, card: Card) -> Vehicle:
             raise CardError(f"{what}.", where=card.where, channel=name, hint="Identify anew with --residual.")
     parameters = _wider(vehicle.parameters, names)
     rows = tuple((_ROWS_AHEAD if heading else ROWS).items())
-    given = {"own": vehicle.parameters, "names": vehicle.input_names, "rows": rows}
+    given = {"base": vehicle.parameters, "names": vehicle.input_names, "rows": rows}
     return replace(
         vehicle,
         card=card,
@@ -213,21 +213,21 @@ def residual(state: Named, inputs: Named, par: Named, *, names: tuple[str, ...],
 
 
 def _derivatives(
-    state: Named, inputs: Named, par: Named, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any,
+    state: Named, inputs: Named, par: Named, env: Environment, xp: Backend, *, of: Derivatives, base: Any, names: Any,
     rows: _Rows,
 ) -> Any:  # fmt: skip
     """Time derivative of the whole state: the equations' own, and the residual's accelerations."""
-    rates = of(state, inputs, own(*par[: len(own._fields)]), env, xp)
+    rates = of(state, inputs, base(*par[: len(base._fields)]), env, xp)
     added = dict(zip(ROWS, residual(state, inputs, par, names=names, rows=rows), strict=True))
     body = rates.body._replace(**{row: getattr(rates.body, row) + value for row, value in added.items()})
     return rates._replace(body=body)
 
 
 def _specific_force(
-    state: Named, inputs: Named, par: Named, env: Environment, xp: Backend, *, of: Derivatives, own: Any, names: Any,
+    state: Named, inputs: Named, par: Named, env: Environment, xp: Backend, *, of: Derivatives, base: Any, names: Any,
     rows: _Rows,
 ) -> Vector:  # fmt: skip
     """What an accelerometer at the centre of gravity reads [m/s^2]: the residual's force is one that it feels."""
-    x, y, z = of(state, inputs, own(*par[: len(own._fields)]), env, xp)
+    x, y, z = of(state, inputs, base(*par[: len(base._fields)]), env, xp)
     ax, ay, az = residual(state, inputs, par, names=names, rows=rows)[:3]
     return Vector(x + ax, y + ay, z + az)

@@ -38,15 +38,15 @@ def environment_of(vehicle: _Carded, environment: Environment | None = None, *, 
     """
     given = environment or Environment()
     if given.air_density is None:
-        given = given._replace(air_density=_own(vehicle, "air_density", SEA_LEVEL_DENSITY, parameters))
+        given = given._replace(air_density=_parameter_or(vehicle, "air_density", SEA_LEVEL_DENSITY, parameters))
     if given.gravity is None:
-        given = given._replace(gravity=_own(vehicle, "gravity", LABORATORY_GRAVITY, parameters))
+        given = given._replace(gravity=_parameter_or(vehicle, "gravity", LABORATORY_GRAVITY, parameters))
     if given.voltage is None:
-        given = given._replace(voltage=_own(vehicle, "voltage_nominal", _NO_BATTERY, parameters))
+        given = given._replace(voltage=_parameter_or(vehicle, "voltage_nominal", _NO_BATTERY, parameters))
     return given
 
 
-def _own(vehicle: _Carded, name: str, usual: float, parameters: Named) -> Any:
+def _parameter_or(vehicle: _Carded, name: str, usual: float, parameters: Named) -> Any:
     if name not in vehicle.parameter_names:
         return usual
     return vehicle.card.values()[name] if parameters is None else getattr(parameters, name)
@@ -91,9 +91,9 @@ def input_delays(vehicle: Vehicle) -> dict[str, float]:
         )
     known = vehicle.card.observer.get(SECTION)
     if known is None:
-        told = vehicle.card.observer.get("nuisance", {})
+        held = vehicle.card.observer.get("nuisance", {})
         names = {i: "delay_motor" if i in vehicle.traits.motors else "delay_servo" for i in vehicle.input_names}
-        known = {i: told.get(name, 0.0) for i, name in names.items()} if told.keys() & set(names.values()) else {}
+        known = {i: held.get(name, 0.0) for i, name in names.items()} if held.keys() & set(names.values()) else {}
     return {name: max(0.0, float(value)) for name, value in known.items()}
 
 

@@ -19,4 +19,4 @@ clockwise rotor."""
 def usual_axes(inputs: Collection[str]) -> tuple[Axis, ...]:
     """The axes of inputs that are called as a coaxial helicopter's, a single rotor's or the ready linear models'."""
     by_axis = {axis: next((s for s in sets if s.keys() <= set(inputs)), None) for axis, sets in _USUAL.items()}
-    return tuple(Axis(axis, moved) for axis, moved in by_axis.items() if moved is not None)
+    return tuple(Axis(axis, channel) for axis, channel in by_axis.items() if channel is not None)

@@ -168,8 +168,8 @@ class Vehicle:
         Raises:
             SwashError: for a vehicle that has no hover.
         """
-        made: LinearResponse = resolve("linearize")(self) if self.structure is None else self.structure
-        return made
+        linear: LinearResponse = resolve("linearize")(self) if self.structure is None else self.structure
+        return linear
 
     def response(self, omega: Array) -> Complex:
         """H(j omega) of the linear model (`as_linear`), shape (n, n_outputs, n_inputs).

@@ -129,12 +129,12 @@ def _rotors(
     """Both rotors; `blowing` is the share of their wakes that is there while they start."""
     body, radius = state.body, par.rotor_radius
     tip = blowing * omega * radius
-    own = Induced(state.inflow_upper.lam0 * tip, state.inflow_lower.lam0 * tip)
+    self_induced = Induced(state.inflow_upper.lam0 * tip, state.inflow_lower.lam0 * tip)
     across2 = air.x * air.x + air.y * air.y
     shares = coaxial_wake.wake_shares(
         -air.z,
         across2,
-        own,
+        self_induced,
         separation=par.hub_height_upper - par.hub_height_lower,
         radius=radius,
         form=options.interference,
@@ -143,7 +143,7 @@ def _rotors(
     upright = xp.cos(body.phi) * xp.cos(body.theta)
     pitches = blade_pitches(sticks, options.upper.sense)
     heights = (par.hub_height_upper, par.hub_height_lower)
-    given = (shares.on_upper * own.induced_lower, shares.on_lower * own.induced_upper)
+    given = (shares.on_upper * self_induced.induced_lower, shares.on_lower * self_induced.induced_upper)
     rotors, felt = [], []
     for i, (disc, flow, switches) in enumerate(
         (
@@ -153,7 +153,7 @@ def _rotors(
     ):
         above = heights[i] * upright - body.z
         near = ground_effect.induced_share(
-            above, across2, own[i] + given[i], radius=radius, form=switches.ground_effect, xp=xp
+            above, across2, self_induced[i] + given[i], radius=radius, form=switches.ground_effect, xp=xp
         )
         felt.append(near * given[i])
         through = Vector(air.x, air.y, air.z - felt[i])
@@ -171,11 +171,11 @@ def loads(
     body, density, switches = state.body, env.air_density, options.upper
     air = body.velocity + local_to_body(env.wind, body.attitude, xp).scaled(-1.0)
 
-    servo_rates, late = None, None
+    servo_rates, delay_rates = None, None
     kind = commands_of(options)
     sticks = kind(*(getattr(inputs, name) for name in kind._fields))
     if state.delays is not None:
-        late, sticks = drive.late(state.delays, sticks, par.servo_delay)
+        delay_rates, sticks = drive.delayed_commands(state.delays, sticks, par.servo_delay)
     if state.servos is not None:
         servo_rates = drive.servo_rates(state.servos, sticks, stops(par, len(sticks)), par, xp)
         sticks = kind(*state.servos)
@@ -213,7 +213,7 @@ def loads(
         rotors,
         rotor_rates,
         servo_rates,
-        late,
+        delay_rates,
         lag,
         bending,
         load * turning,

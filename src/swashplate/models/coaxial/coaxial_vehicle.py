@@ -100,8 +100,8 @@ def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> di
         ("lower", acting.lower_rotor, rotors.lower, rotors.given_lower, state.lower),
     ):
         through = float(rotor.induced + given)
-        for kind, words in rotor_doubts(part.force, air, through, omega, disc, par, environment).items():
-            by_kind[f"{kind} {side}"] = f"{side} rotor: {words}"
+        for kind, doubt in rotor_doubts(part.force, air, through, omega, disc, par, environment).items():
+            by_kind[f"{kind} {side}"] = f"{side} rotor: {doubt}"
     return by_kind
 
 
@@ -130,7 +130,7 @@ TRAITS = Traits(
 )
 
 
-def _late(states: tuple[str, ...]) -> Traits:
+def _traits_of_delays(states: tuple[str, ...]) -> Traits:
     """With delayed commands, which these states carry."""
     return replace(TRAITS, delayed_by="servo_delay", roles={**TRAITS.roles, **dict.fromkeys(states, "other")})
 
@@ -165,8 +165,8 @@ def coaxial(card: Card) -> Vehicle:
     names: tuple[str, ...] = commands_of(options)._fields
     count = len(names)
     servos = _tuple("CoaxialServos", tuple(f"{each}_servo" for each in names))
-    late = (*(f"{each}_late" for each in names), *(f"{each}_late_rate" for each in names))
-    delays = _tuple("CoaxialDelays", late)
+    delay_states = (*(f"{each}_late" for each in names), *(f"{each}_late_rate" for each in names))
+    delays = _tuple("CoaxialDelays", delay_states)
     at = (_START_PITCH, *(0.0,) * (count - 1))
     state = CoaxialState(
         RigidBody(*(0.0,) * 12),
@@ -210,6 +210,6 @@ def coaxial(card: Card) -> Vehicle:
         derivatives=partial(derivatives, options=options),
         specific_force=partial(specific_force, options=options),
         trim_held=held,
-        traits=TRAITS if state.delays is None else _late(state.delays._fields),
+        traits=TRAITS if state.delays is None else _traits_of_delays(state.delays._fields),
         options=options,
     )

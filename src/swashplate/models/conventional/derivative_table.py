@@ -51,9 +51,9 @@ class DerivativeTable:
         published tables, the Lynx's among them, are of this kind.
         """
         mixing = np.eye(6)
-        whole = 1.0 - inertia_xz**2 / (inertia_xx * inertia_zz)
-        mixing[3, 3] = mixing[5, 5] = 1.0 / whole
-        mixing[3, 5], mixing[5, 3] = inertia_xz / inertia_xx / whole, inertia_xz / inertia_zz / whole
+        determinant = 1.0 - inertia_xz**2 / (inertia_xx * inertia_zz)
+        mixing[3, 3] = mixing[5, 5] = 1.0 / determinant
+        mixing[3, 5], mixing[5, 3] = inertia_xz / inertia_xx / determinant, inertia_xz / inertia_zz / determinant
         return replace(self, parts={name: mixing @ part for name, part in self.parts.items()})
 
     def names(self) -> Iterator[str]:

@@ -10,7 +10,7 @@ from swashplate.physics.backend import Backend, Named, Scalar
 from swashplate.physics.engine import EngineLag, RotorSpeed
 
 
-def late(states: Named, commands: Named, delay: Scalar) -> tuple[Any, Any]:
+def delayed_commands(states: Named, commands: Named, delay: Scalar) -> tuple[Any, Any]:
     """Rates of the delays' states, and what comes out of them.
 
     Args:

@@ -132,9 +132,9 @@ def loads(
 
     # Controls: delay, servos, yaw gyro, stabilizer bar.
     sticks = Controls(inputs.theta0, inputs.B1, inputs.A1, inputs.theta0T)
-    servo_rates, late = None, None
+    servo_rates, delay_rates = None, None
     if state.delays is not None:
-        late, sticks = drive.late(state.delays, sticks, par.servo_delay)
+        delay_rates, sticks = drive.delayed_commands(state.delays, sticks, par.servo_delay)
     if state.servos is not None:
         stops = (
             (par.collective_low, par.collective_high),
@@ -219,7 +219,7 @@ def loads(
         rotor_rates,
         gyro_rates,
         servo_rates,
-        late,
+        delay_rates,
         lag,
         bending,
         rotor.induced,

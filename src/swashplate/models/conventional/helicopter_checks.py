@@ -98,12 +98,12 @@ def check_numbers(card: Card) -> None:
 def check_inertia(value: Mapping[str, float], refuse: Refuse) -> None:
     """Refuse moments of inertia that no body has."""
     inertia = {axis: value[f"inertia_{axis}"] for axis in ("xx", "yy", "zz")}
-    for axis, own in inertia.items():
-        others = sum(inertia.values()) - own
-        if own > others:
+    for axis, moment in inertia.items():
+        others = sum(inertia.values()) - moment
+        if moment > others:
             refuse(
                 f"inertia_{axis}",
-                f"is {own:g}, more than the two others together ({others:g}).",
+                f"is {moment:g}, more than the two others together ({others:g}).",
                 "No body has such moments of inertia: check the units and which axis is which.",
             )
     # The principal moments in the plane of symmetry must be a body's too.

@@ -34,7 +34,7 @@ class MainRotor(NamedTuple):
 def main_rotor(
     air: Vector,
     rates: Vector,
-    disc: Flapping,
+    tilt: Flapping,
     induced: Inflow | None,
     blades: tuple[Scalar, Scalar, Scalar],
     omega: Scalar,
@@ -49,7 +49,7 @@ def main_rotor(
     Args:
         air: velocity of the CG through the air, body axes [m/s].
         rates: body rates [rad/s].
-        disc: tip-path plane.
+        tilt: of the tip-path plane.
         induced: dynamic inflow states, or None for momentum theory at every instant.
         blades: theta0, A1, B1 at the blades [rad].
         omega: rotor speed against the fuselage [rad/s].
@@ -74,14 +74,14 @@ def main_rotor(
     solidity = par.rotor_blades * par.rotor_chord / (_PI * par.rotor_radius)
     slope = par.rotor_lift_slope
     mu2 = mu_x * mu_x + mu_y * mu_y
-    own = Flapping(disc.a1, sense * disc.b1)
+    flap = Flapping(tilt.a1, sense * tilt.b1)
     blade = blade_element.WHOLE
     if options.tip_loss:
         blade = blade_element.span(par.rotor_tip_loss, par.rotor_root_cutout)
     # Moments of a shorter blade are those of a whole one with this lift slope (m3 is 1/4 there).
     flap_slope = slope if blade is blade_element.WHOLE else slope * 4.0 * blade.m3
-    seen = blade_element.Disc(
-        mu_x, mu_y, mu_z, 0.0, 0.0, 0.0, p / omega, q / omega, theta0, par.rotor_twist, A1, B1, 0.0, own.a1, own.b1
+    disc = blade_element.Disc(
+        mu_x, mu_y, mu_z, 0.0, 0.0, 0.0, p / omega, q / omega, theta0, par.rotor_twist, A1, B1, 0.0, flap.a1, flap.b1
     )
 
     held = flapping.hinge(
@@ -101,14 +101,14 @@ def main_rotor(
     flaps = None  # by which flapping changes the blades' pitch
     if options.delta3:
         flaps = par.rotor_delta3
-        seen = seen._replace(A1=A1 + flaps * own.a1, B1=B1 + flaps * own.b1)
+        disc = disc._replace(A1=A1 + flaps * flap.a1, B1=B1 + flaps * flap.b1)
 
     # Inflow: mean and gradient.
     if induced is None:
-        free = blade_element.thrust_coefficient(seen, solidity, slope, blade)
+        free = blade_element.thrust_coefficient(disc, solidity, slope, blade)
         loss = 0.5 * slope * solidity * blade.m1
         if flaps is not None:  # pitch by coning, which falls with the inflow: C_T stays linear in it
-            still_air, more = (_coned(seen._replace(lam0=lam), blade, held, par, flaps, options) for lam in (0.0, 1.0))
+            still_air, more = (_coned(disc._replace(lam0=lam), blade, held, par, flaps, options) for lam in (0.0, 1.0))
             free = blade_element.thrust_coefficient(still_air, solidity, slope, blade)
             loss = free - blade_element.thrust_coefficient(more, solidity, slope, blade)
         lam0 = inflow.momentum_inflow(free, loss, mu_z, mu2, xp)
@@ -127,18 +127,18 @@ def main_rotor(
     if options.ground_effect != "none":
         near = _near_ground(height, mu2, flow.lam0, par, options, xp)
         flow = Inflow(near * flow.lam0, near * flow.lam_c, near * flow.lam_s)
-    seen = seen._replace(lam0=flow.lam0, lam_c=flow.lam_c, lam_s=flow.lam_s)
+    disc = disc._replace(lam0=flow.lam0, lam_c=flow.lam_c, lam_s=flow.lam_s)
 
     # Flapping: coning, then the tip-path plane's rates in space.
-    seen = _coned(seen, blade, held, par, flaps, options)
+    disc = _coned(disc, blade, held, par, flaps, options)
     bending = flapping.faded_wake_distortion(par.wake_distortion, mu2, par.wake_distortion_fade, xp)
     # Dynamic inflow has the wake's lag in its states.
     kept = 0.0 if options.inflow == "pitt-peters" else bending * flapping.wake_follows(held.excess, through2, xp)
     lag = (xp.cos(par.phase_lag), xp.sin(par.phase_lag)) if options.phase_lag else None
-    tilted = seen._replace(a1=held.damping * own.a1, b1=held.damping * own.b1)
+    tilted = disc._replace(a1=held.damping * flap.a1, b1=held.damping * flap.b1)
     still = _moments(tilted._replace(p=0.0, q=0.0), blade)
     plane_p, plane_q = flapping.plane_rates(
-        own,
+        flap,
         still,
         held,
         (p / omega, q / omega),
@@ -149,7 +149,7 @@ def main_rotor(
 
     # Loads with everything that the blades now see.
     lam_c, lam_s = flow.lam_c + kept * plane_q, flow.lam_s + kept * plane_p
-    moving = seen._replace(p=plane_p, q=plane_q, lam_c=lam_c, lam_s=lam_s)
+    moving = disc._replace(p=plane_p, q=plane_q, lam_c=lam_c, lam_s=lam_s)
     inflow_rates = None
     CT = blade_element.thrust_coefficient(moving, solidity, slope, blade)
     form = blade_element.thrust_tilt_loads if options.in_plane == "thrust-tilt" else blade_element.disc_loads
@@ -175,23 +175,23 @@ def main_rotor(
         torque = torque + pressure * par.rotor_radius * (par.rotor_induced_factor - 1.0) * flow.lam0 * CT
     if options.precession_torque:
         polar = par.rotor_blades * par.blade_inertia
-        torque = torque - flapping.precession_torque(own, p, q, inertia=polar, omega=omega)
+        torque = torque - flapping.precession_torque(flap, p, q, inertia=polar, omega=omega)
     force = Vector(ahead * ct + thrust * st, sense * pressure * coefficients.CY, ahead * st - thrust * ct)
-    roll, yaw = held.moment * disc.b1, sense * torque
-    moment = hub.cross(force) + Vector(roll * ct - yaw * st, held.moment * disc.a1, roll * st + yaw * ct)
+    roll, yaw = held.moment * tilt.b1, sense * torque
+    moment = hub.cross(force) + Vector(roll * ct - yaw * st, held.moment * tilt.a1, roll * st + yaw * ct)
     return MainRotor(Contribution(force, moment), torque, disc_rates, inflow_rates, flow.lam0 * tip)
 
 
-def _moments(seen: blade_element.Disc, blade: blade_element.Span) -> blade_element.FlapMoments:
+def _moments(disc: blade_element.Disc, blade: blade_element.Span) -> blade_element.FlapMoments:
     """Flap moments over those of a whole blade at the same slope (`flap_slope` has the rest)."""
-    moments = blade_element.flap_moments(seen, blade)
+    moments = blade_element.flap_moments(disc, blade)
     if blade is blade_element.WHOLE:
         return moments
     return blade_element.FlapMoments(*(0.25 * part / blade.m3 for part in moments))
 
 
 def _coned(
-    seen: blade_element.Disc,
+    disc: blade_element.Disc,
     blade: blade_element.Span,
     held: flapping.Hinge,
     par: Named,
@@ -200,15 +200,15 @@ def _coned(
 ) -> blade_element.Disc:
     """The disc with its coning, and with the pitch that coning adds or takes where flapping changes pitch."""
     if not options.coning:
-        return seen._replace(a0=par.precone)
-    moment = _moments(seen, blade).mean
+        return disc._replace(a0=par.precone)
+    moment = _moments(disc, blade).mean
     if flaps is None:
-        return seen._replace(a0=flapping.coning(moment, held, par.precone, free=1.0))
+        return disc._replace(a0=flapping.coning(moment, held, par.precone, free=1.0))
     # The moment is linear in the collective: a0 = g (M + M' k (a0 - precone)), coning beyond the precone moves pitch.
     gain = 0.5 * held.lock / (1.0 + held.excess)
-    slope = _moments(seen._replace(theta0=seen.theta0 + 1.0), blade).mean - moment
+    slope = _moments(disc._replace(theta0=disc.theta0 + 1.0), blade).mean - moment
     a0 = gain * (moment - slope * flaps * par.precone) / (1.0 - gain * slope * flaps)
-    return seen._replace(a0=a0, theta0=seen.theta0 + flaps * (a0 - par.precone))
+    return disc._replace(a0=a0, theta0=disc.theta0 + flaps * (a0 - par.precone))
 
 
 def _near_ground(

@@ -25,7 +25,7 @@ class SizeClass(NamedTuple):
     """A class of helicopters: what is in it, the packaged cards that are scaled for it, its statistics and switches."""
 
     name: str
-    words: str
+    contents: str
     mass_below: float
     radius_below: float
     members: tuple[str, ...]
@@ -145,7 +145,7 @@ def default_class(mass: float, radius: float) -> DefaultClass:
     """The class of a helicopter of this mass [kg] and rotor radius [m]; where they disagree, the mass decides."""
     by_mass = next(entry for entry in CLASSES.values() if mass < entry.mass_below)
     by_radius = next(entry for entry in CLASSES.values() if radius < entry.radius_below)
-    why = f"class {by_mass.name} ({by_mass.words}), because of its mass of {mass:g} kg"
+    why = f"class {by_mass.name} ({by_mass.contents}), because of its mass of {mass:g} kg"
     if by_mass is by_radius:
         return DefaultClass(by_mass.name, f"{why} and rotor radius of {radius:g} m")
     return DefaultClass(
@@ -232,8 +232,8 @@ def new_card(
         parameters.setdefault(name, Parameter(float(ADDED[name][1]), UNITS[name], source, "assumed"))
     for name, (option, stood) in ADDED.items():
         if isinstance(stood, float):
-            words = f"none fitted; option {option} takes it" if option else "none fitted"
-            parameters.setdefault(name, Parameter(stood, UNITS[name], words, "assumed"))
+            fitted = f"none fitted; option {option} takes it" if option else "none fitted"
+            parameters.setdefault(name, Parameter(stood, UNITS[name], fitted, "assumed"))
     trust = "Nothing yet: every number marked assumed is a guess. Measure them, and write how into source and status."
     parts = {name: value for name, value in patterns[0].options.items() if name not in _TABLES}
     options = {**parts, **switched, "rotation": rotation, "yaw_at_blades": True, "precession_torque": True}

@@ -115,7 +115,7 @@ def linear(card: Card) -> Vehicle:
     for name in trims:
         if name not in card.parameters:
             raise CardError("is missing.", where=where, channel=name, hint=f"Add [parameters.{name}].")
-    own = Structure(states, inputs, tuple(entries))
+    layout = Structure(states, inputs, tuple(entries))
     body_names = () if grounded else RigidBody._fields
     inner = tuple(name for name in states if name not in body_names)
     template = tuple_type("Inner", inner)(*(0.0,) * len(inner)) if inner else None
@@ -131,8 +131,8 @@ def linear(card: Card) -> Vehicle:
         input_names=inputs,
         input_units=tuple(card.options["input_units"]),
         input_limits=limits,
-        derivatives=partial(derivatives, structure=own),
-        specific_force=partial(specific_force, structure=own),
+        derivatives=partial(derivatives, structure=layout),
+        specific_force=partial(specific_force, structure=layout),
         traits=replace(TRAITS, no_trim=grounded, rest=_rest) if grounded else replace(TRAITS, axes=usual_axes(inputs)),
     )
 
@@ -178,8 +178,8 @@ def derivatives(
         return LinearState(None, type(state.inner)(*(rates[n] for n in state.inner._fields)))
     place = body_to_local(body.velocity, body.attitude, xp)
     turned = euler_rates(body.rates, body.attitude, xp)
-    moved = dict(zip(("x", "y", "z"), place, strict=True)) | {"psi": turned.psi}
-    rates = moved | _rates(state, inputs, par, structure)
+    pose_rates = dict(zip(("x", "y", "z"), place, strict=True)) | {"psi": turned.psi}
+    rates = pose_rates | _rates(state, inputs, par, structure)
     inner = None if state.inner is None else type(state.inner)(*(rates[n] for n in state.inner._fields))
     return LinearState(RigidBody(*(rates[n] for n in RigidBody._fields)), inner)
 

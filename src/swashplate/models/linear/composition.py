@@ -109,23 +109,23 @@ def _clash(parts: tuple[str, ...]) -> str:
                 return f"'{name}' and '{other}' cannot stand together: {why}."
         if part.needs and not set(part.needs) & set(parts):
             return f"'{name}' needs {' or '.join(part.needs)}: {part.why}."
-    whole = _entries(parts)
+    entries = _entries(parts)
     for name in reversed(parts):
         others = _entries(tuple(part for part in parts if part != name))
-        if others == whole:
+        if others == entries:
             right = PARTS[name].equations
-            own = {(row, column): (text,) for row, terms in right.items() for column, text in terms.items()}
-            return _superfluous(name, own, others)
+            entries_of_part = {(row, column): (text,) for row, terms in right.items() for column, text in terms.items()}
+            return _superfluous(name, entries_of_part, others)
     return ""
 
 
-def _superfluous(name: str, own: Entries, others: Entries) -> str:
+def _superfluous(name: str, entries: Entries, others: Entries) -> str:
     """Why a part adds nothing to the entries that the others make."""
-    there = [text for place, texts in own.items() for text in texts if text in others.get(place, ())]
+    there = [text for place, texts in entries.items() for text in texts if text in others.get(place, ())]
     if there:
         verb = "is" if len(there) == 1 else "are"
         return f"'{name}' adds nothing: {', '.join(dict.fromkeys(there))} {verb} there already."
-    places = ", ".join(f"d{row}/dt by {column}" for row, column in own)
+    places = ", ".join(f"d{row}/dt by {column}" for row, column in entries)
     return f"'{name}' has no place: these parts have no {places}."
 
 
@@ -232,7 +232,7 @@ def _delays(
     equations: Mapping[str, Mapping[str, str]],
 ) -> dict[str, str]:
     """One delay for each input, and one for each pair or entry that is named; an input whose all are has none left."""
-    own: dict[str, str] = {}
+    of_pairs: dict[str, str] = {}
     entries = [f"{row}_dot/{name}" for row, terms in equations.items() for name in terms if name in inputs]
     for pair in pairs:
         output, _, name = pair.partition("/")
@@ -246,16 +246,16 @@ def _delays(
                 where=text,
                 hint=f"{near} {listed}".strip(),
             )
-        if pair in own:
+        if pair in of_pairs:
             raise CardError(f"'{pair}' is named twice.", where=text)
-        own[pair] = f"tau_{output}_{SHORT[name]}"
+        of_pairs[pair] = f"tau_{output}_{SHORT[name]}"
     shared = [
         name
         for name in inputs
-        if any(f"{output}/{name}" not in own for output in outputs)
-        and any(entry not in own for entry in entries if entry.endswith(f"/{name}"))
+        if any(f"{output}/{name}" not in of_pairs for output in outputs)
+        and any(entry not in of_pairs for entry in entries if entry.endswith(f"/{name}"))
     ]
-    return {name: f"tau_{SHORT[name]}" for name in shared} | own
+    return {name: f"tau_{SHORT[name]}" for name in shared} | of_pairs
 
 
 def _kinematic(terms: tuple[str, ...]) -> tuple[str, ...]:
@@ -275,7 +275,7 @@ def _parameters(model: dict[str, Any]) -> dict[str, Any]:
     texts += [*model["delays"].values(), *model.get("trim", {}).values()]
     if any("specific_force" in output for output in model["outputs"].values()) and "body" in model["name"].split("+"):
         texts.append("g")
-    made: dict[str, Any] = {}
+    parameters: dict[str, Any] = {}
     used = dict.fromkeys(n for text in texts for n in sorted(Expression(text).names))
     for name in sorted(used, key=lambda n: n not in HELD):
         one = number(name)
@@ -283,5 +283,5 @@ def _parameters(model: dict[str, Any]) -> dict[str, Any]:
         entry |= {"fixed": True} if name in HELD else {}
         entry |= {"lower": one.lower} if one.lower is not None else {}
         entry |= {"upper": one.upper} if one.upper is not None else {}
-        made[name] = entry | {"note": one.source}
-    return made
+        parameters[name] = entry | {"note": one.source}
+    return parameters

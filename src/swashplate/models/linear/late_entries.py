@@ -28,12 +28,12 @@ def widened(model: StateSpaceModel) -> tuple[StateSpaceModel, tuple[int, ...]]:
     """The model with one more input for each of these entries, and which input of the model drives which."""
     entries = places(model)
     column = {place: len(model.inputs) + k for k, place in enumerate(entries.values())}
-    moved = tuple(
+    elements = tuple(
         replace(e, column=column[e.row, e.column]) if e.matrix == "G" and (e.row, e.column) in column else e
         for e in model.elements
     )
     owner = (*range(len(model.inputs)), *(j for _, j in entries.values()))
-    return replace(model, inputs=(*model.inputs, *entries), elements=moved), owner
+    return replace(model, inputs=(*model.inputs, *entries), elements=elements), owner
 
 
 def shares(owner: Sequence[int]) -> Array:

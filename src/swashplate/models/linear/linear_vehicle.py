@@ -38,9 +38,9 @@ class StateSpaceVehicle(Vehicle):
         return linear_vehicle(model.with_values(values, **kept))
 
     def with_card(self, card: Card) -> Vehicle:
-        made = super().with_card(card)
+        vehicle = super().with_card(card)
         same = card.values() == self.card.values() and dict(card.options) == dict(self.card.options)
-        return made if same else linear(card)
+        return vehicle if same else linear(card)
 
     def save(self, path: str | Path) -> Path:
         """Write the model's file, which `swashplate.vehicle` reads."""
@@ -110,8 +110,8 @@ def linear_vehicle(model: StateSpaceModel, *, limits: Mapping[str, tuple[float, 
     learnt: dict[str, Mapping[str, float]] = {**_delays(model)}
     learnt |= {UNMOVED: dict(model.document[UNMOVED])} if UNMOVED in model.document else {}
     card = Card(NAME, model.title, model.trust, options, parameters, observer=learnt, path=model.name)
-    made = linear(card)
-    parts: dict[str, Any] = {f.name: getattr(made, f.name) for f in fields(Vehicle)}
+    vehicle = linear(card)
+    parts: dict[str, Any] = {f.name: getattr(vehicle, f.name) for f in fields(Vehicle)}
     return StateSpaceVehicle(**parts | {"structure": model})
 
 

@@ -70,7 +70,7 @@ def state_space_of_matrices(
         "inputs": {i: units.get(i, "1") for i in inputs},
         "equations": equations,
         "outputs": {s: {"of": {s: "1"}} for s in kept},
-        "delays": {key: repr(late) for key, late in delays.items() if late and key.split("/")[0] not in gone},
+        "delays": {key: repr(delay) for key, delay in delays.items() if delay and key.split("/")[0] not in gone},
         "limits": {i: [low, high] for i, (low, high) in ranges.items() if low < 0.0 < high},
         "trim": {n: repr(float(v)) for n, v in trim.items() if n in (*kept, *inputs, "air_density", "u", "v", "w")},
         "parameters": parameters,

@@ -70,7 +70,7 @@ def _sorted(powers: dict[str, int]) -> Powers:
 def unit_words(model: StateSpaceModel) -> list[str]:
     """Entries whose unit is not what their equation asks for, in words; none where all fit or too little is known."""
     known = {name: unit for name, p in model.parameters.items() if p.unit and (unit := _Unit.of(p.unit)) is not None}
-    wrong = [words for e in model.elements if (words := _entry_words(model, e, known))]
+    wrong = [text for e in model.elements if (text := _entry_words(model, e, known))]
     return (
         [f"units do not fit: {'; '.join(wrong)}. Is a number in other units, or in the wrong place?"] if wrong else []
     )
@@ -105,10 +105,10 @@ def _entry_words(model: StateSpaceModel, e: Element, known: dict[str, _Unit]) ->
 
 def _left(model: StateSpaceModel, row: int, known: dict[str, _Unit]) -> _Unit | None:
     """What multiplies the state's own rate on the left side; None where that is not known."""
-    own: Expression | None = next(
+    factor: Expression | None = next(
         (e.expression for e in model.elements if e.matrix == "M" and e.row == e.column == row), None
     )
-    if own is None or not own.names:
+    if factor is None or not factor.names:
         return _Unit(())
-    unit = own(known) if own.names <= set(known) else None
+    unit = factor(known) if factor.names <= set(known) else None
     return unit if isinstance(unit, _Unit) else None

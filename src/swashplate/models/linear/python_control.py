@@ -37,23 +37,23 @@ def state_space(
         SwashError: an order that is negative or too high.
     """
     control = library("control", what="to_control")
-    plain = control.ss(*matrices, states=list(states), inputs=list(inputs), outputs=list(outputs))
-    late = {key: value for key, value in delays.items() if value > 0.0}
-    if not asked(pade, late, name=name):
-        return plain
-    of_pairs = {(o, i): late.get(f"{o}/{i}", late.get(i, 0.0)) for o in outputs for i in inputs}
-    own = {i: {of_pairs[o, i] for o in outputs} for i in inputs}
-    if all(len(distinct) == 1 for distinct in own.values()):
-        before = control.append(*(_delay(distinct.pop(), pade) for distinct in own.values()))
-        whole = plain * before
+    undelayed = control.ss(*matrices, states=list(states), inputs=list(inputs), outputs=list(outputs))
+    positive = {key: value for key, value in delays.items() if value > 0.0}
+    if not asked(pade, positive, name=name):
+        return undelayed
+    of_pairs = {(o, i): positive.get(f"{o}/{i}", positive.get(i, 0.0)) for o in outputs for i in inputs}
+    by_input = {i: {of_pairs[o, i] for o in outputs} for i in inputs}
+    if all(len(distinct) == 1 for distinct in by_input.values()):
+        before = control.append(*(_delay(distinct.pop(), pade) for distinct in by_input.values()))
+        delayed = undelayed * before
     else:  # outputs answer one input after different times: each input has its own copy of the model
         columns = []
         for k, i in enumerate(inputs):
             after = control.append(*(_delay(of_pairs[o, i], pade) for o in outputs))
-            columns.append(after * control.ss(plain.A, plain.B[:, [k]], plain.C, plain.D[:, [k]]))
-        whole = control.append(*columns)
-        whole = control.ss(whole.A, whole.B, _summed(whole.C, len(outputs)), _summed(whole.D, len(outputs)))
-    return control.ss(whole.A, whole.B, whole.C, whole.D, inputs=list(inputs), outputs=list(outputs))
+            columns.append(after * control.ss(undelayed.A, undelayed.B[:, [k]], undelayed.C, undelayed.D[:, [k]]))
+        delayed = control.append(*columns)
+        delayed = control.ss(delayed.A, delayed.B, _summed(delayed.C, len(outputs)), _summed(delayed.D, len(outputs)))
+    return control.ss(delayed.A, delayed.B, delayed.C, delayed.D, inputs=list(inputs), outputs=list(outputs))
 
 
 def joined(wide: Any, shares: Array, *, inputs: Sequence[str]) -> Any:
@@ -68,12 +68,12 @@ def joined(wide: Any, shares: Array, *, inputs: Sequence[str]) -> Any:
 def transfer_function(numerator: Array, denominator: Array, *, delay: float, pade: int | None, name: str) -> Any:
     """A `control.TransferFunction`, its delay [s] as a Padé polynomial; see `state_space` for `pade`."""
     control = library("control", what="to_control")
-    plain = control.tf(list(numerator), list(denominator))
-    late = {name: delay} if delay > 0.0 else {}
-    return plain * control.tf(*control.pade(delay, pade)) if asked(pade, late, name=name) else plain
+    undelayed = control.tf(list(numerator), list(denominator))
+    delays = {name: delay} if delay > 0.0 else {}
+    return undelayed * control.tf(*control.pade(delay, pade)) if asked(pade, delays, name=name) else undelayed
 
 
-def asked(pade: int | None, late: Mapping[str, float], *, name: str) -> bool:
+def asked(pade: int | None, delays: Mapping[str, float], *, name: str) -> bool:
     """Whether delays become polynomials; warns where they are left out without having been asked to be.
 
     Raises:
@@ -81,14 +81,14 @@ def asked(pade: int | None, late: Mapping[str, float], *, name: str) -> bool:
     """
     if pade is not None and not 0 <= pade <= _HIGHEST:
         raise SwashError(f"is {pade}, expected 0 (no delays) to {_HIGHEST}.", channel="pade")
-    if late and pade is None:
-        told = ", ".join(f"{key} {1e3 * value:.3g} ms" for key, value in late.items())
+    if delays and pade is None:
+        listed = ", ".join(f"{key} {1e3 * value:.3g} ms" for key, value in delays.items())
         warnings.warn(
-            f"the delays of {name} are left out ({told}): give to_control(pade=3) to have them as Padé polynomials, "
+            f"the delays of {name} are left out ({listed}): give to_control(pade=3) to have them as Padé polynomials, "
             "or pade=0 to leave them out knowingly.",
             stacklevel=4,
         )
-    return bool(late and pade)
+    return bool(delays and pade)
 
 
 def _delay(seconds: float, order: int | None) -> Any:

@@ -51,12 +51,12 @@ def of_pairs(
     h = np.einsum("fi,fi->f", left, m["G"].T[inputs]) + m["D"][outputs, inputs]
     slopes = _changes(_entry_slopes(model, free, stepped), outputs, inputs, x=x, left=left, jw=jw, free=len(free))
     answers, by = np.split(h, np.cumsum(sizes)[:-1]), np.split(slopes, np.cumsum(sizes)[:-1])
-    for k, (o, i, own) in enumerate(pairs):
+    for k, (o, i, frequencies) in enumerate(pairs):
         expression = model.delays.get(f"{model.outputs[o]}/{model.inputs[i]}", model.delays.get(model.inputs[i]))
         if expression is not None:
-            lag = np.exp(-1j * own * float(expression(values)))
+            lag = np.exp(-1j * frequencies * float(expression(values)))
             answers[k], by[k] = answers[k] * lag, by[k] * lag[:, None]
-            by[k] -= np.outer(1j * own * answers[k], _slopes(model, expression, free, stepped))
+            by[k] -= np.outer(1j * frequencies * answers[k], _slopes(model, expression, free, stepped))
     return answers, by
 
 
@@ -90,8 +90,8 @@ def _entry_slopes(model: StateSpaceModel, free: Sequence[str], stepped: Mapping[
     for e in model.elements:
         if any(row := _slopes(model, e.expression, free, stepped)):
             moving.setdefault(e.matrix, []).append((e.row, e.column, row))
-    made = {matrix: [np.array(column) for column in zip(*entries, strict=True)] for matrix, entries in moving.items()}
-    return {matrix: (rows, columns, slopes) for matrix, (rows, columns, slopes) in made.items()}
+    arrays = {matrix: [np.array(column) for column in zip(*entries, strict=True)] for matrix, entries in moving.items()}
+    return {matrix: (rows, columns, slopes) for matrix, (rows, columns, slopes) in arrays.items()}
 
 
 def _changes(

@@ -146,13 +146,13 @@ class StateSpaceModel:
                 f"is no parameter of '{self.name}'; it has {', '.join(self.parameters)}.", channel=", ".join(unknown)
             )
         changed = {n: replace(self.parameters[n], value=float(v), **changes) for n, v in values.items()}
-        made = replace(self, parameters={**self.parameters, **changed})
-        tied = {n: float(v) for n, v in made.numbers().items() if made.parameters[n].tie is not None}
+        new = replace(self, parameters={**self.parameters, **changed})
+        tied = {n: float(v) for n, v in new.numbers().items() if new.parameters[n].tie is not None}
         return replace(
-            made, parameters={**made.parameters, **{n: replace(made.parameters[n], value=v) for n, v in tied.items()}}
+            new, parameters={**new.parameters, **{n: replace(new.parameters[n], value=v) for n, v in tied.items()}}
         )
 
-    def with_bounds(self, told: Mapping[str, tuple[float, float]]) -> StateSpaceModel:
+    def with_bounds(self, bounds: Mapping[str, tuple[float, float]]) -> StateSpaceModel:
         """A copy whose parameters carry what a fit told of them, and nothing of earlier fits.
 
         Args:
@@ -162,7 +162,7 @@ class StateSpaceModel:
         return replace(
             self,
             parameters={
-                n: replace(p, cramer_rao=told.get(n, nothing)[0], insensitivity=told.get(n, nothing)[1])
+                n: replace(p, cramer_rao=bounds.get(n, nothing)[0], insensitivity=bounds.get(n, nothing)[1])
                 for n, p in self.parameters.items()
             },
         )
@@ -279,8 +279,8 @@ class StateSpaceModel:
         x = np.linalg.solve(s * m["M"] - m["F"], np.broadcast_to(m["G"] + 0j, (len(omega), *m["G"].shape)))
         h = (m["H0"] + s * m["H1"]) @ x + m["D"]
         values = self.numbers()
-        late = {name: float(expression(values)) for name, expression in self.delays.items()}
-        lag = np.array([[late.get(f"{o}/{i}", late.get(i, 0.0)) for i in self.inputs] for o in self.outputs])
+        delays = {name: float(expression(values)) for name, expression in self.delays.items()}
+        lag = np.array([[delays.get(f"{o}/{i}", delays.get(i, 0.0)) for i in self.inputs] for o in self.outputs])
         return np.asarray(h * np.exp(-s * lag), dtype=np.complex128)
 
     def to_control(self, *, pade: int | None = None) -> Any:

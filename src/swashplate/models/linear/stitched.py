@@ -81,12 +81,12 @@ class SpeedPoint:
 
     def implied(self) -> Array:
         """Derivatives of the rows by speed that the trims' gradients stand for: d(-g)/du - X x_t' - B u_t'."""
-        moved = np.array([0.0 if name == "u" else self.gradients.get(name, 0.0) for name in self.columns])
+        gradients = np.array([0.0 if name == "u" else self.gradients.get(name, 0.0) for name in self.columns])
         driven = np.array([self.gradients[name] for name in self.inputs])
         weight = np.zeros(len(self.rows))
         turned = gravity_slope(self.trim) @ [self.gradients["phi"], self.gradients["theta"]]
         weight[:3] = -turned
-        return np.asarray(weight - self.X @ moved - self.B @ driven)
+        return np.asarray(weight - self.X @ gradients - self.B @ driven)
 
     def given(self) -> Array:
         """The point's own derivatives of the rows by speed."""
@@ -152,8 +152,8 @@ class StitchedVehicle(Vehicle):
         names = list(disagreement(points[0]))
         rows = []
         for p in points:
-            own, implied = zip(*disagreement(p).values(), strict=True)
-            rows.append([f"{p.speed:.2f}", "point", *(f"{value:.3g}" for value in own)])
+            derivatives, implied = zip(*disagreement(p).values(), strict=True)
+            rows.append([f"{p.speed:.2f}", "point", *(f"{value:.3g}" for value in derivatives)])
             rows.append(["", "trims", *(f"{value:.3g}" for value in implied)])
         lines.append("Derivatives by speed as the point has them, and as its trims' gradients imply, which fly:")
         return "\n".join([*lines, text_table(["u [m/s]", "of", *names], rows, left=(1,)), self.card.trust])
@@ -213,18 +213,18 @@ def stitched(card: Card) -> Vehicle:
     parts = [name.removesuffix("_0").partition("_by_") for name in card.parameters if name.endswith("_0")]
     rows, columns = (*RATES, *inner), (*NEEDED, *inner, *inputs)
     entries = tuple((row, column) for row, by, column in parts if by and row in rows and column in columns)
-    own = Stitches(n, inner, inputs, entries)
+    stitches = Stitches(n, inner, inputs, entries)
     expected: dict[str, str] = {}
     for k in range(n):
         expected |= {f"{entry_name(*e)}_{k}": entry_unit(units[e[0]], units[e[1]]) for e in entries}
-        expected |= {f"trim_{name}_{k}": units[name] for name in own.trimmed}
-        expected |= {f"gradient_{name}_{k}": gradient_unit(units[name]) for name in own.trimmed[1:]}
+        expected |= {f"trim_{name}_{k}": units[name] for name in stitches.trimmed}
+        expected |= {f"gradient_{name}_{k}": gradient_unit(units[name]) for name in stitches.trimmed[1:]}
     card.checked_against(expected)
     speeds = [card.parameters[f"trim_u_{k}"].value for k in range(n)]
     if any(not slow < fast for slow, fast in pairwise(speeds)):
-        told = ", ".join(f"{speed:g}" for speed in speeds)
-        raise CardError(f"are {told} m/s, expected ascending speeds.", where=where, channel="trim_u_0 and on")
-    made = Vehicle(
+        listed = ", ".join(f"{speed:g}" for speed in speeds)
+        raise CardError(f"are {listed} m/s, expected ascending speeds.", where=where, channel="trim_u_0 and on")
+    vehicle = Vehicle(
         card=card,
         state=LinearState(RigidBody(*(0.0,) * 12), tuple_type("Inner", inner)(*(0.0,) * len(inner)) if inner else None),
         inputs=tuple_type("Inputs", inputs),
@@ -234,11 +234,11 @@ def stitched(card: Card) -> Vehicle:
         input_names=inputs,
         input_units=tuple(options["input_units"]),
         input_limits=tuple(zip(map(float, options["low"]), map(float, options["high"]), strict=True)),
-        derivatives=partial(derivatives, own=own),
-        specific_force=partial(specific_force, own=own),
+        derivatives=partial(derivatives, stitches=stitches),
+        specific_force=partial(specific_force, stitches=stitches),
         traits=replace(TRAITS, axes=usual_axes(inputs)),
     )
-    return StitchedVehicle(**{f.name: getattr(made, f.name) for f in fields(Vehicle)})
+    return StitchedVehicle(**{f.name: getattr(vehicle, f.name) for f in fields(Vehicle)})
 
 
 def gradient_unit(unit: str) -> str:
@@ -253,19 +253,19 @@ def outside(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> M
     body = RigidBody(*map(float, x[: len(RigidBody._fields)]))
     ahead = body.u - _wind(body, environment, FloatBackend()).x
     slow, fast = numbers["trim_u_0"].value, numbers[f"trim_u_{n - 1}"].value
-    told = {}
+    doubts = {}
     if not slow - _NEAR <= ahead <= fast + _NEAR:
-        told["speed"] = (
+        doubts["speed"] = (
             f"the air speed ahead is {ahead:.1f} m/s, outside the points, {slow:.1f} to {fast:.1f} m/s: "
             "trims and derivatives are held at the last one"
         )
     density = float(vehicle.card.options["air_density"])
     if abs(environment.air_density / density - 1.0) > _DENSER:
-        told["density"] = (
+        doubts["density"] = (
             f"the air has {environment.air_density:.3g} kg/m^3, the points {density:.3g}, "
             "and their derivatives are not scaled"
         )
-    return told
+    return doubts
 
 
 _NEAR = 0.5
@@ -317,21 +317,21 @@ def between(speed: Scalar, par: Named, n: int, xp: Backend) -> Between:
 
 
 def _acting(
-    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, own: Stitches
+    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, stitches: Stitches
 ) -> tuple[Vector, Vector, dict[str, Scalar]]:
     """Specific force [m/s^2], angular acceleration [rad/s^2] and the inner states' rates."""
     body = state.body
     assert body is not None
     air = body.velocity + _wind(body, env, xp).scaled(-1.0)
     here = named_states(state) | inputs._asdict() | {"u": air.x, "v": air.y, "w": air.z}
-    speed = xp.minimum(xp.maximum(air.x, par.trim_u_0), getattr(par, f"trim_u_{own.points - 1}"))
-    place = between(speed, par, own.points, xp)
-    trims = {"u": speed} | {name: place.trim(par, name) for name in own.trimmed[1:]}
+    speed = xp.minimum(xp.maximum(air.x, par.trim_u_0), getattr(par, f"trim_u_{stitches.points - 1}"))
+    place = between(speed, par, stitches.points, xp)
+    trims = {"u": speed} | {name: place.trim(par, name) for name in stitches.trimmed[1:]}
     away = {name: value - trims.get(name, 0.0) for name, value in here.items()}
     weight = gravity(1.0, env.gravity, Euler(trims["phi"], trims["theta"], 0.0), xp)
-    rates: dict[str, Scalar] = dict.fromkeys((*RATES, *own.inner), 0.0)
+    rates: dict[str, Scalar] = dict.fromkeys((*RATES, *stitches.inner), 0.0)
     rates |= {"u": -weight.x, "v": -weight.y, "w": -weight.z}
-    for row, column in own.entries:
+    for row, column in stitches.entries:
         name = entry_name(row, column)
         slope = sum(share * getattr(par, f"{name}_{k}") for k, share in enumerate(place.derivatives))
         rates[row] = rates[row] + slope * away[column]
@@ -340,10 +340,10 @@ def _acting(
 
 
 def derivatives(
-    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, *, own: Stitches
+    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, *, stitches: Stitches
 ) -> LinearState:
     """Time derivative of the whole state."""
-    felt, turned, rates = _acting(state, inputs, par, env, xp, own)
+    felt, turned, rates = _acting(state, inputs, par, env, xp, stitches)
     assert state.body is not None
     force = felt + gravity(1.0, env.gravity, state.body.attitude, xp)
     # Of a body with equal moments of inertia: the gyroscopic moments are the points'.
@@ -353,7 +353,7 @@ def derivatives(
 
 
 def specific_force(
-    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, *, own: Stitches
+    state: LinearState, inputs: Named, par: Named, env: Environment, xp: Backend, *, stitches: Stitches
 ) -> Vector:
     """What accelerometers at the centre of gravity read [m/s^2]."""
-    return _acting(state, inputs, par, env, xp, own)[0]
+    return _acting(state, inputs, par, env, xp, stitches)[0]

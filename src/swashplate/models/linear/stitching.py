@@ -57,7 +57,7 @@ def stitch_points(
         _same(points[0], model, names[0], name)
     trims = [trim_of(model) for model in points]
     inner = tuple(state for state in points[0].states if state not in RigidBody._fields)
-    told = [f"{state} counts from its trim." for state in _untold(trims, inner, names)]
+    notes = [f"{state} counts from its trim." for state in _untold(trims, inner, names)]
     every = sorted(
         (
             (_trimmed(m, n, trim, inner, points[0].inputs), m, trim)
@@ -65,19 +65,19 @@ def stitch_points(
         ),
         key=lambda one: one[0].speed,
     )
-    made = [one for one, _, _ in every]
-    for slow, fast in pairwise(made):
+    trimmed = [one for one, _, _ in every]
+    for slow, fast in pairwise(trimmed):
         if fast.speed - slow.speed < _APART:
             raise CardError(f"is {fast.speed:.4g} m/s, as that of {slow.name}.", where=fast.name, channel="trim.u")
     fitted = any(np.isfinite(p.cramer_rao) for model in points for p in model.parameters.values())
     how = gradients or ("trims" if fitted else "derivatives")
-    free = [i for i in points[0].inputs if np.ptp([one.trim[i] for one in made]) > 0.0]
-    slopes = differences(made) if how == "trims" else [own_gradients(one, free) for one in made]
+    free = [i for i in points[0].inputs if np.ptp([one.trim[i] for one in trimmed]) > 0.0]
+    slopes = differences(trimmed) if how == "trims" else [own_gradients(one, free) for one in trimmed]
     stitched = [
         SpeedPoint(m.name, inner, m.inputs, m.trim, without_kinematics(m, fitted=fitted), m.B[m.rows], slope)
-        for m, slope in zip(made, slopes, strict=True)
+        for m, slope in zip(trimmed, slopes, strict=True)
     ]
-    told.append(
+    notes.append(
         "Gradients of the trims are what the points' own derivatives say, so that these are kept."
         if how == "derivatives"
         else "Gradients of the trims are differences of the trims; they stand for the points' derivatives by speed."
@@ -88,20 +88,20 @@ def stitch_points(
             f"are {', '.join(f'{d:g}' for d in sorted(densities))} kg/m^3, expected one.", channel="trim.air_density"
         )
     if not densities:
-        told.append("No point says the air's density: that of a calm day near the ground is assumed.")
-    options: dict[str, Any] = {"points": len(made), "inner": list(inner)}
+        notes.append("No point says the air's density: that of a calm day near the ground is assumed.")
+    options: dict[str, Any] = {"points": len(trimmed), "inner": list(inner)}
     options |= {"inner_units": [points[0].units.get(name, "1") or "1" for name in inner]}
     options |= {"inputs": list(points[0].inputs)}
     options |= {"input_units": [points[0].units.get(name, "1") or "1" for name in points[0].inputs]}
-    options |= _limits([model for _, model, _ in every], made, told)
+    options |= _limits([model for _, model, _ in every], trimmed, notes)
     options |= {"air_density": densities.pop() if densities else SEA_LEVEL_DENSITY}
-    delays = _delays([model for _, model, _ in every], made, told)
-    speeds = ", ".join(f"{one.speed:.3g}" for one in made)
+    delays = _delays([model for _, model, _ in every], trimmed[0].inputs, notes)
+    speeds = ", ".join(f"{one.speed:.3g}" for one in trimmed)
     return Card(
         vehicle=NAME,
         title=title or f"Stitched at {speeds} m/s",
-        trust=f"Between {made[0].speed:.3g} and {made[-1].speed:.3g} m/s ahead, near the trims; beyond, trims and "
-        f"derivatives are held. {' '.join(told)}",
+        trust=f"Between {trimmed[0].speed:.3g} and {trimmed[-1].speed:.3g} m/s ahead, near the trims; beyond, trims "
+        f"and derivatives are held. {' '.join(notes)}",
         options=options,
         parameters=_parameters(stitched, options, "identified" if fitted else "derived"),
         observer={SECTION: delays} if delays else {},
@@ -153,10 +153,10 @@ def _trimmed(
     order = [*NEEDED, *inner]
     places = [model.states.index(state) for state in order]
     for state in (s for s in _PLACE if s in model.states):
-        moved = [row for row, k in zip(order, places, strict=True) if abs(A[k, model.states.index(state)]) > _NOTHING]
-        if moved:
+        driven = [row for row, k in zip(order, places, strict=True) if abs(A[k, model.states.index(state)]) > _NOTHING]
+        if driven:
             raise CardError(
-                f"moves {', '.join(moved)}: a stitched model knows no place.",
+                f"moves {', '.join(driven)}: a stitched model knows no place.",
                 where=name,
                 channel=state,
                 hint="Linearise well above the ground.",
@@ -172,10 +172,10 @@ def _trimmed(
         raise CardError("is not zero, expected a straight flight.", where=name, channel=f"trim.{turning[0]}")
     wanted = (*TRIMMED, *inner, *inputs)
     columns = [model.inputs.index(entry) for entry in inputs]
-    made = TrimmedMatrices(
+    matrices = TrimmedMatrices(
         name, inner, inputs, A[np.ix_(places, places)], B[np.ix_(places, columns)], {k: trim[k] for k in wanted}
     )
-    over = made.course()
+    over = matrices.course()
     if max(abs(over.y), abs(over.z)) > _ASIDE * max(1.0, abs(over.x)):
         raise CardError(
             f"flies {over.x:.2f} m/s ahead, {over.y:.2f} m/s right, {-over.z:.2f} m/s up; expected level flight ahead.",
@@ -183,17 +183,17 @@ def _trimmed(
             channel="trim",
             hint="u, v and w are along the body's axes, angles in rad.",
         )
-    return made
+    return matrices
 
 
-def _limits(models: Sequence[StateSpaceModel], made: Sequence[TrimmedMatrices], told: list[str]) -> dict[str, Any]:
+def _limits(models: Sequence[StateSpaceModel], trimmed: Sequence[TrimmedMatrices], notes: list[str]) -> dict[str, Any]:
     """Ranges of the inputs: the widest that a file says about its trim; an assumed one about all trims otherwise."""
     ends: dict[str, Any] = {"low": [], "high": []}
     assumed = []
-    for name in made[0].inputs:
+    for name in trimmed[0].inputs:
         ranges = [
             (model.document.get("limits", {}).get(name), one.trim[name])
-            for model, one in zip(models, made, strict=True)
+            for model, one in zip(models, trimmed, strict=True)
         ]
         known = [(at + low, at + high) for (low, high), at in ((r, at) for r, at in ranges if r is not None)]
         if not known:
@@ -203,18 +203,18 @@ def _limits(models: Sequence[StateSpaceModel], made: Sequence[TrimmedMatrices], 
         ends["low"].append(float(min(low for low, _ in known)))
         ends["high"].append(float(max(high for _, high in known)))
     if assumed:
-        told.append(f"Ranges of inputs are assumed about the trims: {', '.join(assumed)} either way.")
+        notes.append(f"Ranges of inputs are assumed about the trims: {', '.join(assumed)} either way.")
     return ends
 
 
-def _delays(models: Sequence[StateSpaceModel], made: Sequence[TrimmedMatrices], told: list[str]) -> dict[str, float]:
+def _delays(models: Sequence[StateSpaceModel], inputs: Sequence[str], notes: list[str]) -> dict[str, float]:
     """One delay for every input [s], the mean of the points'; empty where no point has any."""
     delays = {}
-    for name in made[0].inputs:
-        late = np.array([model.delay(output, name) for model in models for output in model.outputs] or [0.0])
-        delays[name] = max(0.0, float(late.mean()))
-        if np.ptp(late) > 1e-9:
-            told.append(f"Delay of {name}: mean of {1e3 * late.min():.3g} to {1e3 * late.max():.3g} ms.")
+    for name in inputs:
+        lags = np.array([model.delay(output, name) for model in models for output in model.outputs] or [0.0])
+        delays[name] = max(0.0, float(lags.mean()))
+        if np.ptp(lags) > 1e-9:
+            notes.append(f"Delay of {name}: mean of {1e3 * lags.min():.3g} to {1e3 * lags.max():.3g} ms.")
     return delays if any(delays.values()) else {}
 
 

@@ -240,9 +240,9 @@ class TransferFunctions(tuple[TransferFunction, ...]):
             free: parameters as a fit names them: what is of one response of several has its output behind ("K p").
         """
         function = next(one for one in self if (one.output, one.input) == (output, input))
-        h, own = function.with_slopes(omega)
+        h, derivatives = function.with_slopes(omega)
         mine = function.form.own_names if len(self) > 1 else ()
-        by_name = {f"{name} {output}" if name in mine else name: slope for name, slope in own.items()}
+        by_name = {f"{name} {output}" if name in mine else name: slope for name, slope in derivatives.items()}
         slopes = np.zeros((np.size(omega), len(free)), dtype=np.complex128)
         for k, name in enumerate(free):
             slopes[:, k] = by_name.get(name, 0.0)

@@ -92,8 +92,8 @@ def without_kinematics(point: TrimmedMatrices, *, fitted: bool) -> Array:
     angles = [_AT["phi"], _AT["theta"]]
     rest = left[np.ix_(range(3), angles)] - gravity_slope(point.trim)
     # A bar that keeps its own attitude leaves two equal effects with opposite signs: of the attitude and of the bar's.
-    own = left[:3, None, len(NEEDED) :] + rest[:, :, None]
-    unexplained = np.min(np.abs(np.concatenate([rest[:, :, None], own], axis=2)), axis=2)
+    with_inner = left[:3, None, len(NEEDED) :] + rest[:, :, None]
+    unexplained = np.min(np.abs(np.concatenate([rest[:, :, None], with_inner], axis=2)), axis=2)
     if np.max(unexplained) > _GRAVITY_OFF:
         row, k = divmod(int(np.argmax(unexplained)), 2)
         raise CardError(

@@ -21,11 +21,11 @@ def equation_lines(model: StateSpaceModel) -> tuple[str, ...]:
     rates = [f"d{name}/dt" for name in model.states]
     lines = []
     for row in range(len(model.states)):
-        own = _terms(model, row, ("M",), rates) or [rates[row]]
-        if not any(e.matrix == "M" and e.row == e.column == row for e in model.elements) and own != [rates[row]]:
-            own = [rates[row], *own]
+        left = _terms(model, row, ("M",), rates) or [rates[row]]
+        if not any(e.matrix == "M" and e.row == e.column == row for e in model.elements) and left != [rates[row]]:
+            left = [rates[row], *left]
         right = [*_terms(model, row, ("F",), model.states), *_terms(model, row, ("G",), model.inputs)]
-        lines.append(f"{_sum(own)} = {_sum(right)}")
+        lines.append(f"{_sum(left)} = {_sum(right)}")
     for row, output in enumerate(model.outputs):
         terms = _terms(model, row, ("H0",), model.states) + _terms(model, row, ("H1",), rates)
         terms += _terms(model, row, ("D",), model.inputs)
