@@ -154,7 +154,7 @@ def state_space(asked: FitStateSpace, say: Say) -> LinearStudy:
                 seed=asked.seed,
                 progress=_iterations(say),
             )
-    fit, whole = stopping.told(fit), fit
+    fit, whole = stopping.with_stop(fit), fit
     if asked.reduce and fit is whole:  # there is nothing to take out of what was stopped
         fit = reduce(
             fit, hold_out=flights, progress=lambda i, cost: say("reducing", note=f"step {i}, J_ave {cost:.4g}")
@@ -190,7 +190,7 @@ def in_time(asked: FitInTime, say: Say) -> LinearStudy:
             horizon=asked.horizon,
             progress=_iterations(say),
         )
-    fit = stopping.told(fit)
+    fit = stopping.with_stop(fit)
     say("flying the model")
     unseen = _uniform(asked, unread, channels) or records
     verification = marked(verify(fit.solution, unseen, outputs=wanted), fit.settings["records"])

@@ -160,7 +160,7 @@ def identify_vehicle(asked: FitVehicle, say: Say) -> Identification:
             progress=lambda i, cost: say("fitting", done=i, total=iterations, note=f"iteration {i}, cost {cost:.6g}"),
             **question,
         )
-    fit, refused = stopping.told(fit), ""
+    fit, refused = stopping.with_stop(fit), ""
     if posterior is not None and not fit.failed:
         drawing = f"drawing the posterior by {posterior}"
         say(drawing)

@@ -51,7 +51,7 @@ def carry_out(question: VerbQuestion[Any], outs: tuple[Path, ...]) -> None:
         _show(question, answer, made)
     problems = question.problems(answer)
     if problems or stop.code:
-        complain(" ".join([*problems, *([stop.words] if stop.code and not problems else [])]))
+        complain(" ".join([*problems, *([stop.sentence] if stop.code and not problems else [])]))
         raise typer.Exit(stop.code or Exit.INPUT)
 
 

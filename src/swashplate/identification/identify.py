@@ -141,5 +141,5 @@ def _suited(model: Vehicle | StateSpaceModel, data: Data, method: str | None) ->
             if not reason:
                 return name.split("/")[0], estimator
             refused[name] = reason
-    told = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
-    raise IdentificationError(f"no method suits this model and these data ({told}).", where=f"'{model.name}'")
+    reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
+    raise IdentificationError(f"no method suits this model and these data ({reasons}).", where=f"'{model.name}'")

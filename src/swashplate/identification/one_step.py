@@ -42,7 +42,7 @@ class EffectTest:
         gain: log-likelihood that it adds; priors of its own numbers count against it.
         chance: of so large a gain where the effect is not there; `adjusted`: the same for the search among all (Holm).
         values: of the tested numbers, with their standard deviations.
-        moved: other free numbers, by how many of their own standard deviations the effect moves them, largest first.
+        shifts: other free numbers, by how many of their own standard deviations the effect moves them, largest first.
         refused: why nothing can be said, "" where something can.
     """
 
@@ -52,7 +52,7 @@ class EffectTest:
     chance: float = float("nan")
     adjusted: float = float("nan")
     values: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    moved: Mapping[str, float] = field(default_factory=dict)
+    shifts: Mapping[str, float] = field(default_factory=dict)
     refused: str = ""
 
     @property
@@ -71,21 +71,21 @@ def chance_of(statistic: float, free: int, bounded: int) -> float:
     """
     from scipy.special import chdtrc  # every report imports this module
 
-    whole = float(chdtrc(free, max(statistic, 0.0)))
+    chance = float(chdtrc(free, max(statistic, 0.0)))
     if not bounded:
-        return whole
+        return chance
     less = float(chdtrc(free - 1, max(statistic, 0.0))) if free > 1 else float(statistic <= 0.0)
-    return 0.5 * (less + whole)
+    return 0.5 * (less + chance)
 
 
 def holm(tests: Sequence[EffectTest]) -> tuple[EffectTest, ...]:
     """The tests with their chances adjusted for how many were made (Holm 1979)."""
     judged = sorted((i for i, one in enumerate(tests) if not one.refused), key=lambda i: tests[i].chance)
-    made, worst = list(tests), 0.0
+    adjusted, worst = list(tests), 0.0
     for rank, i in enumerate(judged):
         worst = min(1.0, max(worst, (len(judged) - rank) * tests[i].chance))
-        made[i] = replace(tests[i], adjusted=worst)
-    return tuple(made)
+        adjusted[i] = replace(tests[i], adjusted=worst)
+    return tuple(adjusted)
 
 
 _SINGULAR = 1e14
@@ -122,19 +122,19 @@ def one_step_effects(fit: Result[Any, Any], effects: Sequence[PhysicalEffect] | 
 
 def in_words(tests: Sequence[EffectTest]) -> str:
     """One line: what the flights ask for, and what freeing it would move; "" for no tests."""
-    told = [test for test in tests if not test.refused]
-    if not told:
+    answered = [test for test in tests if not test.refused]
+    if not answered:
         return ""
     parts = []
-    for test in told:
+    for test in answered:
         if test.verdict == "needed":
             far = f"{np.sqrt(2.0 * test.gain):.0f} sigma"
-            moved = [f"{name} by {by:+.0f} sigma" for name, by in test.moved.items() if abs(by) > MOVED]
+            shifts = [f"{name} by {by:+.0f} sigma" for name, by in test.shifts.items() if abs(by) > MOVED]
             word, numbers = "needs" if test.asked else "lacks", ", ".join(test.effect.without)
             parts.append(
-                f"{word} {test.effect.name} ({far}; freeing {numbers} moves {', '.join(moved) or 'nothing else'})"
+                f"{word} {test.effect.name} ({far}; freeing {numbers} moves {', '.join(shifts) or 'nothing else'})"
             )
-    idle = [test.effect.name for test in told if test.verdict != "needed"]
+    idle = [test.effect.name for test in answered if test.verdict != "needed"]
     line = "; ".join(parts) or "asks for no part of the physics"
     rest = f"; not asked for: {', '.join(idle)}" if idle else ""
     return f"{line}{rest}. By one step from this fit."
@@ -173,15 +173,15 @@ def _without(fit: Result[Any, Any], effect: PhysicalEffect) -> EffectTest:
     at = [fit.names.index(name) for name in names]
     rest = [i for i in range(len(fit.names)) if i not in at]
     wide = fit.covariance_corrected if np.all(np.isfinite(fit.covariance_corrected)) else fit.covariance
-    own, across = wide[np.ix_(at, at)], wide[np.ix_(rest, at)]
-    if any(fit[name].at_bound for name in names) or np.linalg.cond(own) > _SINGULAR:
+    block, across = wide[np.ix_(at, at)], wide[np.ix_(rest, at)]
+    if any(fit[name].at_bound for name in names) or np.linalg.cond(block) > _SINGULAR:
         return EffectTest(effect, True, refused="it stands on a bound, or the flights do not tell it.")
     away = np.array([fit[name].value - effect.without[name] for name in names])
-    pull = np.linalg.solve(own, away)
-    held = np.sqrt(np.maximum(np.diag(wide)[rest] - np.einsum("ij,ij->i", across @ np.linalg.inv(own), across), 0.0))
+    pull = np.linalg.solve(block, away)
+    held = np.sqrt(np.maximum(np.diag(wide)[rest] - np.einsum("ij,ij->i", across @ np.linalg.inv(block), across), 0.0))
     by = across @ pull
-    moved = {fit.names[i]: float(m / s) for i, m, s in zip(rest, by, held, strict=True) if s > 0.0}
-    return _test(fit, effect, True, float(away @ pull), {n: (fit[n].value, fit[n].best_sigma) for n in names}, moved)
+    shifts = {fit.names[i]: float(m / s) for i, m, s in zip(rest, by, held, strict=True) if s > 0.0}
+    return _test(fit, effect, True, float(away @ pull), {n: (fit[n].value, fit[n].best_sigma) for n in names}, shifts)
 
 
 def _with(fit: Result[Any, Any], effects: Sequence[PhysicalEffect]) -> list[EffectTest]:
@@ -200,28 +200,28 @@ def _with(fit: Result[Any, Any], effects: Sequence[PhysicalEffect]) -> list[Effe
     likelihood.refresh(row)
     _, slope, information = likelihood.scores(row)
     _, by_prior, prior = likelihood.row.prior(row)
-    slope, whole = slope + by_prior, information + prior
-    plain = accuracy.covariance(likelihood.row, information, prior)
+    slope, hessian = slope + by_prior, information + prior
+    bound = accuracy.covariance(likelihood.row, information, prior)
     white, sensitivities, elsewhere = likelihood.whitened(row)
     lags = round(LAGS / likelihood.records[0].dt)
-    corrected = accuracy.corrected_covariance(plain, elsewhere + prior, white, sensitivities, lags=lags)
+    corrected = accuracy.corrected_covariance(bound, elsewhere + prior, white, sensitivities, lags=lags)
     names, scale = list(likelihood.row.names), likelihood.row.scale
     stopped = {name for name in fit.names if fit[name].at_bound}
     free = [i for i, name in enumerate(names) if name not in added and name not in stopped]
     tests = []
     for effect in effects:
         at = [names.index(name) for name in effect.without]
-        split = _Split(whole[np.ix_(at, at)], whole[np.ix_(free, free)], whole[np.ix_(at, free)])
+        split = _Split(hessian[np.ix_(at, at)], hessian[np.ix_(free, free)], hessian[np.ix_(at, free)])
         if not np.all(np.diag(split.tested) > 0.0) or np.linalg.cond(split.alone) > _SINGULAR:
             tests.append(EffectTest(effect, False, refused="no flight moves it by itself."))
             continue
         left = slope[at] - split.between @ np.linalg.solve(split.others, slope[free])
         step = -np.linalg.solve(split.alone, left)
         inside = np.ix_(at, at)
-        colour = max(1.0, float(np.trace(np.linalg.solve(plain[inside], corrected[inside]))) / len(at))
+        colour = max(1.0, float(np.trace(np.linalg.solve(bound[inside], corrected[inside]))) / len(at))
         others = -np.linalg.solve(split.others, split.between.T @ step)
         sigmas = {name: fit[name].best_sigma for name in fit.names}
-        moved = {
+        shifts = {
             names[i]: float(by * scale[i] / sigmas[names[i]])
             for i, by in zip(free, others, strict=True)
             if sigmas.get(names[i], 0.0) > 0.0
@@ -231,7 +231,7 @@ def _with(fit: Result[Any, Any], effects: Sequence[PhysicalEffect]) -> list[Effe
             name: (effect.without[name] + float(s * scale[i]), float(sigma))
             for name, i, s, sigma in zip(effect.without, at, step, spread, strict=True)
         }
-        tests.append(_test(fit, effect, False, float(-left @ step) / colour, values, moved))
+        tests.append(_test(fit, effect, False, float(-left @ step) / colour, values, shifts))
     return tests
 
 
@@ -241,7 +241,7 @@ def _test(
     asked: bool,
     statistic: float,
     values: dict[str, tuple[float, float]],
-    moved: dict[str, float],
+    shifts: dict[str, float],
 ) -> EffectTest:
     """The chance of a statistic where the effect is not there; a step beyond a bound is none."""
     names = list(values)
@@ -259,5 +259,5 @@ def _test(
         chance=chance,
         adjusted=chance,
         values=values,
-        moved=dict(sorted(moved.items(), key=lambda one: -abs(one[1]))),
+        shifts=dict(sorted(shifts.items(), key=lambda one: -abs(one[1]))),
     )

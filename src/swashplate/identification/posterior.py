@@ -85,9 +85,9 @@ def posterior(
         raise IdentificationError(
             "did not converge: chains would start from nowhere.", where=where, hint="Allow more iterations."
         )
-    made = _drawn(result, fitted, draws=draws, chains=chains, warmup=warming, seed=seed, progress=progress)
-    made.check(where=where)
-    return replace(result, posterior=made)
+    drawn = _drawn(result, fitted, draws=draws, chains=chains, warmup=warming, seed=seed, progress=progress)
+    drawn.check(where=where)
+    return replace(result, posterior=drawn)
 
 
 def check_posterior(method: str) -> None:
@@ -104,8 +104,8 @@ def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, wh
     covariance = result.covariance
     vague = [n for n, v in zip(result.names, np.diag(covariance), strict=True) if not 0.0 < v < np.inf]
     if vague or not result.names or not np.all(np.isfinite(covariance)):
-        told = "has no standard deviation." if vague else "knows no spread: nothing was free."
-        raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
+        problem = "has no standard deviation." if vague else "knows no spread: nothing was free."
+        raise IdentificationError(problem, where=where, channel=", ".join(vague) or None)
     low, high = bounds_of(result.solution, result.names)
     mean = np.array([result[name].value for name in result.names])
     rows = normal_within(mean, covariance, low, high, count=draws * chains, seed=seed, where=where)

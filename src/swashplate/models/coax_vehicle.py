@@ -119,7 +119,7 @@ def balance(start: Vehicle, identified: Vehicle, trims: Mapping[str, float]) -> 
     """What takes the place of the yaw and the fall that the start's numbers leave in the hover that was flown.
 
     Args:
-        start, found: before and after the fit.
+        start, identified: before and after the fit.
         trims: of the motors, "trim_motor_upper" and "trim_motor_lower", zero where they are not named.
 
     Returns:

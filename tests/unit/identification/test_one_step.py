@@ -78,7 +78,7 @@ def test_a_part_that_is_held_out_is_judged_as_the_fit_with_it_judges(spin: float
     assert test.values["gyroscopic"][1] == pytest.approx(np.sqrt(covariance[-1, -1]), rel=0.1)
     assert test.verdict == ("needed" if spin else "not needed")
     by = (numbers[1] - line.solved()[1][1]) / fit["o_zeta_lower"].best_sigma
-    assert test.moved["o_zeta_lower"] == pytest.approx(by, rel=1e-6)
+    assert test.shifts["o_zeta_lower"] == pytest.approx(by, rel=1e-6)
     assert in_words([test]).startswith("lacks spin (" if spin else "asks for no part of the physics; not asked")
 
 
@@ -89,7 +89,7 @@ def test_a_part_that_is_free_is_judged_as_the_fit_without_it_judges() -> None:
     assert test.asked
     assert test.gain == pytest.approx(cost - line.solved()[0], rel=1e-6)
     by = (line.solved()[1][0] - numbers[0]) / np.sqrt(covariance[0, 0])
-    assert test.moved["linkage_lower"] == pytest.approx(by, rel=1e-6)
+    assert test.shifts["linkage_lower"] == pytest.approx(by, rel=1e-6)
     assert "needs flap-back" in in_words([test])
     assert "freeing a_alpha_u_linear moves linkage_lower by" in in_words([test])
 

@@ -63,7 +63,7 @@ def covariance(row: Row, information: Array, prior: Array) -> Array:
 
 
 def corrected_covariance(
-    plain: Array, rest: Array, whitened: Sequence[Array], sensitivities: Sequence[Array], *, lags: int
+    bound: Array, rest: Array, whitened: Sequence[Array], sensitivities: Sequence[Array], *, lags: int
 ) -> Array:
     """Bound that allows for coloured residuals (Morelli and Klein 1997; Klein and Morelli 2006, sec. 6.1).
 
@@ -81,22 +81,22 @@ def corrected_covariance(
         sensitivities: per record, their derivatives (p, n, m).
         lags: how many samples of correlation to allow for.
     """
-    moved = [np.flatnonzero(np.any(sensitivity, axis=(1, 2))) for sensitivity in sensitivities]
-    pieces = [sensitivity[own] for sensitivity, own in zip(sensitivities, moved, strict=True)]
+    affected = [np.flatnonzero(np.any(sensitivity, axis=(1, 2))) for sensitivity in sensitivities]
+    pieces = [sensitivity[rows] for sensitivity, rows in zip(sensitivities, affected, strict=True)]
     products = [
-        _products(residual, residual, lags) + _products(*_taken(piece, plain[np.ix_(own, own)]), lags)
-        for residual, piece, own in zip(whitened, pieces, moved, strict=True)
+        _products(residual, residual, lags) + _products(*_taken(piece, bound[np.ix_(rows, rows)]), lags)
+        for residual, piece, rows in zip(whitened, pieces, affected, strict=True)
     ]
     taper = 1.0 - np.arange(lags + 1) / (lags + 1.0)
     correlation = taper[:, None, None] * np.sum(products, axis=0) / sum(len(residual) for residual in whitened)
     middle = np.array(rest, dtype=np.float64)
-    for piece, own in zip(pieces, moved, strict=True):  # a window's residuals know nothing of other windows
-        middle[np.ix_(own, own)] += _spread(correlation, piece)
-    return np.asarray(plain @ middle @ plain)
+    for piece, places in zip(pieces, affected, strict=True):  # a window's residuals know nothing of other windows
+        middle[np.ix_(places, places)] += _spread(correlation, piece)
+    return np.asarray(bound @ middle @ bound)
 
 
 def covariance_by_octaves(
-    plain: Array, rest: Array, whitened: Sequence[Array], sensitivities: Sequence[Array]
+    bound: Array, rest: Array, whitened: Sequence[Array], sensitivities: Sequence[Array]
 ) -> Array:
     """Bound that allows for errors which hold together over half an octave, as those of what a model lacks do.
 
@@ -113,20 +113,20 @@ def covariance_by_octaves(
         share[0] = 1.0 / n
         if n % 2 == 0:
             share[-1] = 1.0 / n
-        moved = rfft(piece, axis=1).conj() * share[None, :, None]
-        by_line = np.einsum("pkm,km->kp", moved, rfft(residual, axis=0)).real
+        spectrum = rfft(piece, axis=1).conj() * share[None, :, None]
+        by_line = np.einsum("pkm,km->kp", spectrum, rfft(residual, axis=0)).real
         band = np.floor(2.0 * np.log2(np.maximum(np.arange(len(share)), 1.0) / n)).astype(int)
         for b in np.unique(band):
-            pulls[b] = pulls.get(b, np.zeros(len(plain))) + by_line[band == b].sum(axis=0)
+            pulls[b] = pulls.get(b, np.zeros(len(bound))) + by_line[band == b].sum(axis=0)
     together = np.array(list(pulls.values()))
-    return np.asarray(plain @ (together.T @ together + rest) @ plain)
+    return np.asarray(bound @ (together.T @ together + rest) @ bound)
 
 
 def covering(covariance: Array, *others: Array) -> Array:
     """A covariance with the same correlations whose variances are the largest of all."""
-    own = np.diag(covariance)
-    largest = np.max([own, *map(np.diag, others)], axis=0)
-    stretch = np.sqrt(np.divide(largest, own, out=np.ones_like(own), where=own > 0.0))
+    variance = np.diag(covariance)
+    largest = np.max([variance, *map(np.diag, others)], axis=0)
+    stretch = np.sqrt(np.divide(largest, variance, out=np.ones_like(variance), where=variance > 0.0))
     return np.asarray(covariance * np.outer(stretch, stretch))
 
 
@@ -136,10 +136,10 @@ def information_beyond(covariance: Array, prior: Array) -> Array:
     return np.asarray((turn * np.maximum(stretch, 0.0)) @ turn.T)
 
 
-def _taken(sensitivity: Array, plain: Array) -> tuple[Array, Array]:
+def _taken(sensitivity: Array, bound: Array) -> tuple[Array, Array]:
     """Two rows of which the products over time are what the fit takes out of a white error, each (n, m, p)."""
-    seen = sensitivity.transpose(1, 2, 0)
-    return seen @ plain, seen
+    slopes = sensitivity.transpose(1, 2, 0)
+    return slopes @ bound, slopes
 
 
 def _products(left: Array, right: Array, lags: int) -> Array:
@@ -158,13 +158,13 @@ def _spread(correlation: Array, sensitivity: Array) -> Array:
     both[: lags + 1] = correlation.transpose(0, 2, 1)
     both[size - lags :] = correlation[:0:-1]
     spectrum = rfft(both, axis=0)
-    moved = rfft(sensitivity, size, axis=1).transpose(1, 2, 0)
+    slopes = rfft(sensitivity, size, axis=1).transpose(1, 2, 0)
     share = np.full(len(spectrum), 2.0 / size)  # of both signs of a frequency (Parseval)
     share[0] = 1.0 / size
     if size % 2 == 0:
         share[-1] = 1.0 / size
-    left = (moved.conj() * share[:, None, None]).reshape(-1, moved.shape[2])
-    return np.asarray((left.T @ (spectrum @ moved).reshape(-1, moved.shape[2])).real)
+    left = (slopes.conj() * share[:, None, None]).reshape(-1, slopes.shape[2])
+    return np.asarray((left.T @ (spectrum @ slopes).reshape(-1, slopes.shape[2])).real)
 
 
 def marginal_information(information: Array, prior: Array, places: Array | NDArray[np.int64]) -> Array:

@@ -230,11 +230,11 @@ def _list(value: object, where: str, at: str) -> list[Any]:
 
 
 def _wrong(value: object, expected: str, where: str, at: str) -> DocumentError:
-    words: dict[type, str] = {
+    names: dict[type, str] = {
         dict: "a table",
         list: "a list",
         str: "a text",
         bool: "true or false",
         type(None): "nothing",
     }
-    return DocumentError(f"is {words.get(type(value), 'a number')}, expected {expected}.", where=where, channel=at)
+    return DocumentError(f"is {names.get(type(value), 'a number')}, expected {expected}.", where=where, channel=at)

@@ -212,10 +212,10 @@ class Likelihood(ABC):
         """Cost and gradient at the covariance that a cost has, and nothing kept: for samplers, from several threads
         too. A Kalman gain keeps the sensors' noise of the last `refresh`."""
         with np.errstate(over="ignore", invalid="ignore"):
-            moved = list(self.moved_errors(row))
-        cost, gradient = self.cost_of(moved), np.zeros(len(self.row))
+            errors = list(self.moved_errors(row))
+        cost, gradient = self.cost_of(errors), np.zeros(len(self.row))
         if np.isfinite(cost):
-            for part in self._expected(moved):
+            for part in self._expected(errors):
                 gradient[part.places] += self._gradient(part, part.whitened(part.errors))
         return cost, gradient
 
@@ -245,7 +245,7 @@ class Likelihood(ABC):
 
         The last is the information (p, p) that lies in the errors' covariance instead.
         """
-        plain: dict[int, list[Array]] = {}
+        by_number: dict[int, list[Array]] = {}
         slopes: dict[int, list[Array]] = {}
         rest = np.zeros((len(self.row), len(self.row)))
         for part in self._moved_here(row):
@@ -253,10 +253,10 @@ class Likelihood(ABC):
             rest[np.ix_(part.places, part.places)] += by_covariance
             every = np.zeros((len(self.row), *part.errors.shape))
             every[part.places] = white
-            plain.setdefault(part.number, []).append(part.whitened(part.errors))
+            by_number.setdefault(part.number, []).append(part.whitened(part.errors))
             slopes.setdefault(part.number, []).append(every)
         joined = [np.concatenate(each, axis=1) if len(each) > 1 else each[0] for each in slopes.values()]
-        return [np.concatenate(each) for each in plain.values()], joined, rest
+        return [np.concatenate(each) for each in by_number.values()], joined, rest
 
 
 class OwnCovariance(Likelihood):
@@ -289,9 +289,9 @@ class OwnCovariance(Likelihood):
         size = {s: around.get(s, 1.0) for s in states}
         entries = list(parameters)
         for number, record in enumerate(records):
-            seen = dict(zip(outputs, map(float, record.outputs[0]), strict=True))
+            first = dict(zip(outputs, map(float, record.outputs[0]), strict=True))
             for s in states:
-                begin = seen.get(s, rest.get(s, 0.0))
+                begin = first.get(s, rest.get(s, 0.0))
                 entries.append(Entry(f"start {s}[{number}]", "initial", begin, 0.3 * size[s]))
                 if shifts:
                     entries.append(Entry(f"shift {s}[{number}]", "nuisance", 0.0, 0.1 * size[s]))

@@ -149,11 +149,11 @@ class MultiStepErrors:
             tuple(base.row.entries[place] for place in self._places),
             tuple((at[i], at[j], c) for i, j, c in base.row.prior_correlations if i in at and j in at),
         )
-        moved = np.ix_(self._places, self._places)
+        square = np.ix_(self._places, self._places)
         self.known = np.zeros((len(self.row), len(self.row)))
         if known is not None:
             prior = base.row.prior(self._found)[2]
-            self.known = accuracy.information_beyond(known[moved], prior[moved])
+            self.known = accuracy.information_beyond(known[square], prior[square])
         errors = np.concatenate(base.errors_ahead(self._found, self.ahead))
         wild = np.asarray(~np.isfinite(errors).all(axis=(1, 2)))
         if wild.any():
@@ -222,8 +222,8 @@ class MultiStepErrors:
         errors, slopes = self._errors_and_slopes(row)
         kept = [i for i, part in enumerate(errors) if len(part)]
         white = [(errors[i] * self._scale).reshape(len(errors[i]), -1) for i in kept]
-        moved = [(slopes[i] * self._scale).reshape(*slopes[i].shape[:2], -1) for i in kept]
-        return white, moved, self.known
+        scaled = [(slopes[i] * self._scale).reshape(*slopes[i].shape[:2], -1) for i in kept]
+        return white, scaled, self.known
 
     def _errors_and_slopes(self, row: Array) -> tuple[list[Array], list[Array]]:
         with np.errstate(over="ignore", invalid="ignore"):

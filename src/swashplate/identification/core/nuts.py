@@ -70,26 +70,26 @@ def sample(
         seed: of all that is random.
         progress: told draws of a chain so far and at most.
     """
-    made = [_Chain(np.random.default_rng([seed, number])) for number in range(chains)]
+    samplers = [_Chain(np.random.default_rng([seed, number])) for number in range(chains)]
     with ThreadPoolExecutor(max_workers=min(chains, os.cpu_count() or 1)) as pool:
         data = whitening(row, optimum, covariance)
         data = evened(data, lambda sides: [p.slope for p in pool.map(density_of(slope, row, data), sides)])
-        density, done, told = density_of(slope, row, data), 0, None
-        steps = list(pool.map(lambda chain: chain.warmed(density, len(row), warmup), made))
+        density, done, draws = density_of(slope, row, data), 0, None
+        steps = list(pool.map(lambda chain: chain.warmed(density, len(row), warmup), samplers))
         step = float(np.exp(np.mean(np.log(steps))))  # the metric is one, and so is the step
         while done < most:
             size = min(block, most - done)
-            list(pool.map(lambda chain, size=size: chain.draw(density, step, size), made))
+            list(pool.map(lambda chain, size=size: chain.draw(density, step, size), samplers))
             done += size
-            stats = np.array([chain.stats for chain in made])
+            stats = np.array([chain.stats for chain in samplers])
             named = {name: stats[:, :, i] for i, name in enumerate(_STATS)}
-            told = Chains(np.array([chain.rows for chain in made]), named, np.full(chains, step))
+            draws = Chains(np.array([chain.rows for chain in samplers]), named, np.full(chains, step))
             if progress is not None:
                 progress(done, most)
-            if enough(told):
+            if enough(draws):
                 break
-    assert told is not None
-    return told
+    assert draws is not None
+    return draws
 
 
 def density_of(slope: Slope, row: Row, data: dict[str, Any]) -> Density:
@@ -137,16 +137,16 @@ class _Chain:
         log = np.log(_FIRST_STEP)
         taken = [log]
         for k in range(warmup):
-            self.at, told = drawn(density, self.at, float(np.exp(log)), self.random)
-            log += (told[-1] - _ACCEPTED) / np.sqrt(k + 1.0)
+            self.at, stats = drawn(density, self.at, float(np.exp(log)), self.random)
+            log += (stats[-1] - _ACCEPTED) / np.sqrt(k + 1.0)
             taken.append(log)
         return float(np.exp(np.mean(taken[len(taken) // 2 :])))
 
     def draw(self, density: Density, step: float, count: int) -> None:
         for _ in range(count):
-            self.at, told = drawn(density, self.at, step, self.random)
+            self.at, stats = drawn(density, self.at, step, self.random)
             self.rows.append(self.at.row)
-            self.stats.append(told)
+            self.stats.append(stats)
 
 
 # ---- one draw --------------------------------------------------------------------------------------------------------
@@ -175,8 +175,8 @@ def drawn(
         ahead = random.random() < 0.5
         more = _grown(density, path.last if ahead else path.first, step if ahead else -step, depth, energy, random)
         path, depth = _joined(path, more, ahead, random, onward=True), depth + 1
-    told = (path.chosen.density, path.ran_away, energy, depth, path.steps, path.accepted / path.steps)
-    return path.chosen, tuple(map(float, told))
+    stats = (path.chosen.density, path.ran_away, energy, depth, path.steps, path.accepted / path.steps)
+    return path.chosen, tuple(map(float, stats))
 
 
 def _grown(
@@ -201,7 +201,7 @@ def _grown(
 
 def _joined(near: _Path, far: _Path, ahead: bool, random: np.random.Generator, *, onward: bool) -> _Path:
     """A path and what was added to it; `onward`: the draw rather comes from what was added, if that is whole."""
-    early, late = (near, far) if ahead else (far, near)
+    early, later = (near, far) if ahead else (far, near)
     accepted, steps = near.accepted + far.accepted, near.steps + far.steps
     if far.ends:
         return near._replace(ends=True, ran_away=far.ran_away, accepted=accepted, steps=steps)
@@ -211,9 +211,9 @@ def _joined(near: _Path, far: _Path, ahead: bool, random: np.random.Generator, *
     turned = any(
         part @ begin[1] <= 0.0 or part @ end[1] <= 0.0
         for part, begin, end in (
-            (momentum, early.first, late.last),
-            (early.momentum + late.first[1], early.first, late.first),
-            (late.momentum + early.last[1], early.last, late.last),
+            (momentum, early.first, later.last),
+            (early.momentum + later.first[1], early.first, later.first),
+            (later.momentum + early.last[1], early.last, later.last),
         )
     )
-    return _Path(early.first, late.last, chosen, weight, momentum, turned, False, accepted, steps)
+    return _Path(early.first, later.last, chosen, weight, momentum, turned, False, accepted, steps)

@@ -62,9 +62,9 @@ class Row:
     def column(self, field: str) -> Array:
         """A number of every entry; made once, for a search asks thousands of times."""
         if field not in self._columns:
-            made = np.array([getattr(entry, field) for entry in self.entries], dtype=np.float64)
-            made.flags.writeable = False
-            self._columns[field] = made
+            column = np.array([getattr(entry, field) for entry in self.entries], dtype=np.float64)
+            column.flags.writeable = False
+            self._columns[field] = column
         return self._columns[field]
 
     @cached_property
@@ -83,9 +83,9 @@ class Row:
 
     def numbers(self, row: Array) -> dict[str, float]:
         """What a scaled row holds by name, in units."""
-        plain, logarithmic = row * self.scale, self.column("logarithmic") > 0.0
-        plain = np.where(logarithmic, np.exp(np.where(logarithmic, plain, 0.0)), plain)
-        return dict(zip(self.names, plain.tolist(), strict=True))
+        numbers, logarithmic = row * self.scale, self.column("logarithmic") > 0.0
+        numbers = np.where(logarithmic, np.exp(np.where(logarithmic, numbers, 0.0)), numbers)
+        return dict(zip(self.names, numbers.tolist(), strict=True))
 
     def prior(self, row: Array) -> tuple[float, Array, Array]:
         """Half the squared distance from the priors, its gradient and its Hessian (the priors' information)."""
@@ -104,8 +104,8 @@ class Row:
         for first, second, value in self.prior_correlations:
             correlation[first, second] = correlation[second, first] = value
         information = np.zeros_like(correlation)
-        own = 1.0 / sigma[known]
-        information[np.ix_(known, known)] = np.linalg.inv(correlation[np.ix_(known, known)]) * np.outer(own, own)
+        weight = 1.0 / sigma[known]
+        information[np.ix_(known, known)] = np.linalg.inv(correlation[np.ix_(known, known)]) * np.outer(weight, weight)
         return information
 
     def places(self, group: str) -> NDArray[np.intp]:

@@ -51,8 +51,8 @@ class Layout:
     def value_slopes(self, card: Array, row: Array) -> Array:
         """Slopes of `values` by each free parameter (free, parameters), by complex steps (Squire and Trapp 1998)."""
         step = 1j * IMAGINARY * np.eye(len(self.free))
-        moved = [np.imag(np.array(self.values(card, row + one))) / IMAGINARY for one in step]
-        return np.array(moved).reshape(len(step), len(card))
+        slopes = [np.imag(np.array(self.values(card, row + one))) / IMAGINARY for one in step]
+        return np.array(slopes).reshape(len(step), len(card))
 
 
 @dataclass(frozen=True)
@@ -111,8 +111,8 @@ class Parameterization:
 
     def identified(self, row: ArrayLike) -> dict[str, float]:
         """Names and values of everything that moved, tied parameters too."""
-        moved = self.layout.values(self.card_row, np.asarray(row))
-        return {name: float(getattr(moved, name)) for name in (*self.names, *(name for name, _ in self.ties))}
+        values = self.layout.values(self.card_row, np.asarray(row))
+        return {name: float(getattr(values, name)) for name in (*self.names, *(name for name, _ in self.ties))}
 
     @property
     def prior_correlations(self) -> tuple[tuple[int, int, float], ...]:
@@ -247,7 +247,7 @@ def _from_card(
         )
     _known(vehicle, known)
     free = {item.name for item in wanted}
-    made = [
+    entries = [
         replace(item, mean=known[item.name].value, sigma=known[item.name].sigma, start=known[item.name].value,
                 source=f"{FROM_CARD}{known[item.name].source}") if item.name in known else item
         for item in wanted
@@ -256,7 +256,7 @@ def _from_card(
     for name in rest:
         entry = known[name]
         vehicle = vehicle.with_values({name: entry.value}, status=entry.status, sigma=entry.sigma, source=entry.source)
-    return vehicle, made, rest
+    return vehicle, entries, rest
 
 
 def _with_priors(vehicle: Vehicle, wanted: list[Free], priors: Mapping[str, tuple[float, float]]) -> list[Free]:

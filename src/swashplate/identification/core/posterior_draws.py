@@ -106,23 +106,23 @@ class Posterior:
         """Why the draws may not be believed, in words; empty where nothing speaks against them."""
         if not self.rhat.size:
             return ()
-        told = []
+        faults = []
         # A number that never moves has no R-hat: that is a fault and no pass.
         mixed = ~(self.rhat < SPLIT_RHAT)
         if mixed.any():
             worst = np.argsort(-np.nan_to_num(self.rhat, nan=np.inf))[: min(3, int(mixed.sum()))]
             named = ", ".join(f"{self.names[i]} {self.rhat[i]:.3f}" for i in worst)
-            told.append(f"split-R-hat is to be below {SPLIT_RHAT:g}, found {named} ({mixed.sum()} numbers above)")
+            faults.append(f"split-R-hat is to be below {SPLIT_RHAT:g}, found {named} ({mixed.sum()} numbers above)")
         few = ~(self.ess[: self.parameters] >= LEAST_ESS)
         if few.any():
             worst = np.argsort(np.nan_to_num(self.ess[: self.parameters]))[: min(3, int(few.sum()))]
             named = ", ".join(f"{self.names[i]} {self.ess[i]:.0f}" for i in worst)
-            told.append(f"{LEAST_ESS:g} effective draws are needed, found {named} ({few.sum()} parameters below)")
+            faults.append(f"{LEAST_ESS:g} effective draws are needed, found {named} ({few.sum()} parameters below)")
         if self.diverging > MOST_DIVERGENT:
-            told.append(
+            faults.append(
                 f"{100.0 * self.diverging:.1f} % of the trajectories ran away, at most {100 * MOST_DIVERGENT:g} %"
             )
-        return tuple(told)
+        return tuple(faults)
 
     def check(self, *, where: str) -> None:
         """That the draws may be used.
@@ -175,7 +175,7 @@ class Posterior:
         chains, count = self.draws.shape[:2]
         dims, k = ("chain", "draw"), self.parameters
         coords = {"chain": np.arange(chains), "draw": np.arange(count)}
-        told = {"inference_library": "swashplate", "seed": self.seed}
+        attributes = {"inference_library": "swashplate", "seed": self.seed}
         variables: dict[str, Any] = {
             name: (dims, self.draws[:, :, i], {"units": unit})
             for i, (name, unit) in enumerate(zip(self.names[:k], self.units, strict=True))
@@ -184,12 +184,12 @@ class Posterior:
         if rest:
             variables["constants"] = ((*dims, "constant"), self.draws[:, :, k:])
         more = {"constant": rest} if rest else {}
-        groups = {"posterior": xr.Dataset(variables, coords | more, told)}
+        groups = {"posterior": xr.Dataset(variables, coords | more, attributes)}
         if self.stats:
             stats: dict[str, Any] = {name: (dims, values) for name, values in self.stats.items()}
             stats["diverging"] = (dims, self.stats["diverging"] > 0.5)
             stats |= {"step_size": ("chain", self.step)}
-            groups["sample_stats"] = xr.Dataset(stats, coords, told)
+            groups["sample_stats"] = xr.Dataset(stats, coords, attributes)
         if self.rhat.size:
             numbers = {"rhat": ("number", self.rhat), "ess": ("number", self.ess)}
             groups["diagnostics"] = xr.Dataset(numbers, {"number": list(self.names)})
@@ -216,22 +216,22 @@ class Posterior:
         """Heading and cells of a table of the model's parameters: quantiles, spread, and how well they were drawn."""
         quantiles = np.quantile(self.values, QUANTILES, axis=0)
         spread = self.values.std(axis=0, ddof=1)
-        made: list[tuple[str, ...]] = []
+        rows: list[tuple[str, ...]] = []
         for i, name in enumerate(self.names[: self.parameters]):
             cells = [name, *(f"{q:.5g}" for q in quantiles[:, i]), f"{spread[i]:.2g}"]
             cells += [f"{self.rhat[i]:.4f}", f"{self.ess[i]:.0f}"] if self.rhat.size else ["", ""]
-            made.append((*cells, self.units[i]))
-        return ("parameter", "2.5 %", "median", "97.5 %", "sd", "split-R-hat", "ESS", "unit"), made
+            rows.append((*cells, self.units[i]))
+        return ("parameter", "2.5 %", "median", "97.5 %", "sd", "split-R-hat", "ESS", "unit"), rows
 
     def __repr__(self) -> str:
         chains, count = self.draws.shape[:2]
-        told = f"posterior by {self.method}: {chains} chains of {count} draws"
+        title = f"posterior by {self.method}: {chains} chains of {count} draws"
         if self.stats:
-            told += f", {100.0 * self.diverging:.2g} % ran away"
-        return "\n".join([told, text_table(*self.rows(), left=(0, 7)), *(f"! {fault}." for fault in self.faults)])
+            title += f", {100.0 * self.diverging:.2g} % ran away"
+        return "\n".join([title, text_table(*self.rows(), left=(0, 7)), *(f"! {fault}." for fault in self.faults)])
 
 
-def adjusted(draws: Array, plain: Array, corrected: Array) -> Array:
+def adjusted(draws: Array, bound: Array, corrected: Array) -> Array:
     """Draws of a likelihood that takes coloured residuals for white, spread as the corrected covariance says.
 
     The linear map about their mean that takes a normal distribution of the plain covariance into one of the corrected,
@@ -240,10 +240,10 @@ def adjusted(draws: Array, plain: Array, corrected: Array) -> Array:
 
     Args:
         draws: shape (n, p).
-        plain, corrected: covariances at the optimum (p, p), the first as the likelihood has it.
+        bound, corrected: covariances at the optimum (p, p), the first as the likelihood has it.
     """
-    scale = np.sqrt(np.diag(plain))
-    P, C = plain / np.outer(scale, scale), corrected / np.outer(scale, scale)
+    scale = np.sqrt(np.diag(bound))
+    P, C = bound / np.outer(scale, scale), corrected / np.outer(scale, scale)
     root = _root(P)
     inverse = np.linalg.pinv(root, hermitian=True)
     way = inverse @ _root(root @ C @ root) @ inverse

@@ -250,8 +250,8 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
 
 def _bridged(flight: Flight) -> tuple[tuple[float, float], ...]:
     """Where conditioning drew lines over gaps of the pose."""
-    told = [step.details.get("bridged", ()) for step in flight.history if step.operation == "resample"]
-    return tuple((float(first), float(last)) for holes in told for first, last in holes)
+    bridged = [step.details.get("bridged", ()) for step in flight.history if step.operation == "resample"]
+    return tuple((float(first), float(last)) for holes in bridged for first, last in holes)
 
 
 _CLOCK = 1e-6

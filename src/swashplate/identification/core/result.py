@@ -196,8 +196,8 @@ class Result(Shown, Generic[Model, Details]):
         """How many free parameters lie within two corrected sigmas of the truth, in words; "" where none is known."""
         known = [e for e in map(self.__getitem__, self.names) if e.name in self.truth and e.best_sigma > 0.0]
         near = [e for e in known if abs(e.value - self.truth[e.name]) <= 2.0 * e.best_sigma]
-        told = f"{len(near)} of {len(known)} parameters lie within two sigmas of the simulated aircraft's."
-        return told if known else ""
+        text = f"{len(near)} of {len(known)} parameters lie within two sigmas of the simulated aircraft's."
+        return text if known else ""
 
     @cached_property
     def _by_name(self) -> dict[str, Estimate]:
@@ -250,8 +250,8 @@ class Result(Shown, Generic[Model, Details]):
         Raises:
             IdentificationError: transfer functions with more zeros than poles, which cannot be flown.
         """
-        made: Vehicle = resolve("vehicle_of_result")(self)
-        return made
+        vehicle: Vehicle = resolve("vehicle_of_result")(self)
+        return vehicle
 
     # ---- models that the data cannot tell apart ----------------------------------------------------------------
     def draw_values(self, count: int, *, seed: int, corrected: bool = True, within: Any = None) -> dict[str, Array]:
@@ -277,8 +277,8 @@ class Result(Shown, Generic[Model, Details]):
             covariance = self.covariance
         vague = [n for n, v in zip(self.names, np.diag(covariance), strict=True) if not 0.0 < v < np.inf]
         if vague or not self.names or not np.all(np.isfinite(covariance)):
-            told = "has no standard deviation." if vague else "knows no spread: nothing was free."
-            raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
+            problem = "has no standard deviation." if vague else "knows no spread: nothing was free."
+            raise IdentificationError(problem, where=where, channel=", ".join(vague) or None)
         low, high = bounds_of(self.solution if within is None else within, self.names)
         if self.posterior is not None and self.posterior.method != "laplace":
             both = (self.covariance, self.covariance_corrected) if corrected else None
@@ -301,9 +301,9 @@ class Result(Shown, Generic[Model, Details]):
         """
         if not hasattr(self.solution, "with_values"):
             raise IdentificationError("numbers of it cannot be drawn.", where=self.name)
-        made: Drawable = self.model
+        model: Drawable = self.model
         drawn = self.draw_values(count, seed=seed)
-        return tuple(made.with_values({name: float(v[k]) for name, v in drawn.items()}) for k in range(count))
+        return tuple(model.with_values({name: float(v[k]) for name, v in drawn.items()}) for k in range(count))
 
     # ---- files -------------------------------------------------------------------------------------------------
     def to_document(self, *, comparisons: bool = True) -> dict[str, Any]:
@@ -335,8 +335,8 @@ class Result(Shown, Generic[Model, Details]):
         responses = f", J_ave = {self.cost:.1f} over {len(self.costs)} responses" if self.costs else ""
         lines = [f"{self.name} by {self.method}: {self.state}{responses}"]
         lines += [f"  {text}" for text in self.settings.get("set by the choice", ())]
-        told = getattr(self.details, "lines", None)
-        lines += told(self) if told is not None else []
+        lines_of = getattr(self.details, "lines", None)
+        lines += lines_of(self) if lines_of is not None else []
         columns = [(head, cells) for head, cells in self.columns() if any(cells)]
         widths = [max(len(cell) for cell in (head, *cells)) for head, cells in columns]
         for row in range(-1, len(self.estimates)):

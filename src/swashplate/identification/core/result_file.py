@@ -89,14 +89,14 @@ def from_document(
         if name not in _SPECIAL:
             table[name] = decode(hints[name], document[name], where=where, at=name)
     details = document["details"]
-    made: Result[Any, Any] = Result(
+    result: Result[Any, Any] = Result(
         **table,
         solution=model_from(document["model"], where=where, at="model", equations=equations),
         start=model_from(document["start"], where=where, at="start", equations=equations),
         details=None if details is None else part(details, where=where, at="details"),
     )
-    _check(made, where)
-    return made
+    _check(result, where)
+    return result
 
 
 def save(result: Result[Any, Any], path: str | os.PathLike[str]) -> Path:

@@ -138,8 +138,8 @@ class Solver:
 
     def after(self, done: int) -> Solver:
         """The same, which counts its iterations on from so many."""
-        told = self.progress
-        return replace(self, progress=told and (lambda iteration, cost: told(done + iteration, cost)))
+        report = self.progress
+        return replace(self, progress=report and (lambda iteration, cost: report(done + iteration, cost)))
 
     def steps(self, row: Row, cost: Callable[[Array], float]) -> Steps:
         """How far each step goes: `variance_steps` where variances are among the entries, else `damped_steps`."""

@@ -82,8 +82,8 @@ def scale_words(data: Iterable[DataSource]) -> tuple[str, ...]:
 
 def problem_words(data: Iterable[DataSource]) -> tuple[str, ...]:
     """What else is wrong with the data: a line for each log."""
-    told = {_log(one): "; ".join(each.text.rstrip(".") for each in one.problems if not each.scale) for one in data}
-    return tuple(f"{log}: {text}." for log, text in told.items() if text)
+    problems = {_log(one): "; ".join(each.text.rstrip(".") for each in one.problems if not each.scale) for one in data}
+    return tuple(f"{log}: {text}." for log, text in problems.items() if text)
 
 
 def _log(data: DataSource) -> str:
@@ -101,10 +101,10 @@ def hashes(flights: Iterable[Flight]) -> dict[str, dict[str, Any]]:
     by_name: dict[str, dict[str, Any]] = {}
     for flight in flights:
         name = flight.provenance.source or "flight"
-        own: dict[str, Any] = {"sha256": flight.provenance.sha256, "signals": _signals(flight)}
-        before = by_name.get(name, own)
+        hashed: dict[str, Any] = {"sha256": flight.provenance.sha256, "signals": _signals(flight)}
+        before = by_name.get(name, hashed)
         problems = [*before.get("problems", ()), *(asdict(problem) for problem in flight.provenance.problems)]
-        by_name[name] = {key: value if before[key] == value else "" for key, value in own.items()}
+        by_name[name] = {key: value if before[key] == value else "" for key, value in hashed.items()}
         if problems:
             by_name[name]["problems"] = [one for i, one in enumerate(problems) if one not in problems[:i]]
     return by_name
@@ -115,14 +115,14 @@ _INTERVAL = re.compile(r"(?P<name>.+) -?[\d.]+-+[\d.]+ s")
 
 def sources_named(names: Iterable[str], known: Mapping[str, Mapping[str, Any]]) -> tuple[DataSource, ...]:
     """Records ("log 3.00-9.00 s" each) with the hashes of their flights, of `hashes`."""
-    made = []
+    sources = []
     for name in names:
         match = _INTERVAL.fullmatch(name)
-        own = known.get(name if match is None else match["name"], {})
-        problems = tuple(Problem(each["text"], tuple(each["scale"])) for each in own.get("problems", ()))
-        sha256, signals = (str(own.get(key, "")) for key in ("sha256", "signals"))
-        made.append(DataSource(name, sha256=sha256, signals=signals, problems=problems))
-    return tuple(made)
+        source = known.get(name if match is None else match["name"], {})
+        problems = tuple(Problem(each["text"], tuple(each["scale"])) for each in source.get("problems", ()))
+        sha256, signals = (str(source.get(key, "")) for key in ("sha256", "signals"))
+        sources.append(DataSource(name, sha256=sha256, signals=signals, problems=problems))
+    return tuple(sources)
 
 
 def _signals(flight: Flight) -> str:

@@ -36,7 +36,7 @@ class Stop:
     keeps: bool = False
 
     @property
-    def words(self) -> str:
+    def sentence(self) -> str:
         """What stopped it, empty where nothing did."""
         if not self.code:
             return ""
@@ -104,13 +104,13 @@ def keep(interrupt: BaseException) -> None:
 def unfinished() -> str:
     """Why a search that has not converged ended."""
     stop = _STOP.get()
-    return stop.words if stop is not None and stop.code else RAN_OUT
+    return stop.sentence if stop is not None and stop.code else RAN_OUT
 
 
-def told(fit: Result[Any, Any]) -> Result[Any, Any]:
+def with_stop(fit: Result[Any, Any]) -> Result[Any, Any]:
     """The fit, with the stop among its problems where there was one."""
     stop = _STOP.get()
     if stop is None or not stop.code:
         return fit
-    others = tuple(text for text in fit.problems if text != stop.words)
-    return replace(fit, converged=False, problems=(stop.words, *others))
+    others = tuple(text for text in fit.problems if text != stop.sentence)
+    return replace(fit, converged=False, problems=(stop.sentence, *others))

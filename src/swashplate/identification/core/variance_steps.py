@@ -125,18 +125,18 @@ class VarianceSteps:
     def _scored(self, at: Point) -> Promise:
         """The information in the variances, by steps of the row: half the relative change of a variance per step."""
         information, prior = at.information[0], at.information[1] - at.information[0]
-        own = self._row.prior(at.row)[1]
-        pull = at.gradient - own
+        by_prior = self._row.prior(at.row)[1]
+        pull = at.gradient - by_prior
 
         def promise(step: Array) -> tuple[float, Array, Array]:
-            moved, slope = step.copy(), np.ones_like(step)
-            moved[self._variance] = 0.5 * np.expm1(2.0 * step[self._variance])
-            slope[self._variance] = 1.0 + 2.0 * moved[self._variance]
-            push = slope * (pull + information @ moved)
+            scaled, slope = step.copy(), np.ones_like(step)
+            scaled[self._variance] = 0.5 * np.expm1(2.0 * step[self._variance])
+            slope[self._variance] = 1.0 + 2.0 * scaled[self._variance]
+            push = slope * (pull + information @ scaled)
             bent = np.where(self._variance, np.maximum(2.0 * push, 0.0), 0.0)
             hessian = information * np.outer(slope, slope) + prior + np.diag(bent)
-            change = pull @ moved + 0.5 * moved @ information @ moved + own @ step + 0.5 * step @ prior @ step
-            return float(change), push + own + prior @ step, hessian
+            change = pull @ scaled + 0.5 * scaled @ information @ scaled + by_prior @ step + 0.5 * step @ prior @ step
+            return float(change), push + by_prior + prior @ step, hessian
 
         return promise
 

@@ -77,11 +77,11 @@ def best_powers(
             weights /= weights.sum()
         gain = np.maximum(weights @ np.array(gains), 0.0)
         for axis in range(axes):
-            own = owner == axis
-            moved = power[own] * np.sqrt(gain[own])  # the square root converges for A too, and hardly slower for D
-            total_moved = moved.sum()
+            mask = owner == axis
+            share = power[mask] * np.sqrt(gain[mask])  # the square root converges for A too, and hardly slower for D
+            total_moved = share.sum()
             if total_moved > 0.0:
-                power[own] = allowed[axis] * moved / total_moved
+                power[mask] = allowed[axis] * share / total_moved
     return np.asarray(power)
 
 
@@ -211,9 +211,9 @@ def line_information(model: Sensed, frequency: Array, inputs: Complex, noise: No
     resolvent = _resolvent(model, w)
     states = np.einsum("fij,jk,fk->fi", resolvent, model.B, inputs)
     pushed = np.einsum("ijp,fj->fip", model.dA, states) + np.einsum("imp,fm->fip", model.dB, inputs)
-    seen = np.einsum("fij,fjp->fip", resolvent, pushed)
-    late = (-1j * w[:, None] * states)[:, :, None]
-    slopes = np.concatenate([seen, late], axis=2)[:, model.outputs]
+    states_by = np.einsum("fij,fjp->fip", resolvent, pushed)
+    by_delay = (-1j * w[:, None] * states)[:, :, None]
+    slopes = np.concatenate([states_by, by_delay], axis=2)[:, model.outputs]
     weighed = np.linalg.solve(output_noise(model, frequency, noise, rate=rate), slopes)
     return np.asarray(0.5 * np.einsum("fip,fiq->fpq", slopes.conj(), weighed).real)
 
@@ -229,7 +229,7 @@ def bounds_from(information: Array) -> Array:
     scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
     scaled = total / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
-    told = values > _TOLD
-    variance = np.sum(vectors[:, told] ** 2 / values[told], axis=1)
-    variance[np.any(vectors[:, ~told] ** 2 > _PART, axis=1)] = np.inf
+    known = values > _TOLD
+    variance = np.sum(vectors[:, known] ** 2 / values[known], axis=1)
+    variance[np.any(vectors[:, ~known] ** 2 > _PART, axis=1)] = np.inf
     return np.asarray((np.sqrt(variance) / scale)[:-1])

@@ -84,16 +84,16 @@ def accuracy_of_fit(cost: ResponseCost, row: Array) -> FitAccuracy:
     covariance = error_covariance(targets, known=known) * np.outer(weight, weight)
     spread = np.sqrt(np.diag(covariance))
     size = np.sqrt(np.sum(slopes**2, axis=0))
-    seen = np.isfinite(size) & (size > 0.0)
-    normal = slopes[:, seen] / size[seen]
+    sized = np.isfinite(size) & (size > 0.0)
+    normal = slopes[:, sized] / size[sized]
     values, vectors = np.linalg.eigh(normal.T @ normal)
-    told = values > _UNSEEN
-    inverse = (vectors[:, told] / values[told]) @ vectors[:, told].T
+    well = values > _UNSEEN
+    inverse = (vectors[:, well] / values[well]) @ vectors[:, well].T
 
     # What such errors leave after a fit to them: the diagonal of P C P with P = 1 - S (S'S)^-1 S'.
-    moved, taken = covariance @ normal, normal @ inverse
-    left = np.diag(covariance) - 2.0 * np.sum(moved * taken, axis=1)
-    left = np.maximum(left + np.sum((taken @ (normal.T @ moved)) * taken, axis=1), 0.0)
+    weighted, taken = covariance @ normal, normal @ inverse
+    left = np.diag(covariance) - 2.0 * np.sum(weighted * taken, axis=1)
+    left = np.maximum(left + np.sum((taken @ (normal.T @ weighted)) * taken, axis=1), 0.0)
     of = np.tile(np.repeat(np.arange(len(targets)), [t.omega.size for t in targets]), 2)
     missed, expected = (np.bincount(of, part / spread**2) for part in (residual**2, left))
     unit = covariance / np.outer(spread, spread)
@@ -102,19 +102,19 @@ def accuracy_of_fit(cost: ResponseCost, row: Array) -> FitAccuracy:
     factor = np.sqrt(_counted(misfit, freedom, given=GIVEN if known else 0.0))[of]
 
     score = normal.T @ (covariance * np.outer(factor, factor)) @ normal
-    bound = inverse @ score @ inverse + (vectors[:, ~told] / _UNSEEN) @ vectors[:, ~told].T
-    units = cost.row.scale[seen] / size[seen]
-    whole, alone = np.zeros((seen.size, seen.size)), np.full(seen.size, np.inf)
-    np.fill_diagonal(whole, np.inf)
-    whole[np.ix_(seen, seen)] = bound * np.outer(units, units)
-    alone[seen] = np.sqrt(np.diag(score)) * np.abs(units)
+    bound = inverse @ score @ inverse + (vectors[:, ~well] / _UNSEEN) @ vectors[:, ~well].T
+    units = cost.row.scale[sized] / size[sized]
+    joint, alone = np.zeros((sized.size, sized.size)), np.full(sized.size, np.inf)
+    np.fill_diagonal(joint, np.inf)
+    joint[np.ix_(sized, sized)] = bound * np.outer(units, units)
+    alone[sized] = np.sqrt(np.diag(score)) * np.abs(units)
     names = [entry.name for entry in cost.row.entries]
     directions = ()
-    if seen.all():
+    if sized.all():
         directions = blind_directions(names, np.linalg.pinv(bound / np.outer(size, size), hermitian=True))
     shared = all(t.shared is not None for t in targets)
     warnings = () if known and shared else (NOT_SHARED,) if known else (NO_ERRORS,)
-    return FitAccuracy(whole, alone, misfit, directions, warnings)
+    return FitAccuracy(joint, alone, misfit, directions, warnings)
 
 
 def _rows(targets: Sequence[Target]) -> NDArray[np.int64]:

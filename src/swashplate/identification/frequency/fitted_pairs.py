@@ -52,8 +52,8 @@ class PairChoice:
 
     def band_of(self, output: str, input: str) -> Band | None:
         """Limits of a pair [Hz]."""
-        own = {name.replace(" ", ""): limits for name, limits in self.bands.items()}
-        return next((own[name] for name in (f"{output}/{input}", input, output) if name in own), self.band)
+        by_pair = {name.replace(" ", ""): limits for name, limits in self.bands.items()}
+        return next((by_pair[name] for name in (f"{output}/{input}", input, output) if name in by_pair), self.band)
 
     def leaves_out(self, output: str, input: str) -> bool:
         """Whether a pair is not used."""
@@ -93,11 +93,11 @@ class PairChoice:
             for name in shared_in:
                 if self.leaves_out(output, name):
                     continue
-                own = self.band_of(output, name)
-                one = target(responses, output, name, band=own, least=self.least_coherence)
+                band = self.band_of(output, name)
+                one = target(responses, output, name, band=band, least=self.least_coherence)
                 if one is None:
                     missing.append(f"{output} / {name}")
-                    limit = ceiling(responses, output, name, band=own)
+                    limit = ceiling(responses, output, name, band=band)
                     ceilings += [] if limit is None else [limit]
                 else:
                     targets.append(one)

@@ -55,8 +55,8 @@ class Foresight:
         self, model: StateSpaceModel, targets: Sequence[Target], *, offered: Iterable[str], spread: float
     ) -> None:
         self._points, self._spread = sum(t.omega.size for t in targets), spread
-        own = composition.parts_of(str(model.document["composed"]))
-        twin = self._twin(model, own, offered)
+        parts = composition.parts_of(str(model.document["composed"]))
+        twin = self._twin(model, parts, offered)
         free = (*model.free, *(name for group in self.numbers.values() for name in group))
         errors, slopes = _weighed(twin, free, targets)
         size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
@@ -65,25 +65,25 @@ class Foresight:
         self._errors = errors - known @ (known.T @ errors)
         rest = slopes[:, len(model.free) :]
         rest = rest - known @ (known.T @ rest)
-        told = np.linalg.norm(rest, axis=0) > _TOLD
+        acts = np.linalg.norm(rest, axis=0) > _TOLD
         places = np.cumsum([0, *(len(group) for group in self.numbers.values())])
         self._columns = {
-            name: rest[:, a:b][:, told[a:b]] for name, a, b in zip(self.numbers, places, places[1:], strict=False)
+            name: rest[:, a:b][:, acts[a:b]] for name, a, b in zip(self.numbers, places, places[1:], strict=False)
         }
         self._columns = {name: columns for name, columns in self._columns.items() if columns.size}
 
-    def _twin(self, model: StateSpaceModel, own: tuple[str, ...], offered: Iterable[str]) -> StateSpaceModel:
+    def _twin(self, model: StateSpaceModel, present: tuple[str, ...], offered: Iterable[str]) -> StateSpaceModel:
         """The model with everything that it lacks, of which each does next to nothing; and whose numbers are whose."""
-        parts = list(own)
+        parts = list(present)
         for name in offered:
             if name not in parts and not composition.nonsense([*parts, name]):
                 parts.append(name)
-        added = [name for name in parts if name not in own]
-        others = [name for name in DERIVATIVES if name not in own]
-        derivatives = [name for name in others if not composition.nonsense([*own, name])]
+        added = [name for name in parts if name not in present]
+        others = [name for name in DERIVATIVES if name not in present]
+        derivatives = [name for name in others if not composition.nonsense([*present, name])]
         pairs = composition.pairs_of(str(model.document["composed"]))
-        whole = structure(composition.PREFIX + "+".join([*parts, *derivatives, *pairs]))
-        twin = from_relative(whole, model)
+        widest = structure(composition.PREFIX + "+".join([*parts, *derivatives, *pairs]))
+        twin = from_relative(widest, model)
         taken = set(model.parameters)
         self.numbers: dict[str, tuple[str, ...]] = {}
         for name in (*added, *derivatives):
@@ -136,8 +136,8 @@ class Foresight:
                     continue
                 columns = self._columns[name]
                 left = columns if basis is None else columns - basis @ (basis.T @ columns)
-                own = _basis(left[:, np.linalg.norm(left, axis=0) > _TOLD])
-                fall = float(np.sum((own.T @ errors) ** 2))
+                span = _basis(left[:, np.linalg.norm(left, axis=0) > _TOLD])
+                fall = float(np.sum((span.T @ errors) ** 2))
                 more = self._worth(fall, [name])
                 if more > most:
                     best, most = name, more
@@ -175,8 +175,8 @@ def worths(model: StateSpaceModel, targets: Sequence[Target], *, spread: float) 
         if at:
             away = np.array([model.parameters[model.free[k]].value - absent[model.free[k]] for k in at]) * size[at]
             rise = float(away @ np.linalg.pinv(covariance[np.ix_(at, at)], hermitian=True) @ away)
-            own = len(_numbers_of(name)) if name in PARTS else 1
-            worth[name] = score(rise, -own, hidden=-hidden([name]), spread=spread, points=points)
+            count = len(_numbers_of(name)) if name in PARTS else 1
+            worth[name] = score(rise, -count, hidden=-hidden([name]), spread=spread, points=points)
     return worth
 
 

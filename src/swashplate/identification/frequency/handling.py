@@ -281,8 +281,8 @@ def _delay_margin(omega: Array, loop: Complex, error: Array | None) -> ReadNumbe
     if error is None or not value > 0.0:
         return ReadNumber(value)
     step = _STEP * error
-    moved = [_least_delay(omega, loop * np.exp(way * step)) for way in (1.0, -1.0, 1j, -1j)]
-    return ReadNumber(value, float(np.hypot(moved[0] - moved[1], moved[2] - moved[3]) / (2.0 * _STEP)))
+    stepped = [_least_delay(omega, loop * np.exp(way * step)) for way in (1.0, -1.0, 1j, -1j)]
+    return ReadNumber(value, float(np.hypot(stepped[0] - stepped[1], stepped[2] - stepped[3]) / (2.0 * _STEP)))
 
 
 def _least_delay(omega: Array, loop: Complex) -> float:

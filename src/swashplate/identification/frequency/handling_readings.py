@@ -117,8 +117,8 @@ class Line:
             return head + (_NO_LOOP if flew else f"delay margin {r.delay_in_words()}")
         if r is None:
             return head + self.problem
-        told = f"; {self.problem}" if self.problem else ""
-        return head + f"bandwidth {r.bandwidth!r} rad/s, phase delay {r.phase_delay_line!r} s{told}"
+        remark = f"; {self.problem}" if self.problem else ""
+        return head + f"bandwidth {r.bandwidth!r} rad/s, phase delay {r.phase_delay_line!r} s{remark}"
 
 
 def own_input(responses: FrequencyResponse, output: str) -> str | None:
@@ -130,10 +130,10 @@ def own_input(responses: FrequencyResponse, output: str) -> str | None:
         if band is not None:
             inside = (responses.omega >= band[0]) & (responses.omega <= band[1])
             gain = np.abs(responses.response[inside, o, i]) ** 2
-            power, whole = responses.input_power[inside, i], responses.output_power[inside, o]
+            power, total = responses.input_power[inside, i], responses.output_power[inside, o]
             # Responses from elsewhere (control.FRD) know no powers; then the gain decides.
-            known = np.isfinite(power).any() and np.isfinite(whole).any()
-            share = np.nansum(gain * power) / np.nansum(whole) if known else 1.0 + np.nanmean(gain)
+            known = np.isfinite(power).any() and np.isfinite(total).any()
+            share = np.nansum(gain * power) / np.nansum(total) if known else 1.0 + np.nanmean(gain)
             reached[name] = float(share)
     best = max(reached, key=lambda name: reached[name], default=None)
     return best if best is not None and reached[best] > OWN else None
@@ -150,8 +150,8 @@ def handling_lines(responses: FrequencyResponse, fits: Sequence[Fitted] = ()) ->
         try:
             omega, attitude, error, coherence = attitude_of(responses, rate, name)
             sign = _pilots(attitude)
-            flown = handling_qualities(omega, sign * attitude, error=error, coherence=coherence)
-            lines.append(Line(title, "flight", flown, _turned(sign, name, angle)))
+            qualities = handling_qualities(omega, sign * attitude, error=error, coherence=coherence)
+            lines.append(Line(title, "flight", qualities, _turned(sign, name, angle)))
         except IdentificationError as problem:
             lines.append(Line(title, "flight", None, problem.problem))
 
@@ -225,5 +225,5 @@ def _turned(sign: float, input: str, angle: str) -> str:
     """That a response was read with its sign turned, in words."""
     if sign > 0.0:
         return ""
-    told = f"read with its sign turned: a positive {input} makes {angle} negative"
-    return f"{told}, {'as its name says' if expected_sense(angle, input) < 0 else 'look at the units of both'}"
+    text = f"read with its sign turned: a positive {input} makes {angle} negative"
+    return f"{text}, {'as its name says' if expected_sense(angle, input) < 0 else 'look at the units of both'}"

@@ -71,8 +71,8 @@ def from_core(
     starts = {}
     for lag in LAGS if flaps else (0.0,):
         values = shared | (_rotor(known, lag) if flaps else {})
-        words = "regression on the core" + (f", tip-path plane of {lag:g} s" if flaps else "")
-        starts[words] = model.with_values({n: _within(model, n, v) for n, v in values.items() if n in model.free})
+        origin = "regression on the core" + (f", tip-path plane of {lag:g} s" if flaps else "")
+        starts[origin] = model.with_values({n: _within(model, n, v) for n, v in values.items() if n in model.free})
     return starts
 
 
@@ -111,9 +111,9 @@ def _out_of_the_delays(known: Mapping[str, float]) -> dict[str, float]:
     """Delays that are shorter by the actuators' lags, and lags that are no longer than their delays."""
     values: dict[str, float] = {}
     for lag in dict.fromkeys(SERVO.values()):
-        own = [f"tau_{SHORT[name]}" for name, servo in SERVO.items() if servo == lag and f"tau_{SHORT[name]}" in known]
-        values[lag] = min((known[lag], *(known[name] for name in own)))
-        values |= {name: known[name] - values[lag] for name in own}
+        lags = [f"tau_{SHORT[name]}" for name, servo in SERVO.items() if servo == lag and f"tau_{SHORT[name]}" in known]
+        values[lag] = min((known[lag], *(known[name] for name in lags)))
+        values |= {name: known[name] - values[lag] for name in lags}
     return values
 
 
@@ -168,8 +168,8 @@ def other_starts(
         for share, held in _lags_held(model).items():
             known = by_regression(held, responses, band=band)
             if known is not None:
-                words = f"regression with lags at {share:g} of their start values"
-                starts[words] = model.with_values({n: known.parameters[n].value for n in model.free})
+                origin = f"regression with lags at {share:g} of their start values"
+                starts[origin] = model.with_values({n: known.parameters[n].value for n in model.free})
     return {name: one for name, one in starts.items() if one is not None}
 
 
@@ -193,8 +193,8 @@ def by_regression(
     """
     if any(name not in responses.inputs for name in model.inputs):
         return None
-    seen = [o for o in model.outputs if o in responses.outputs]
-    part = responses.select(tuple(seen), model.inputs) if seen else None
+    measured = [o for o in model.outputs if o in responses.outputs]
+    part = responses.select(tuple(measured), model.inputs) if measured else None
     if part is None or model.free == ():
         return None
     low, high = (0.0, np.inf) if band is None else (2.0 * np.pi * band[0], 2.0 * np.pi * band[1])
@@ -204,7 +204,7 @@ def by_regression(
     if usable.size < LINES // 2:
         return None
     usable = usable[np.unique(np.linspace(0, usable.size - 1, LINES).astype(int))]
-    states, spread = _states(model, part, usable, [model.outputs.index(o) for o in seen])
+    states, spread = _states(model, part, usable, [model.outputs.index(o) for o in measured])
     if states is None:
         return None
     omega = part.omega[usable]
@@ -319,14 +319,14 @@ def by_controls(model: StateSpaceModel, targets: Sequence[Target]) -> StateSpace
     """
     changes: dict[str, float] = {}
     for i, name in enumerate(model.inputs):
-        own = [t for t in targets if t.input == name]
+        of_input = [t for t in targets if t.input == name]
         column = {
             e.expression.text.replace(" ", "").lstrip("-")
             for e in model.elements
             if e.matrix in ("G", "D") and e.column == i
         } & set(model.free)
         ratios = []
-        for t in own:
+        for t in of_input:
             h = model.response(t.omega)[:, model.outputs.index(t.output), i]
             if np.all(np.isfinite(h)) and np.all(np.abs(h) > 0.0):
                 ratio = t.measured / h

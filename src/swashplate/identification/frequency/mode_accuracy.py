@@ -71,9 +71,9 @@ def mode_accuracy(
     left = left.conj().T
     length = np.sum(left.T * right, axis=0)
     left = left / np.where(np.abs(length) > np.finfo(float).tiny, length, 1.0)[:, None]
-    moved = _moved(model, tuple(bounds), left, right)
-    told = np.isfinite(np.array(list(bounds.values())))
-    size = np.where(told, list(bounds.values()), 0.0)
+    slopes = _root_slopes(model, tuple(bounds), left, right)
+    known = np.isfinite(np.array(list(bounds.values())))
+    size = np.where(known, list(bounds.values()), 0.0)
     covariance = np.outer(size, size) * np.nan_to_num(correlation)
     modes = []
     for k in np.argsort(-np.abs(values), kind="stable"):
@@ -81,15 +81,15 @@ def mode_accuracy(
         if v.imag < 0.0 or abs(v) < _ORIGIN:
             continue
         # Of the modulus and of -Re / modulus.
-        frequency = (np.conj(v) * moved[k]).real / abs(v)
-        damping = -moved[k].real / abs(v) + v.real / abs(v) ** 2 * frequency
-        blind = bool(np.any(np.abs(moved[k][~told]) > 0.0))
+        frequency = (np.conj(v) * slopes[k]).real / abs(v)
+        damping = -slopes[k].real / abs(v) + v.real / abs(v) ** 2 * frequency
+        blind = bool(np.any(np.abs(slopes[k][~known]) > 0.0))
         bound = [np.inf if blind else float(np.sqrt(max(s @ covariance @ s, 0.0))) for s in (frequency, damping)]
         modes.append(ModeAccuracy(v, abs(v), -v.real / abs(v), bound[0], bound[1], bool(abs(v) >= lowest)))
     return tuple(modes)
 
 
-def _moved(model: StateSpaceModel, names: Sequence[str], left: Complex, right: Complex) -> Complex:
+def _root_slopes(model: StateSpaceModel, names: Sequence[str], left: Complex, right: Complex) -> Complex:
     """Derivatives of the eigenvalues by the parameters, shape (n_states, n_parameters)."""
     columns = []
     for name in names:

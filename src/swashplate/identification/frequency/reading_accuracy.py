@@ -80,47 +80,47 @@ def error_of(fit: Fitted, output: str, input: str, omega: Array) -> tuple[Comple
         _process(t.omega, r, noise[np.ix_(k, k)] + _loosened(fit, s))
         for t, r, s, k in zip(targets, residuals, slopes, rows, strict=True)
     ]
-    whole = noise.copy()
+    joint = noise.copy()
     for process, t, k in zip(processes, targets, rows, strict=True):
-        whole[np.ix_(k, k)] += process.covariance(t.omega, t.omega)
+        joint[np.ix_(k, k)] += process.covariance(t.omega, t.omega)
 
     at = omega if omega.size <= _KNOTS else np.geomspace(omega[0], omega[-1], _KNOTS)
-    own = [k for k, t in enumerate(targets) if (t.output, t.input) == (output, input)]
-    beside = np.zeros((2 * at.size, whole.shape[0]))
-    if own:
-        mine = processes[own[0]]
-        beside[:, rows[own[0]]] = mine.covariance(at, targets[own[0]].omega)
+    of_pair = [k for k, t in enumerate(targets) if (t.output, t.input) == (output, input)]
+    beside = np.zeros((2 * at.size, joint.shape[0]))
+    if of_pair:
+        mine = processes[of_pair[0]]
+        beside[:, rows[of_pair[0]]] = mine.covariance(at, targets[of_pair[0]].omega)
     else:  # nothing was measured there: as the form does elsewhere
         mine = Process(*(float(np.median([getattr(p, part) for p in processes])) for part in ("variance", "length")))
     order = np.concatenate(rows)
     left, trend = np.zeros(order.size), np.zeros((order.size, slopes[0].shape[1]))
     left[order], trend[order] = np.concatenate(residuals), np.concatenate(slopes)
-    mean, spread = _likely(whole, beside, mine.covariance(at, at), left, trend, _slopes(fit, output, input, at))
-    moved = np.column_stack([mean, _root(spread)])
-    moved = moved[: at.size] + 1j * moved[at.size :]
+    mean, spread = _likely(joint, beside, mine.covariance(at, at), left, trend, _slopes(fit, output, input, at))
+    columns = np.column_stack([mean, _root(spread)])
+    columns = columns[: at.size] + 1j * columns[at.size :]
     if at is not omega:
-        moved = np.stack([np.interp(np.log(omega), np.log(at), column) for column in moved.T], axis=1)
-    return moved[:, 0], moved[:, 1:]
+        columns = np.stack([np.interp(np.log(omega), np.log(at), column) for column in columns.T], axis=1)
+    return columns[:, 0], columns[:, 1:]
 
 
-def _likely(whole: Array, beside: Array, own: Array, left: Array, trend: Array, slopes: Array) -> tuple[Array, Array]:
+def _likely(joint: Array, beside: Array, prior: Array, left: Array, trend: Array, slopes: Array) -> tuple[Array, Array]:
     """Mean and covariance of the errors under the residuals `left`, with all of the trend's numbers free.
 
     Args:
-        whole, beside, own: covariances of residuals, of errors with residuals, and of errors.
+        joint, beside, prior: covariances of residuals, of errors with residuals, and of errors.
         trend, slopes: by the fit's numbers, at the residuals and at the errors.
     """
     size = np.maximum(np.linalg.norm(trend, axis=0), 1e-300)
     trend, slopes = trend / size, slopes / size
-    solved = np.linalg.solve(whole, np.column_stack([left, trend, beside.T]))
+    solved = np.linalg.solve(joint, np.column_stack([left, trend, beside.T]))
     by_left, by_trend, by_own = solved[:, 0], solved[:, 1 : 1 + size.size], solved[:, 1 + size.size :]
     values, vectors = np.linalg.eigh(trend.T @ by_trend)
-    seen = values > _UNSEEN * max(values.max(initial=0.0), 1e-300)
-    inverse = (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
+    kept = values > _UNSEEN * max(values.max(initial=0.0), 1e-300)
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
     numbers = inverse @ (trend.T @ by_left)
     beyond = slopes - beside @ by_trend
     mean = beside @ by_left + beyond @ numbers
-    return mean, own - beside @ by_own + beyond @ inverse @ beyond.T
+    return mean, prior - beside @ by_own + beyond @ inverse @ beyond.T
 
 
 def _process(omega: Array, left: Array, explained: Array) -> Process:
@@ -161,12 +161,12 @@ def _noise(targets: Sequence[Target], residuals: Sequence[Array], *, free: int) 
 
 def _loosened(fit: Fitted, slopes: Array) -> Array:
     """What the free numbers, loosened, make of one response: a covariance; what leaves no trace does not move."""
-    seen = np.isfinite(np.diag(fit.covariance))
-    covariance = np.where(np.outer(seen, seen), _FREE * fit.covariance, 0.0)
+    known = np.isfinite(np.diag(fit.covariance))
+    covariance = np.where(np.outer(known, known), _FREE * fit.covariance, 0.0)
     reach = np.abs(slopes).max(axis=0) * np.sqrt(np.diag(covariance))
-    moved = slopes * np.minimum(1.0, _MOST / np.maximum(reach, 1e-300))
-    made = moved @ covariance @ moved.T
-    return np.asarray(made + _EVEN * np.max(np.diag(made), initial=0.0) * np.eye(made.shape[0]))
+    bounded = slopes * np.minimum(1.0, _MOST / np.maximum(reach, 1e-300))
+    loosened = bounded @ covariance @ bounded.T
+    return np.asarray(loosened + _EVEN * np.max(np.diag(loosened), initial=0.0) * np.eye(loosened.shape[0]))
 
 
 def _slopes(fit: Fitted, output: str, input: str, omega: Array) -> Array:
@@ -220,11 +220,11 @@ def has_pair(fit: Fitted, output: str, input: str) -> bool:
 
 def answers(fit: Fitted, output: str, input: str, omega: Array) -> Answers:
     """A response of a fitted model with the standard deviations of its gain and phase."""
-    h, error, moved = _errors(fit, output, input, omega)
-    if not moved.shape[1]:
+    h, error, deviations = _errors(fit, output, input, omega)
+    if not deviations.shape[1]:
         return Answers(omega, h, *[np.full(omega.size, np.nan)] * 2)
-    moved = np.column_stack([error, moved])
-    return Answers(omega, h, np.sqrt((moved.real**2).sum(axis=1)), np.sqrt((moved.imag**2).sum(axis=1)))
+    deviations = np.column_stack([error, deviations])
+    return Answers(omega, h, np.sqrt((deviations.real**2).sum(axis=1)), np.sqrt((deviations.imag**2).sum(axis=1)))
 
 
 def spread(fit: Fitted, output: str, input: str, omega: Array, read: Callable[[Complex], Array]) -> tuple[Array, Array]:
@@ -271,6 +271,6 @@ def _errors(fit: Fitted, output: str, input: str, omega: Array) -> tuple[Complex
 
 def _fit_root(fit: Fitted) -> Array:
     """L with L L' = the covariance of the parameters; one that is not seen at all does not move."""
-    seen = np.isfinite(np.diag(fit.covariance))
-    values, vectors = np.linalg.eigh(np.where(np.outer(seen, seen), fit.covariance, 0.0))
+    known = np.isfinite(np.diag(fit.covariance))
+    values, vectors = np.linalg.eigh(np.where(np.outer(known, known), fit.covariance, 0.0))
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

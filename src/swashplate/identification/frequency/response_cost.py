@@ -136,11 +136,11 @@ def target(
     omega, log = responses.omega[known], np.log(np.abs(h[known])) + 1j * np.unwrap(np.angle(h[known]))
     at = np.geomspace(omega[0], omega[-1], points)
     log_at = np.interp(np.log(at), np.log(omega), log.real) + 1j * np.interp(np.log(at), np.log(omega), log.imag)
-    seen, sure = (np.interp(np.log(at), np.log(omega), column[known]) for column in (coherence, error))
+    coherent, sure = (np.interp(np.log(at), np.log(omega), column[known]) for column in (coherence, error))
     shared = None
     if responses.shared is not None:
         shared = responses.shared.at(at, responses.omega, *responses.place(output, input))
-    return Target(output, input, at, np.exp(log_at), seen, error=sure, shared=shared)
+    return Target(output, input, at, np.exp(log_at), coherent, error=sure, shared=shared)
 
 
 def ceiling(

@@ -35,14 +35,14 @@ def under_names_of(
             channel=taken[0],
             hint="Give --rename for a name that the responses do not have.",
         )
-    words, twins = [], {}
+    notes, twins = [], {}
     for name in model.outputs:
         other = name.removesuffix(TWIN) if name.endswith(TWIN) else name + TWIN
         if name in (*responses.outputs, *given) or other not in responses.outputs or other in given.values():
             continue
         if other not in model.outputs:
             twins[name] = other
-            words.append(f"the responses' '{other}' is taken as the model's '{name}'.")
+            notes.append(f"the responses' '{other}' is taken as the model's '{name}'.")
     changed = {source: name for name, source in (given | twins).items()}
     known = dict(responses.settings.get("channels", {}))
     channels = known | {name: known.get(source, source) for source, name in changed.items()}
@@ -52,12 +52,12 @@ def under_names_of(
         inputs=tuple(changed.get(name, name) for name in responses.inputs),
         settings={**responses.settings, **({"channels": channels} if changed else {})},
     )
-    words += [
+    notes += [
         f"the responses' '{name}' is not fitted: the model has no such output. {hint}"
         for name in called.outputs
         if name not in model.outputs and (hint := _hint(name, model, called))
     ]
-    return called, tuple(words)
+    return called, tuple(notes)
 
 
 def _hint(name: str, model: StateSpaceModel, responses: FrequencyResponse) -> str:

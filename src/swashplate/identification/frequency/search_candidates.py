@@ -46,9 +46,9 @@ def cores(responses: FrequencyResponse) -> list[tuple[str, ...]]:
     if cyclic:
         candidates.append(("body",))
         axes = ("cyclic", *heave, *yaw)
-        seen = {state for part in axes for state in PARTS[part].states} | {"az"}
-        moved = _CYCLIC | ({"collective"} if heave or yaw else set()) | ({"pedal"} if yaw else set())
-        if outputs <= seen and inputs <= moved:  # compared on the same responses
+        measured = {state for part in axes for state in PARTS[part].states} | {"az"}
+        driven = _CYCLIC | ({"collective"} if heave or yaw else set()) | ({"pedal"} if yaw else set())
+        if outputs <= measured and inputs <= driven:  # compared on the same responses
             candidates.append(axes)
     elif heave or yaw:
         candidates.append((*heave, *yaw))
@@ -67,8 +67,8 @@ _LIKELY = {"roll": "lateral", "pitch": "longitudinal", "yaw": "pedal", "collecti
 
 def _renaming(inputs: Sequence[str]) -> str:
     """`--rename` for channels whose names tell their axis, such as `mixer_roll`; otherwise its form."""
-    told = {ours: name for name in inputs for axis, ours in _LIKELY.items() if name.endswith(axis) and name != ours}
-    return f"--rename {','.join(f'{ours}={name}' for ours, name in told.items()) or 'lateral=CHANNEL'}"
+    renamed = {ours: name for name in inputs for axis, ours in _LIKELY.items() if name.endswith(axis) and name != ours}
+    return f"--rename {','.join(f'{ours}={name}' for ours, name in renamed.items()) or 'lateral=CHANNEL'}"
 
 
 def offered(responses: FrequencyResponse) -> tuple[str, ...]:
@@ -87,7 +87,7 @@ def offered(responses: FrequencyResponse) -> tuple[str, ...]:
         "torque": "collective" in inputs and "r" in outputs,
         "gyro": "pedal" in inputs and "r" in outputs,
     }
-    return tuple(name for name, seen in shown.items() if seen)
+    return tuple(name for name, visible in shown.items() if visible)
 
 
 def preferred(parts: Iterable[str]) -> list[str]:
@@ -99,9 +99,9 @@ def named(parts: Iterable[str]) -> list[str]:
     """The same with derivatives that are a part together by that part's name."""
     given = set(parts)
     for name in _PAIRS:
-        own = {text for terms in PARTS[name].equations.values() for text in terms.values()}
-        if own <= given:
-            given = (given - own) | {name}
+        texts = {text for terms in PARTS[name].equations.values() for text in terms.values()}
+        if texts <= given:
+            given = (given - texts) | {name}
     return list(in_order(given))
 
 
@@ -113,8 +113,8 @@ def joining(parts: Sequence[str], silent: Iterable[tuple[str, str]]) -> list[str
     """
     flaps = any("a" in PARTS[name].states for name in parts if name in PARTS)
     tilt = {"longitudinal": "a", "lateral": "b"} if flaps else {}
-    made = (derivative_of(_ROWS.get(output, output), tilt.get(name, name)) for output, name in silent)
-    return list(dict.fromkeys(made))
+    derivatives = (derivative_of(_ROWS.get(output, output), tilt.get(name, name)) for output, name in silent)
+    return list(dict.fromkeys(derivatives))
 
 
 def contains(parts: Sequence[str], others: Sequence[str]) -> bool:

@@ -33,9 +33,9 @@ def reasons(pick: Contender, others: Sequence[Contender], leaner: Mapping[str, C
     for one in [c for c in others if not leaner and not c.abandoned][:_NAMED]:
         name, before, after = _worst_loss(pick, one)
         lines.append(f"  {one.name}: J_ave {one.cost:.1f}; {name} {after:.0f} instead of {before:.0f}.")
-    own = set(pick.name.split("+"))
+    parts = set(pick.name.split("+"))
     failed = [c for c in (pick, *others) if c.failed]
-    vain = [(c, set(c.name.split("+")) - own) for c in others if own < set(c.name.split("+")) and not c.failed]
+    vain = [(c, set(c.name.split("+")) - parts) for c in others if parts < set(c.name.split("+")) and not c.failed]
     added = list(dict.fromkeys(name for _, more in vain for name in sorted(more) if len(more) == 1))
     if added:
         lines.append(f"  nothing gained that is worth the parameters: {', '.join(added)}.")
@@ -60,7 +60,7 @@ def _worst_loss(pick: Contender, one: Contender) -> tuple[str, float, float]:
     """The response that loses most, with its J in both."""
     other = dict(zip((t.name for t in one.fit.targets), one.fit.costs, strict=True))
     both = zip(pick.fit.targets, pick.fit.costs, strict=True)
-    pairs = [(t.name, own, other[t.name]) for t, own in both if t.name in other] or [("nothing shared", 0.0, 0.0)]
+    pairs = [(t.name, cost, other[t.name]) for t, cost in both if t.name in other] or [("nothing shared", 0.0, 0.0)]
     return max(pairs, key=lambda pair: pair[2] - pair[1])
 
 
@@ -147,10 +147,10 @@ class StructureSearch:
         for c in self.tried:
             name, bound = c.vaguest
             vague = "" if c.abandoned else f"{percent(bound).strip()} ({name})"
-            seen = f"{c.held_out:.2f}" if np.isfinite(c.held_out) else ""
+            ahead = f"{c.held_out:.2f}" if np.isfinite(c.held_out) else ""
             modes = "abandoned after the first look" if c.abandoned else c.modes
             modes = f"its fit failed: {c.failed}, which it contains, fits better" if c.failed else modes
-            table.append((c.name, f"{c.cost:.1f}", f"{max(c.fit.costs):.0f}", str(c.parameters), vague, seen, modes))
+            table.append((c.name, f"{c.cost:.1f}", f"{max(c.fit.costs):.0f}", str(c.parameters), vague, ahead, modes))
         return table if self.judged else [(*row[:5], *row[6:]) for row in table]
 
     def to_document(self) -> dict[str, object]:

@@ -82,8 +82,8 @@ def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpace
         parameter = model.parameters[name]
         value = sign * float(number) * left.get((e.row, e.row), 1.0)
         starts[name] = float(np.clip(value, parameter.lower, parameter.upper))
-    flown = linear.trim.states()
-    starts |= {name: flown[state] for state, name in model.trim.items() if state in flown}
+    trimmed = linear.trim.states()
+    starts |= {name: trimmed[state] for state, name in model.trim.items() if state in trimmed}
     return model.with_values(starts)
 
 
@@ -95,12 +95,12 @@ def at_flown_trim(model: StateSpaceModel, responses: FrequencyResponse) -> State
     """
     means = {name: value for name, value in responses.settings.get("means", {}).items() if np.isfinite(value)}
     about = {name: means[state] for state, name in model.trim.items() if state in means}
-    moved = model.with_values({n: v for n, v in about.items() if model.parameters[n].value == 0.0})
-    told = model.document.get("trim")
-    if not told:
-        return moved
-    inputs = {name: repr(float(means[name])) for name in model.inputs if name in means and name not in told}
-    return replace(moved, document={**moved.document, "trim": {**told, **inputs}})
+    trimmed = model.with_values({n: v for n, v in about.items() if model.parameters[n].value == 0.0})
+    trim = model.document.get("trim")
+    if not trim:
+        return trimmed
+    inputs = {name: repr(float(means[name])) for name in model.inputs if name in means and name not in trim}
+    return replace(trimmed, document={**trimmed.document, "trim": {**trim, **inputs}})
 
 
 def _time_constants(model: StateSpaceModel, states: Sequence[str], a: Array) -> dict[str, float]:
@@ -148,10 +148,10 @@ def from_models(
                 if {output} <= {*model.outputs} & {*responses.outputs} and {name} <= {*model.inputs} & {
                     *responses.inputs
                 }:
-                    seen = target(responses, output, name)
-                    if seen is not None:
-                        h = one.response(seen.omega)[:, o, i]
-                        targets.append(Target(output, name, seen.omega, h, np.ones(seen.omega.size)))
+                    measured = target(responses, output, name)
+                    if measured is not None:
+                        h = one.response(measured.omega)[:, o, i]
+                        targets.append(Target(output, name, measured.omega, h, np.ones(measured.omega.size)))
     return _matched(model, targets, seed=seed)
 
 

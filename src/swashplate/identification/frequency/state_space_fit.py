@@ -26,7 +26,7 @@ from swashplate.identification.frequency.response_cost import (
     Target,
     followed,
 )
-from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit, words
+from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit, fit_warnings
 from swashplate.identification.frequency.state_space_search import STARTED, best_below, better_start, pairs_of
 from swashplate.identification.frequency.structure_score import misfit_words
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
@@ -147,9 +147,9 @@ def fit_targets(
     )
     numbers = optimum.row * cost.row.scale
     accuracy = accuracy_of_fit(cost, optimum.row)
-    told = zip(model.free, map(float, accuracy.sigma), map(float, accuracy.insensitivity), strict=True)
+    sizes = zip(model.free, map(float, accuracy.sigma), map(float, accuracy.insensitivity), strict=True)
     fitted = model.with_values(dict(zip(model.free, map(float, numbers), strict=True))).with_bounds(
-        {name: (sigma, alone) for name, sigma, alone in told}
+        {name: (sigma, alone) for name, sigma, alone in sizes}
     )
     every = cost.each(optimum.row)
     costs = tuple(every[: len(targets)])
@@ -169,7 +169,7 @@ def fit_targets(
     )
     warnings += unit_words(model)
     warnings += misfit_words(fitted, targets, advise=advise)
-    warnings += words(
+    warnings += fit_warnings(
         targets, costs, estimates, accuracy.correlation, at_bound=optimum.at_bound, converged=optimum.converged
     )
     warnings += accuracy.warnings
@@ -216,8 +216,8 @@ def fit_targets(
 
 def unmoved_inputs(responses: FrequencyResponse) -> list[str]:
     """Inputs of which the responses say that nothing moved them from outside."""
-    told, channels = responses.settings.get("excitation", {}), responses.settings.get("channels", {})
-    kinds = {name: told.get(name, told.get(channels.get(name), {})).get("kind") for name in responses.inputs}
+    excited, channels = responses.settings.get("excitation", {}), responses.settings.get("channels", {})
+    kinds = {name: excited.get(name, excited.get(channels.get(name), {})).get("kind") for name in responses.inputs}
     return [name for name, kind in kinds.items() if kind is not None and kind not in OUTSIDE]
 
 
@@ -231,14 +231,14 @@ def _traces(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[tuple[st
     """Free parameters without a trace in any fitted response, and how large each response is, at the start and a shaken
     one."""
     random = np.random.default_rng(1)
-    seen, heard = np.zeros(len(model.free)), np.zeros(len(targets))
+    traces, heard = np.zeros(len(model.free)), np.zeros(len(targets))
     for shake in (0.0, 0.1):
         values = np.array([model.parameters[n].value for n in model.free])
         values = values * (1.0 + shake * random.standard_normal(values.size)) + (values == 0.0) * shake * 0.1
         answers, slopes = model.sensitivities(model.free, values, pairs_of(model, targets))
         heard += [np.nan_to_num(np.abs(h), nan=1.0).max() for h in answers]
-        seen += np.sum([np.nan_to_num(np.abs(s)).max(axis=0) for s in slopes], axis=0)
-    return tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12), heard
+        traces += np.sum([np.nan_to_num(np.abs(s)).max(axis=0) for s in slopes], axis=0)
+    return tuple(name for name, trace in zip(model.free, traces, strict=True) if trace < 1e-12), heard
 
 
 def _start_problems(model: StateSpaceModel) -> list[str]:

@@ -24,7 +24,7 @@ ONE = 0.995
 """Correlation of two parameters above which the responses tell one number of the two."""
 
 
-def words(
+def fit_warnings(
     targets: Sequence[Target],
     costs: Sequence[float],
     parameters: Sequence[Estimate],

@@ -77,11 +77,11 @@ def candidates(parts: Sequence[str], missed: Sequence[tuple[str, str]]) -> dict[
         others = [p for p in parts if not (name == "flap" and p == "flap_decoupled")]
         if nonsense([*others, name]):
             continue
-        own = [f"{o} / {i}" for o, i in missed if o in outputs and (not inputs or i in inputs)]
+        pairs = [f"{o} / {i}" for o, i in missed if o in outputs and (not inputs or i in inputs)]
         if name == "flap" and "flap_decoupled" in parts:
-            own = [f"{o} / {i}" for o, i in missed if o in _TURNING and (o, i) not in _CYCLIC]
-        if own:
-            lacking[name] = own
+            pairs = [f"{o} / {i}" for o, i in missed if o in _TURNING and (o, i) not in _CYCLIC]
+        if pairs:
+            lacking[name] = pairs
     return lacking
 
 
@@ -107,8 +107,8 @@ def lacking_words(model: StateSpaceModel, missed: Sequence[str]) -> str:
     if composed := str(model.document.get("composed", "")):
         first = best[0]
         kept = [p for p in parts if not (first == "flap" and p == "flap_decoupled")]
-        whole = [*(p for p in PARTS if p in (*kept, first)), *pairs_of(composed)]
-        text += f" Try {PREFIX}{'+'.join(whole)}, or --search."
+        tried = [*(p for p in PARTS if p in (*kept, first)), *pairs_of(composed)]
+        text += f" Try {PREFIX}{'+'.join(tried)}, or --search."
     else:
         text += " Compose one with it (swash vehicle structures), or let --search find the parts."
     return text

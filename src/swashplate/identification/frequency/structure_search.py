@@ -104,8 +104,8 @@ class _Search:
                 return known
             starts["itself"] = known.fit.solution
         if known is None and all(one.cost > ACCEPTABLE for one in like):
-            own = from_core(model, self.responses, band=self.choice.band, regressed=self.regressed)
-            starts |= {name: led(one, every) for name, one in {"": model, **own}.items()}
+            by_core = from_core(model, self.responses, band=self.choice.band, regressed=self.regressed)
+            starts |= {name: led(one, every) for name, one in {"": model, **by_core}.items()}
         self.say(model.name)
         fit = fit_targets(
             model,
@@ -126,8 +126,8 @@ class _Search:
 
     def followed(self, best: Contender, others: Iterable[Sequence[str]]) -> Contender:
         """The best of a structure and of others that are begun where it has ended; the best of them to its end."""
-        seen = self.looks([self.composed(parts) for parts in others], like=[best], iterations=LOOK)
-        first = self.best([best, *seen])
+        fits = self.looks([self.composed(parts) for parts in others], like=[best], iterations=LOOK)
+        first = self.best([best, *fits])
         return best if first is best else self.best([best, self.look(first.fit.start, like=(), iterations=FOLLOW)])
 
     def answering(self, parts: Sequence[str]) -> list[str]:
@@ -149,16 +149,16 @@ class _Search:
 
     def round(self, models: Sequence[StateSpaceModel]) -> list[Contender]:
         """A first look at each; those that are not hopeless are followed."""
-        seen = self.looks(models, iterations=LOOK)
-        if not seen:
+        fits = self.looks(models, iterations=LOOK)
+        if not fits:
             raise next(iter(self.refused.values()))
         self.audit()
-        seen = [self.tried[one.name] for one in seen]
-        least = min(one.misfit for one in seen)
-        for one in seen:
+        fits = [self.tried[one.name] for one in fits]
+        least = min(one.misfit for one in fits)
+        for one in fits:
             if one.misfit > HOPELESS * least:
                 self.tried[one.name] = replace(one, abandoned=True)
-        return [self.look(one.fit.start, like=(), iterations=FOLLOW) for one in seen if one.misfit <= HOPELESS * least]
+        return [self.look(one.fit.start, like=(), iterations=FOLLOW) for one in fits if one.misfit <= HOPELESS * least]
 
     def audit(self) -> None:
         """Fits that end above what they contain are tried again from there, and called failed where that is in vain."""
@@ -206,14 +206,14 @@ def search_structures(
         best = search.best([search.tried[one.name] for one in ended])
     else:
         best, leaner = _grown(search)
-    pick, words = _judged(search, best, judge)
+    pick, notes = _judged(search, best, judge)
     pick = _finished(search, pick, pick.fit.start if structures else search.composed(pick.parts))
     tried = sorted(search.tried.values(), key=lambda one: (one is not pick, one.abandoned, search.score(one, pick)))
     refused = [f"  not fitted: {error.problem}" for error in search.refused.values()]
     if apart:
-        words = [f"Compared on what all of them answer to, without {', '.join(apart)}.", *words]
-    told = [*reasons(pick, [c for c in tried if c is not pick], leaner), *refused, *words]
-    return StructureSearch(tuple(tried), pick, tuple(told), time.perf_counter() - began)
+        notes = [f"Compared on what all of them answer to, without {', '.join(apart)}.", *notes]
+    reasoning = [*reasons(pick, [c for c in tried if c is not pick], leaner), *refused, *notes]
+    return StructureSearch(tuple(tried), pick, tuple(reasoning), time.perf_counter() - began)
 
 
 def _by_name(structures: Sequence[StateSpaceModel]) -> list[StateSpaceModel]:
@@ -235,7 +235,7 @@ def _in_common(
     """
     pairs = [[f"{t.output}/{t.input}" for t in choice.targets(one, responses)[0]] for one in structures]
     everywhere = set.intersection(*map(set, pairs))
-    apart = tuple(dict.fromkeys(name for own in pairs for name in own if name not in everywhere))
+    apart = tuple(dict.fromkeys(name for names in pairs for name in names if name not in everywhere))
     if not everywhere:
         raise IdentificationError(
             f"the structures {', '.join(one.name for one in structures)} answer to no response in common.",
@@ -328,18 +328,18 @@ def _judged(
         search.say(f"{one.name} along the hold-out")
         search.tried[one.name] = replace(one, held_out=judge(one.fit.solution))
     near = [search.tried[one.name] for one in near]
-    own = search.tried[best.name]
+    first = search.tried[best.name]
     ahead = min(near, key=lambda c: c.held_out)
-    if ahead.name != own.name and ahead.held_out < BETTER * own.held_out:
-        text = f"The hold-out prefers it to {own.name}: J_rms {ahead.held_out:.2f} against {own.held_out:.2f}."
+    if ahead.name != first.name and ahead.held_out < BETTER * first.held_out:
+        text = f"The hold-out prefers it to {first.name}: J_rms {ahead.held_out:.2f} against {first.held_out:.2f}."
         return ahead, [text]
     if len(near) == 1:
-        return own, [f"The hold-out was flown with it alone: J_rms {own.held_out:.2f}; no other comes as near."]
-    return own, [f"The hold-out agrees: J_rms {own.held_out:.2f}, the next {min(_others(near, own)):.2f}."]
+        return first, [f"The hold-out was flown with it alone: J_rms {first.held_out:.2f}; no other comes as near."]
+    return first, [f"The hold-out agrees: J_rms {first.held_out:.2f}, the next {min(_others(near, first)):.2f}."]
 
 
-def _others(near: Sequence[Contender], own: Contender) -> list[float]:
-    return [c.held_out for c in near if c.name != own.name]
+def _others(near: Sequence[Contender], pick: Contender) -> list[float]:
+    return [c.held_out for c in near if c.name != pick.name]
 
 
 def _finished(search: _Search, pick: Contender, model: StateSpaceModel) -> Contender:

@@ -128,10 +128,10 @@ def targets_of(
 def as_told(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:
     """The fit with its gains' units, and with what its responses were warned of: it is no better than they are."""
     pairs = tuple(f"{t.output} / {t.input}:" for t in fit.targets)
-    heard = tuple(words for words in (*responses.warnings, *responses.problems) if words.startswith(pairs))
+    heard = tuple(text for text in (*responses.warnings, *responses.problems) if text.startswith(pairs))
     problems = (*fit.problems, *scale_words(responses.data))
-    told = replace(fit, warnings=(*fit.warnings, *heard), problems=problems, data=responses.data)
-    return _with_gain_units(told, responses)
+    warned = replace(fit, warnings=(*fit.warnings, *heard), problems=problems, data=responses.data)
+    return _with_gain_units(warned, responses)
 
 
 def _with_gain_units(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:
@@ -166,8 +166,8 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
     shared = form.pole_names
     several = len(targets) > 1
     owner = [{name: f"{name} {t.output}" if several else name for name in form.own_names} for t in targets]
-    names = [*(name for own in owner for name in own.values()), *shared]
-    spread = {own[name]: fixed[name] for own in owner for name in own if name in fixed}
+    names = [*(name for of_pair in owner for name in of_pair.values()), *shared]
+    spread = {of_pair[name]: fixed[name] for of_pair in owner for name in of_pair if name in fixed}
     spread |= {name: value for name, value in fixed.items() if name in names}
     unknown = sorted(set(fixed) - set(names) - set(form.own_names))
     if unknown:
@@ -185,19 +185,19 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
         return TransferFunctions(
             TransferFunction(
                 form,
-                {n: float(values[own[n]]) for n in form.own_names} | {n: float(values[n]) for n in shared},
+                {n: float(values[of_pair[n]]) for n in form.own_names} | {n: float(values[n]) for n in shared},
                 t.output,
                 t.input,
             )
-            for t, own in zip(targets, owner, strict=True)
+            for t, of_pair in zip(targets, owner, strict=True)
         )
 
     def evaluate(numbers: Array) -> tuple[list[Complex], list[Complex]]:
         values = spread | dict(zip(free, numbers, strict=True))
         answers, slopes = [], []
-        for t, own, model in zip(targets, owner, models(values), strict=True):
+        for t, of_pair, model in zip(targets, owner, models(values), strict=True):
             h, by_name = model.with_slopes(t.omega)
-            column = {own.get(name, name): slope for name, slope in by_name.items()}
+            column = {of_pair.get(name, name): slope for name, slope in by_name.items()}
             zero = np.zeros(t.omega.size, dtype=np.complex128)
             answers.append(h)
             slopes.append(np.stack([column.get(name, zero) for name in free], axis=1))
@@ -233,14 +233,14 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
         )
         for name in names
     )
-    made = models(values)
-    responses = [model.response(t.omega) for model, t in zip(made, targets, strict=True)]
+    solution = models(values)
+    responses = [model.response(t.omega) for model, t in zip(solution, targets, strict=True)]
     costs = tuple(cost_of(h, t) for h, t in zip(responses, targets, strict=True))
     first = {n: cost.row.entries[place[n]].start for n in free}
     failed = not followed(optimum.row, costs)
     return Result(
         method="frequency responses",
-        solution=made,
+        solution=solution,
         start=models({**spread, **first}),
         estimates=estimates,
         names=tuple(free),
@@ -253,30 +253,30 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
         history=optimum.history,
         converged=optimum.converged,
         problems=(NOT_FOLLOWED,) if failed else (),
-        warnings=(*_words(made, costs, estimates), *accuracy.warnings),
+        warnings=(*_fit_warnings(solution, costs, estimates), *accuracy.warnings),
         comparisons=tuple(ResponseComparison(t, h, c) for t, h, c in zip(targets, responses, costs, strict=True)),
         settings={"form": form.text, "fixed": dict(spread), "seed": seed},
     )
 
 
-def _words(
+def _fit_warnings(
     models: Sequence[TransferFunction], costs: Sequence[float], parameters: Sequence[Estimate]
 ) -> tuple[str, ...]:
-    words = [
+    warnings = [
         f"{m.output} / {m.input}: J = {cost:.0f}, above 100: the structure does not fit."
         for m, cost in zip(models, costs, strict=True)
         if cost > 100.0
     ]
     vague = [p.name for p in parameters if not p.fixed and p.sigma_percent > 20.0]
     if vague:
-        words.append(f"standard deviation above 20 %: {', '.join(vague)}; fewer parameters may do.")
-    words += sign_words(parameters)
+        warnings.append(f"standard deviation above 20 %: {', '.join(vague)}; fewer parameters may do.")
+    warnings += sign_words(parameters)
     bound = [p.name for p in parameters if p.at_bound]
     if bound:
-        words.append(f"ended on a bound: {', '.join(bound)}.")
+        warnings.append(f"ended on a bound: {', '.join(bound)}.")
     if any(pole.real > 1e-9 for pole in models[0].poles):
-        words.append("the model is unstable.")
-    return tuple(words)
+        warnings.append("the model is unstable.")
+    return tuple(warnings)
 
 
 def _unit(name: str) -> str:

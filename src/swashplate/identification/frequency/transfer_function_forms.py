@@ -132,8 +132,8 @@ def _highest(targets: Sequence[Target]) -> float:
     return max(float(t.omega[-1]) for t in targets) / TWO_PI
 
 
-def _said(trial: TriedStructure, words: str) -> TriedStructure:
-    return replace(trial, fit=replace(trial.fit, warnings=(*trial.fit.warnings, words)))
+def _said(trial: TriedStructure, warning: str) -> TriedStructure:
+    return replace(trial, fit=replace(trial.fit, warnings=(*trial.fit.warnings, warning)))
 
 
 def _tried(wanted: Sequence[Target], form: Form, responses: FrequencyResponse, *, seed: int) -> TriedStructure:

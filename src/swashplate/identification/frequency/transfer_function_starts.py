@@ -29,12 +29,12 @@ def starts(
         seed: of the spread roots.
         longest_delay: [s].
     """
-    made = []
+    guesses = []
     if form.poles or form.zeros:
         for delay in _DELAYS if form.delay else (0.0,):
             guess = _by_polynomials(targets, form, delay)
             if guess is not None:
-                made.append(_with_gains(targets, form, owner, guess, longest_delay))
+                guesses.append(_with_gains(targets, form, owner, guess, longest_delay))
     random = np.random.default_rng(seed)
     low, high = min(t.omega[0] for t in targets), max(t.omega[-1] for t in targets)
     for k in range(SPREAD if form.pole_names or form.zero_names else 1):
@@ -46,8 +46,8 @@ def starts(
                 values[name] = -values[name]
         shared = {name: values[name] for name in form.pole_names}
         zeros = {name: values[name] for name in form.zero_names}
-        made.append(_with_gains(targets, form, owner, (shared, [zeros] * len(targets)), longest_delay))
-    return made
+        guesses.append(_with_gains(targets, form, owner, (shared, [zeros] * len(targets)), longest_delay))
+    return guesses
 
 
 def _by_polynomials(
@@ -117,16 +117,16 @@ def _with_gains(
     """Gain (with its sign) and delay by what the roots leave of each response."""
     shared, each = guess
     values = dict(shared)
-    for t, own, zeros in zip(targets, owner, each, strict=True):
+    for t, of_pair, zeros in zip(targets, owner, each, strict=True):
         shape = TransferFunction(form, {**shared, **zeros, "K": 1.0, "tau": 0.0})
         left = t.measured / shape.response(t.omega)
         tau = _delay(t.omega, left, longest_delay) if form.delay else 0.0
         turned = left * np.exp(1j * tau * t.omega)
         sign = float(np.sign(np.sum(turned.real / np.abs(turned)))) or 1.0
-        values[own["K"]] = sign * float(np.exp(np.mean(np.log(np.abs(left)))))
-        values |= {own[name]: value for name, value in zeros.items()}
+        values[of_pair["K"]] = sign * float(np.exp(np.mean(np.log(np.abs(left)))))
+        values |= {of_pair[name]: value for name, value in zeros.items()}
         if form.delay:
-            values[own["tau"]] = tau
+            values[of_pair["tau"]] = tau
     return values
 
 

@@ -39,8 +39,8 @@ def model_equations(
         text = " + ".join([*terms, BIAS]).replace("+ -", "- ")
         used = {term.partition("*")[2] for term in terms}
         known = {n: model.delays.get(f"{state}_dot/{n}", model.delays.get(n)) for n in model.inputs if n in used}
-        late = {n: float(expression(numbers)) for n, expression in known.items() if expression is not None}
-        equations.append(regression_equation(f"{state}_dot = {text}", delays=late))
+        lags = {n: float(expression(numbers)) for n, expression in known.items() if expression is not None}
+        equations.append(regression_equation(f"{state}_dot = {text}", delays=lags))
     return tuple(equations), tuple(left_out)
 
 
@@ -72,14 +72,14 @@ def _terms(model: StateSpaceModel, row: int, channels: Collection[str]) -> tuple
 
 def _factor(model: StateSpaceModel, element: Element) -> float | None:
     """The number that an entry is; None where something free stands in it."""
-    waiting, seen = set(element.expression.names), set()
+    waiting, visited = set(element.expression.names), set()
     while waiting:
         name = waiting.pop()
-        seen.add(name)
+        visited.add(name)
         if name in model.free:
             return None
         tie = model.parameters[name].tie
-        waiting |= set() if tie is None else set(tie.names) - seen
+        waiting |= set() if tie is None else set(tie.names) - visited
     return float(element.expression(model.numbers()))
 
 
@@ -166,8 +166,8 @@ def regression_equation(text: str, *, delays: Mapping[str, float] | None = None)
         at = term.end()
     if not unknown and not bias:
         raise IdentificationError(f"nothing is unknown in '{text}'.", channel="equation", hint=_EXAMPLE)
-    late = dict(delays or {})
-    for channel, seconds in late.items():
+    lags = dict(delays or {})
+    for channel, seconds in lags.items():
         if not 0.0 <= seconds < math.inf:
             raise IdentificationError(f"is {seconds} s, expected 0 or more.", channel=f"delay of {channel}")
     return RegressionEquation(
@@ -177,7 +177,7 @@ def regression_equation(text: str, *, delays: Mapping[str, float] | None = None)
         regressors=unknown,
         known=known,
         bias=bias,
-        delays=late,
+        delays=lags,
     )
 
 

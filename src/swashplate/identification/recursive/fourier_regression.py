@@ -95,9 +95,9 @@ class RegressionPlan:
         omega = 2.0 * np.pi * self.hertz
         rows = []
         for name in self.equation.channels:
-            late = 0.0 if name == self.equation.left else self.equation.delays.get(name, 0.0)
+            delay = 0.0 if name == self.equation.left else self.equation.delays.get(name, 0.0)
             hold = self.hold if name in self.held else np.ones_like(omega)
-            rows.append(hold * np.exp(-1j * omega * late))
+            rows.append(hold * np.exp(-1j * omega * delay))
         return np.array(rows, dtype=np.complex128)
 
 
@@ -215,8 +215,8 @@ class RecursiveRegression:
         end = begin * np.exp(-2j * np.pi * plan.spacing * plan.dt)
         end *= 1.5 - 0.5 * (end.real * end.real + end.imag * end.imag)  # back onto the circle (Newton's step)
         self._turned = end
-        whole = np.arange(2 * plan.last + 1)
-        both = begin**whole, end**whole
+        powers = np.arange(2 * plan.last + 1)
+        both = begin**powers, end**powers
         half = 0.5 * plan.dt
         self.window = plan.keep**2 * self.window + half * (both[0] + both[1])
         then, here = (turns[plan.first : plan.last + 1] for turns in both)
@@ -259,9 +259,9 @@ class RecursiveRegression:
         basis = np.column_stack([*columns, plan.hold * self.sums[-2]])
         size = np.linalg.norm(basis, axis=0)
         stacked = np.vstack([basis.real, basis.imag])[:, size > 0.0] / size[size > 0.0]
-        told = np.vstack([right.real, right.imag])
-        moved = stacked @ np.linalg.lstsq(stacked, told, rcond=None)[0]
-        return np.asarray(moved[: len(right)] + 1j * moved[len(right) :])
+        parts = np.vstack([right.real, right.imag])
+        projected = stacked @ np.linalg.lstsq(stacked, parts, rcond=None)[0]
+        return np.asarray(projected[: len(right)] + 1j * projected[len(right) :])
 
     def rows(self) -> tuple[Complex, Complex]:
         """Left side (lines) and right side (lines, unknowns) of the complex equations."""
@@ -278,14 +278,14 @@ class RecursiveRegression:
 
 
 def _solved(
-    left: Complex, right: Complex, window: Complex, plan: RegressionPlan, moved: Complex
+    left: Complex, right: Complex, window: Complex, plan: RegressionPlan, projected: Complex
 ) -> tuple[Array, Array, Complex] | None:
     """Coefficients, their covariance and the residuals; None where they cannot be told apart.
 
-    In two stages where `moved` is what instruments have moved of the right side (Söderström and Stoica 1983).
+    In two stages where `projected` is what instruments have moved of the right side (Söderström and Stoica 1983).
     """
     n, k = right.shape
-    gram = (moved.conj().T @ moved).real
+    gram = (projected.conj().T @ projected).real
     size = np.sqrt(np.diag(gram))
     length = float(window[0].real)
     if length <= 0.0 or not np.all(size > 0.0):
@@ -296,7 +296,7 @@ def _solved(
         return None
     inverse = np.linalg.inv(lower)
     inverse = inverse.T @ inverse
-    values = inverse @ ((moved.conj().T @ left).real / size) / size
+    values = inverse @ ((projected.conj().T @ left).real / size) / size
     residual = left - right @ values
     line = np.arange(n)
     lines = n * n * length * length / float(np.sum(np.abs(window[np.abs(line[:, None] - line)]) ** 2))
@@ -304,7 +304,7 @@ def _solved(
     if freedom <= LEAST_FREEDOM:
         return None
     near = np.maximum(0.0, 1.0 - np.abs(line[:, None] - line) / (plan.around + 1.0))
-    scaled = moved / size
+    scaled = projected / size
     # What the coefficients have taken of a line's two numbers, of which neighbours share some.
     taken = np.sum((scaled.conj() @ inverse * scaled).real, axis=1) * n / (2.0 * lines)
     left_over = np.maximum(LEAST_LEFT, 1.0 - taken)

@@ -109,19 +109,19 @@ def slow_plan(
     if not sensors or any(s.delay or abs(s.rate - rate) > 1e-6 * rate for s in sensors):
         raise IdentificationError(f"are to be read at every sample ({rate:g} Hz) and at once.", channel="sensors")
     about = trim(vehicle, voltage=voltage)
-    late = complete_delays(vehicle, input_delays(vehicle) if delays is None else delays)
+    lags = complete_delays(vehicle, input_delays(vehicle) if delays is None else delays)
     plan = ObserverPlan(
-        equations_of(vehicle), tuple(sensors), rate, tuple(round(d * rate) for d in late.values()), slow=tuple(unknown)
+        equations_of(vehicle), tuple(sensors), rate, tuple(round(d * rate) for d in lags.values()), slow=tuple(unknown)
     ).checked()
     chosen = unrest or unrest_of(vehicle.card)
     fade, process = observer.process_noise(plan, chosen)
     numbers = Numbers(parameter_row(vehicle, about.environment), fade, process, observer.measurement_noise(plan))
     mean, variance = np.zeros((len(plan.names), 1)), observer.start_variance(plan, chosen)
     mean[: plan.n, 0] = about.state
-    made = SlowPlan(plan, numbers, ObserverEstimate(mean, np.diag(variance)), about)
-    mean[made.places, 0] = [float(values[name]) for name in unknown]
-    process[made.places] = (wander * size) ** 2 * plan.dt
-    variance[made.places] = (spread * size) ** 2
+    slow = SlowPlan(plan, numbers, ObserverEstimate(mean, np.diag(variance)), about)
+    mean[slow.places, 0] = [float(values[name]) for name in unknown]
+    process[slow.places] = (wander * size) ** 2 * plan.dt
+    variance[slow.places] = (spread * size) ** 2
     return SlowPlan(plan, numbers, ObserverEstimate(mean, np.diag(variance)), about)
 
 
@@ -186,10 +186,10 @@ class SlowParameters:
             self._begin(w, y)
             return False
         self.frozen = ""
-        acting = [self._given[-1 - late][j] for j, late in enumerate(plan.delays)]
+        acting = [self._given[-1 - delay][j] for j, delay in enumerate(plan.delays)]
         driving = np.array([*acting, self._given[-1][-1]])
-        told = self.plan.graph(*self._estimate, driving, np.nan_to_num(y), due)
-        mean, covariance, innovations, spread = (np.asarray(part.full()) for part in told)
+        answer = self.plan.graph(*self._estimate, driving, np.nan_to_num(y), due)
+        mean, covariance, innovations, spread = (np.asarray(part.full()) for part in answer)
         self._estimate = ObserverEstimate(mean, covariance)
         heard = sum(flag * len(sensor.channels) for flag, sensor in zip(due, plan.sensors, strict=True))
         self.surprise = float(np.vdot(innovations, np.linalg.solve(spread, innovations))) / max(heard, 1.0)

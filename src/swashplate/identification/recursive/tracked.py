@@ -72,13 +72,13 @@ def stream_of(flight: Flight, channels: Sequence[str]) -> tuple[Array, Array]:
     time = flight.time(channels[0])
     columns = []
     for name in channels:
-        own, values = flight.time(name), flight.values(name)
-        if own is time or np.array_equal(own, time):
+        times, values = flight.time(name), flight.values(name)
+        if times is time or np.array_equal(times, time):
             columns.append(values)
             continue
-        last = np.searchsorted(own, time, side="right") - 1
-        usual = float(np.median(np.diff(own))) if own.size > 1 else np.inf
-        known = (last >= 0) & (time - own[np.maximum(last, 0)] < _STALE * usual)
+        last = np.searchsorted(times, time, side="right") - 1
+        usual = float(np.median(np.diff(times))) if times.size > 1 else np.inf
+        known = (last >= 0) & (time - times[np.maximum(last, 0)] < _STALE * usual)
         columns.append(np.where(known, values[np.maximum(last, 0)], np.nan))
     return time, np.column_stack(columns)
 
@@ -164,10 +164,10 @@ def _watched(
             stretches.append(FrozenStretch(before if np.isfinite(before) else now, now, why))
         before = now
         if not look <= now < look + every:
-            look, told = now, estimate()
+            look, estimated = now, estimate()
             looks.append(now)
-            values.append(nothing if told is None else told.values)
-            sigmas.append(nothing if told is None else told.sigmas)
+            values.append(nothing if estimated is None else estimated.values)
+            sigmas.append(nothing if estimated is None else estimated.sigmas)
     return np.array(looks), np.array(values), np.array(sigmas), estimate(), _joined(stretches), counted
 
 

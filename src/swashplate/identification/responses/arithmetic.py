@@ -74,7 +74,7 @@ def combine(
         _fits(operation, first, None)
         h = h / (unity + h) if operation == "closed" else h / (unity - h)
         noise, error = noise * through**2, error * through
-    return _made(operation, first, second, omega, h, 1.0 / (1.0 + noise), error)
+    return _result_of(operation, first, second, omega, h, 1.0 / (1.0 + noise), error)
 
 
 def _parts(pair: FrequencyResponse) -> tuple[Complex, Array, Array]:
@@ -138,7 +138,7 @@ def _fits(operation: str, first: FrequencyResponse, second: FrequencyResponse | 
         )
 
 
-def _made(
+def _result_of(
     operation: Operation,
     first: FrequencyResponse,
     second: FrequencyResponse | None,
@@ -158,7 +158,7 @@ def _made(
     names = [getattr(*side)[0] for side in (output, input)]
     of_units = [getattr(side[0], units[side[1]])[:1] for side in (output, input)]
     nothing = np.full((omega.size, 1), np.nan)
-    told = [f"{one.outputs[0]} / {one.inputs[0]}" for one in (first, second) if one is not None]
+    pairs = [f"{one.outputs[0]} / {one.inputs[0]}" for one in (first, second) if one is not None]
     return replace(
         first,
         omega=omega,
@@ -173,11 +173,11 @@ def _made(
         input_power=nothing,
         output_power=nothing,
         input_coherence=np.ones((omega.size, 1, 1)),
-        method=f"{operation} of {' and '.join(told)}",
+        method=f"{operation} of {' and '.join(pairs)}",
         sources=tuple(dict.fromkeys((*first.sources, *other.sources))),
         warnings=tuple(dict.fromkeys((*first.warnings, *other.warnings))),
         problems=tuple(dict.fromkeys((*first.problems, *other.problems))),
-        settings={"operation": operation, "of": told},
+        settings={"operation": operation, "of": pairs},
         direct=None,
         direct_error=None,
         shared=_shared(first, second, omega),

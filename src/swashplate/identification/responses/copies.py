@@ -43,8 +43,8 @@ class Copy:
 
     def __str__(self) -> str:
         size = "" if abs(self.factor - 1.0) < 1e-3 else f" times {self.factor:.4g}"
-        late = f", {1e3 * self.delay:+.3g} ms later" if self.delay else ""
-        return f"'{self.other}' is a copy of '{self.one}'{size}{late}"
+        delay = f", {1e3 * self.delay:+.3g} ms later" if self.delay else ""
+        return f"'{self.other}' is a copy of '{self.one}'{size}{delay}"
 
 
 def copies_of(pieces: Sequence[Signals], ones: Mapping[str, int], others: Mapping[str, int]) -> list[Copy]:
@@ -54,25 +54,25 @@ def copies_of(pieces: Sequence[Signals], ones: Mapping[str, int], others: Mappin
         pieces: records. ones, others: columns by name.
     """
     places = [*ones.values(), *others.values()]
-    plain = [piece.values[:, places] for piece in pieces]
-    smooth = [_smoothed(table) for table in plain]
+    raw = [piece.values[:, places] for piece in pieces]
+    smooth = [_smoothed(table) for table in raw]
     longest = max(smooth, key=len)
     reach = round(_LONGEST / pieces[0].dt)
     spectra = np.asarray(rfft(longest, int(next_fast_len(len(longest) + reach, real=True)), axis=0))
     copies = []
     for i, one in enumerate(ones):
         for j, other in enumerate(others, start=len(ones)):
-            whole = [table[:, [i, j]] for table in plain]
-            if not all(np.any([np.any(table[:, k]) for table in whole]) for k in (0, 1)):
+            pairs = [table[:, [i, j]] for table in raw]
+            if not all(np.any([np.any(table[:, k]) for table in pairs]) for k in (0, 1)):
                 continue
-            factor, off = _factor(np.concatenate(whole))
+            factor, off = _factor(np.concatenate(pairs))
             if off < _EXACT:
                 copies.append(Copy(one, other, factor, 0.0))
                 continue
             lag = _lag(spectra[:, [i, j]], longest[:, [i, j]], reach)
-            late = None if lag is None else _late([table[:, [i, j]] for table in smooth], lag, reach)
-            if late is not None:
-                copies.append(Copy(one, other, late[0], late[1] * pieces[0].dt))
+            match = None if lag is None else _delayed_match([table[:, [i, j]] for table in smooth], lag, reach)
+            if match is not None:
+                copies.append(Copy(one, other, match[0], match[1] * pieces[0].dt))
     return copies
 
 
@@ -149,7 +149,7 @@ def _lag(spectra: Complex, both: Array, reach: int) -> float | None:
     return float(best) if products[best] > _ALIKE * size else None
 
 
-def _late(tables: Sequence[Array], lag: float, reach: int) -> tuple[float, float] | None:
+def _delayed_match(tables: Sequence[Array], lag: float, reach: int) -> tuple[float, float] | None:
     """Factor and lag [samples] by which the second columns are copies of the first; None where they are none.
 
     A slow signal behind a quick lag is nearly late by its time constant. To the second order a lag differs: H is
@@ -157,10 +157,10 @@ def _late(tables: Sequence[Array], lag: float, reach: int) -> tuple[float, float
     """
     for _ in range(_STEPS):
         shifted = np.concatenate([_shifted(table, lag, reach) for table in tables])
-        moved, seen = shifted[:, 0], shifted[:, 3]
-        off = float(np.linalg.norm(seen - moved * (moved @ seen) / (moved @ moved)) / np.linalg.norm(seen))
+        first, second = shifted[:, 0], shifted[:, 3]
+        off = float(np.linalg.norm(second - first * (first @ second) / (first @ first)) / np.linalg.norm(second))
         terms = shifted[:, :3] if off < _LATE else shifted[:, :2]
-        factor, change, *rest = map(float, np.linalg.lstsq(terms, seen, rcond=None)[0])
+        factor, change, *rest = map(float, np.linalg.lstsq(terms, second, rcond=None)[0])
         if off < _LATE:
             return (factor, lag) if abs(rest[0]) < _BENT * abs(factor) * lag**2 / 2.0 else None
         lag -= float(np.clip(change / (factor or 1.0), -1.0, 1.0))
@@ -175,5 +175,5 @@ def _shifted(table: Array, lag: float, reach: int) -> Array:
     if inside.size < 4:
         return np.zeros((0, 4))
     spline = CubicSpline(np.arange(len(table)), table[:, 0])
-    moved = [spline(inside - lag, order) for order in range(3)]
-    return detrended(np.stack([*moved, table[inside, 1]], axis=1))
+    terms = [spline(inside - lag, order) for order in range(3)]
+    return detrended(np.stack([*terms, table[inside, 1]], axis=1))

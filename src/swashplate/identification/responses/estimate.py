@@ -42,11 +42,11 @@ class Beside(NamedTuple):
     """What need not be held still.
 
     Attributes:
-        own: the place among the references of each input that may be let go, by the input's place.
+        reference_of: the place among the references of each input that may be let go, by the input's place.
         loops: places of the outputs that are loops broken at an input.
     """
 
-    own: Mapping[int, int] = {}
+    reference_of: Mapping[int, int] = {}
     loops: Sequence[int] = ()
 
 
@@ -55,7 +55,7 @@ class EstimateBeside(NamedTuple):
 
     Attributes:
         omega: frequencies [rad/s]. matrices: the spectra of every window. notes: in words.
-        blurred, made: responses as the windows blur them, and sharpened.
+        blurred, sharpened: responses as the windows blur them, and sharpened.
         direct: without the references, as the windows blur it; None where there are none.
         held: which inputs are held still where the others act, shape (n_f, n_inputs).
     """
@@ -64,7 +64,7 @@ class EstimateBeside(NamedTuple):
     matrices: list[SpectralMatrix]
     notes: list[str]
     blurred: FrequencyResponse
-    made: FrequencyResponse
+    sharpened: FrequencyResponse
     direct: FrequencyResponse | None
     held: NDArray[np.bool_]
 
@@ -123,15 +123,15 @@ def estimate_beside(
     weight = np.stack([_window_weight(matrix) for matrix in estimate.matrices])
     spectra = _mean(weight, np.stack([matrix.values for matrix in estimate.matrices]))
     held = estimate.held.copy()
-    for i, reference in beside.own.items():
+    for i, reference in beside.reference_of.items():
         held[:, i] = _led(spectra[:, n:, i], spectra[:, n:, n:], reference)
-    alone = np.array([i not in beside.own for i in range(n_in)])
+    alone = np.array([i not in beside.reference_of for i in range(n_in)])
     patterns = {tuple(map(bool, row)) for row in held} | ({tuple(map(bool, alone))} if beside.loops else set())
     for pattern in sorted(patterns):
         if all(pattern):
             continue
         kept = [i for i in range(n_in) if pattern[i]]
-        let_go = [beside.own[i] for i in range(n_in) if not pattern[i]]
+        let_go = [beside.reference_of[i] for i in range(n_in) if not pattern[i]]
         part = _without(pieces, lengths, overlap, limits, question, kept, let_go)
         lines = np.all(held == np.array(pattern), axis=1)
         places = np.zeros((lines.size, n - n_in), dtype=bool)
@@ -139,7 +139,7 @@ def estimate_beside(
         places[:, list(beside.loops)] = pattern == tuple(alone)
         estimate = estimate._replace(
             blurred=_with_places(estimate.blurred, part.blurred, places, kept),
-            made=_with_places(estimate.made, part.made, places, kept),
+            sharpened=_with_places(estimate.sharpened, part.sharpened, places, kept),
             direct=None
             if estimate.direct is None or part.direct is None
             else _with_places(estimate.direct, part.direct, places, kept),
@@ -170,16 +170,16 @@ def _without(
     return estimate_responses(cut, lengths, overlap, limits, asked)
 
 
-def _led(cross: Complex, auto: Complex, own: int) -> NDArray[np.bool_]:
+def _led(cross: Complex, auto: Complex, reference: int) -> NDArray[np.bool_]:
     """From the first to the last line where an input follows its own reference more than all others, shape (n_f,).
 
     Args:
         cross: from references to the input, shape (n_f, n_references). auto: of the references, (n_f, n, n).
-        own: place of its own reference.
+        reference: place of its own reference.
     """
     power = np.diagonal(auto, axis1=1, axis2=2).real
     part = np.where(power > 0.0, np.abs(cross) ** 2 / np.where(power > 0.0, power, 1.0), 0.0)
-    lead = np.flatnonzero(2.0 * part[:, own] >= part.sum(axis=1))
+    lead = np.flatnonzero(2.0 * part[:, reference] >= part.sum(axis=1))
     inside = np.zeros(len(part), dtype=bool)
     if lead.size:
         inside[lead[0] : lead[-1] + 1] = True
@@ -187,19 +187,19 @@ def _led(cross: Complex, auto: Complex, own: int) -> NDArray[np.bool_]:
 
 
 def _with_places(
-    whole: FrequencyResponse, part: FrequencyResponse, places: NDArray[np.bool_], kept: Sequence[int]
+    full: FrequencyResponse, part: FrequencyResponse, places: NDArray[np.bool_], kept: Sequence[int]
 ) -> FrequencyResponse:
     """Responses that are at some lines of some outputs those of a part of the inputs; the others have none there.
 
     Args:
         places: which, shape (n_f, n_outputs). kept: places of the part's inputs.
     """
-    made = {name: getattr(whole, name).copy() for name in ("response", "coherence", "error")}
-    for name, values in made.items():
+    arrays = {name: getattr(full, name).copy() for name in ("response", "coherence", "error")}
+    for name, values in arrays.items():
         values[places] = np.nan
         for k, i in enumerate(kept):
             values[:, :, i][places] = getattr(part, name)[:, :, k][places]
-    return replace(whole, **made, multiple=np.where(places, part.multiple, whole.multiple))
+    return replace(full, **arrays, multiple=np.where(places, part.multiple, full.multiple))
 
 
 def _matrices(
@@ -240,23 +240,23 @@ def composed(
     n_in, n = len(question.inputs), len(question.inputs) + len(question.outputs)
     parts = []
     for matrix, left, share in zip(matrices, matrices if rest is None else rest, shares, strict=True):
-        whole = None if rest is None else np.diagonal(matrix.values, axis1=1, axis2=2).real[:, n_in:n]
+        power = None if rest is None else np.diagonal(matrix.values, axis1=1, axis2=2).real[:, n_in:n]
         parts.append(
             condition_spectra(
                 left.values[:, : n + question.references, : n + question.references],
                 n_in,
                 averages=matrix.averages,
                 removed=guess,
-                whole=whole,
+                total=power,
                 share=share,
                 references=question.references,
             )
         )
     response, coherence, error = _joined(parts, [m.averages for m in matrices], n_in)
     weight = np.stack([_window_weight(matrix) for matrix in matrices])
-    plain = [m.values for m in matrices]
-    auto = _mean(weight, np.stack([np.diagonal(v, axis1=1, axis2=2).real for v in plain]))
-    gxx = _mean(weight, np.stack([v[:, :n_in, :n_in] for v in plain]))
+    values = [m.values for m in matrices]
+    auto = _mean(weight, np.stack([np.diagonal(v, axis1=1, axis2=2).real for v in values]))
+    gxx = _mean(weight, np.stack([v[:, :n_in, :n_in] for v in values]))
     with np.errstate(divide="ignore", invalid="ignore"):
         between = np.abs(gxx) ** 2 / (auto[:, :n_in, None] * auto[:, None, :n_in])
     return FrequencyResponse(

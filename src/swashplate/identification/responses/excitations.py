@@ -36,14 +36,14 @@ class SweepOfCommand:
         references: what serves as the reference for each command if the excitation is its own, by record, shape (n,
             n_commands) each.
         size: rms of what each command has of it, shape (n_commands,). share: of its power meanwhile, same shape.
-        words: when, and how it is known.
+        times: when, and how it is known.
         axis: that the log names ("" where it names none). channel: the log's name of the command that it is added to.
     """
 
     references: Mapping[int, Array]
     size: Array
     share: Array
-    words: str
+    times: str
     axis: str = ""
     channel: str = ""
 
@@ -134,36 +134,36 @@ def _owner(channel: str, logged: Sequence[str], named: int, relative: Array, sco
 
 def _refuse_mixtures(excitations: Sequence[SweepOfCommand], owners: Sequence[str], logged: Mapping[str, str]) -> None:
     for name, source in logged.items():
-        axes = {one.axis: one.words for one, owner in zip(excitations, owners, strict=True) if owner == name}
-        told = {one.channel for one, owner in zip(excitations, owners, strict=True) if owner == name}
-        if len(told - {""}) > 1 and source not in told:
+        axes = {one.axis: one.times for one, owner in zip(excitations, owners, strict=True) if owner == name}
+        channels = {one.channel for one, owner in zip(excitations, owners, strict=True) if owner == name}
+        if len(channels - {""}) > 1 and source not in channels:
             raise FlightError(
                 f"was moved alike by sweeps of several axes, {listed_sweeps(axes)}: one response cannot be of all.",
                 channel=name,
                 hint="Take the stretch of one sweep (FILE@START-STOP), or name the axes' own commands: "
-                f"{', '.join(sorted(told - {''}))}.",
+                f"{', '.join(sorted(channels - {''}))}.",
             )
 
 
-def listed_sweeps(words: Mapping[str, str]) -> str:
+def listed_sweeps(sweeps: Mapping[str, str]) -> str:
     """Axes or commands with the times of their sweeps."""
-    return ", ".join(f"{name} ({text.partition(',')[0]})" for name, text in words.items())
+    return ", ".join(f"{name} ({text.partition(',')[0]})" for name, text in sweeps.items())
 
 
-def only_answering(told: Sequence[ToldSweeps], inputs: Sequence[str], *, called: Mapping[str, str]) -> tuple[str, ...]:
+def only_answering(logs: Sequence[ToldSweeps], inputs: Sequence[str], *, called: Mapping[str, str]) -> tuple[str, ...]:
     """The inputs that a rate loop makes, in records of which the log says that only other commands were swept."""
-    sweeps = [event for one in told for event in one.sweeps]
+    sweeps = [event for one in logs for event in one.sweeps]
     swept = {channel_of(event) for event in sweeps}
     if not sweeps or "" in swept:
         return ()
     return tuple(name for name in inputs if called.get(name, name) in _RATE_LOOPS - swept)
 
 
-def answering_words(told: Sequence[ToldSweeps], answering: Sequence[str]) -> str:
+def answering_words(logs: Sequence[ToldSweeps], answering: Sequence[str]) -> str:
     """Why inputs have no response, and which sweeps there are."""
     swept = {
         f"{axis_of(event)} ('{channel_of(event)}')": f"{times_of(event)[0]:.1f} to {times_of(event)[1]:.1f} s"
-        for one in told
+        for one in logs
         for event in one.sweeps
     }
     return (

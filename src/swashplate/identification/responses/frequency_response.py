@@ -289,8 +289,8 @@ def turned_beside(phase: Array, reference: Array) -> Array:
     known = np.flatnonzero(np.isfinite(reference))
     if known.size == 0:
         return phase
-    whole = np.interp(np.arange(phase.size), known, reference[known])
-    return np.asarray(phase + 360.0 * np.round((whole - phase) / 360.0))
+    target = np.interp(np.arange(phase.size), known, reference[known])
+    return np.asarray(phase + 360.0 * np.round((target - phase) / 360.0))
 
 
 def _polar(h: Complex, before: str = "") -> dict[str, Any]:

@@ -40,11 +40,11 @@ def own_shares(
     """
     if inputs < 2:
         return [None] * len(matrices)
-    plain = [condition_spectra(m.values[:, :inputs, :inputs], inputs, averages=m.averages).own_share for m in matrices]
-    suspects = [i for i in range(inputs) if any(np.mean(share[:, i] < SUSPECT) > OFTEN for share in plain)]
+    shares = [condition_spectra(m.values[:, :inputs, :inputs], inputs, averages=m.averages).own_share for m in matrices]
+    suspects = [i for i in range(inputs) if any(np.mean(share[:, i] < SUSPECT) > OFTEN for share in shares)]
     if not suspects:
         return [None] * len(matrices)
-    close = [_closely(pieces, m, omega, share, suspects, overlap) for m, share in zip(matrices, plain, strict=True)]
+    close = [_closely(pieces, m, omega, share, suspects, overlap) for m, share in zip(matrices, shares, strict=True)]
     # A share is the input's, not the window's, and blurring only adds to it; too few windows fit anything.
     sure = [share for share, m in zip(close, matrices, strict=True) if m.averages >= ENOUGH]
     least = np.fmin.reduce(sure) if sure else np.full(close[0].shape, np.nan)
@@ -55,22 +55,22 @@ def _closely(
     pieces: Sequence[Signals],
     matrix: SpectralMatrix,
     omega: Array,
-    plain: Array,
+    shares: Array,
     suspects: Sequence[int],
     overlap: float,
 ) -> Array:
     """The smaller of a window's own share and what is left when the others' part was taken out of the record."""
-    n = plain.shape[1]
-    closest = plain.copy()
-    seen = np.isfinite(matrix.values[:, 0, 0])
+    n = shares.shape[1]
+    closest = shares.copy()
+    known = np.isfinite(matrix.values[:, 0, 0])
     for i in suspects:
         order = [*(j for j in range(n) if j != i), i]
         part = matrix.values[np.ix_(range(omega.size), order, order)]
         first = condition_spectra(part, n - 1, averages=matrix.averages)
         rest = without(
             [replace(piece, values=piece.values[:, order]) for piece in pieces],
-            omega[seen],
-            coherent_guess(omega[seen], first.response[seen], first.coherence[seen]),
+            omega[known],
+            coherent_guess(omega[known], first.response[known], first.coherence[known]),
         )
         left = spectral_matrix(rest, omega, window=matrix.window, overlap=overlap, periods=0.0)
         assert left is not None
@@ -78,7 +78,7 @@ def _closely(
         power = left.values[:, -1, -1].real * (1.0 - second.multiple[:, 0])
         with np.errstate(divide="ignore", invalid="ignore"):
             share = power / part[:, -1, -1].real
-        closest[seen, i] = np.fmin(closest[seen, i], share[seen])
+        closest[known, i] = np.fmin(closest[known, i], share[known])
     return closest
 
 
@@ -129,7 +129,7 @@ def condition_spectra(
     *,
     averages: float,
     removed: Complex | None = None,
-    whole: Array | None = None,
+    total: Array | None = None,
     share: Array | None = None,
     references: int = 0,
 ) -> Conditioned:
@@ -143,7 +143,7 @@ def condition_spectra(
         inputs: how many of the channels are inputs.
         averages: number of independent windows.
         removed: responses that were taken out of the outputs beforehand and are added here, shape
-            (n_f, n_outputs, n_inputs). whole: spectra of the whole outputs then, shape (n_f, n_outputs).
+            (n_f, n_outputs, n_inputs). total: spectra of the whole outputs then, shape (n_f, n_outputs).
         share: of each input's power that is its own, where it is known better than by these spectra (`own_shares`).
         references: channels behind inputs and outputs that no loop feeds back: the joint estimate is made. Its noise is
             what the responses leave of the measured outputs with the measured inputs, which is the aircraft's own; what
@@ -158,9 +158,9 @@ def condition_spectra(
     auto = np.diagonal(gxx, axis1=1, axis2=2).real
     scale = np.sqrt(np.where(auto > 0.0, auto, 1.0))
     normal = gxx / (scale[:, :, None] * scale[:, None, :])
-    own, inverse = _inverse(normal)
+    lone, inverse = _inverse(normal)
     if share is not None:
-        own = np.fmin(own, share) if references else share
+        lone = np.fmin(lone, share) if references else share
     inverse = inverse / (scale[:, :, None] * scale[:, None, :])
     h = inverse @ gxy  # (n_f, n_inputs, n_outputs)
     explained = np.einsum("fio,fio->fo", gxy.conj(), h).real
@@ -171,14 +171,14 @@ def condition_spectra(
         untold = np.maximum(np.diagonal(measured[:, :inputs, :inputs], axis1=1, axis2=2).real - auto, 0.0)
         a = np.diagonal(inverse, axis1=1, axis2=2).real
         strong = random_error(1.0 / (1.0 + untold * a), averages - (inputs - 1)) < WEAK
-        own = np.where(strong | ~np.isfinite(own), own, 0.0)
+        lone = np.where(strong | ~np.isfinite(lone), lone, 0.0)
     estimate = h.transpose(0, 2, 1) if removed is None else h.transpose(0, 2, 1) + removed
-    response = np.where(own[:, None, :] > SINGULAR, estimate, np.nan)
+    response = np.where(lone[:, None, :] > SINGULAR, estimate, np.nan)
     a = np.diagonal(inverse, axis1=1, axis2=2).real
     power = np.abs(response) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         coherence = power / (a[:, None, :] * noise[:, :, None] + power)
-        multiple = explained / gyy if whole is None else 1.0 - noise / whole
+        multiple = explained / gyy if total is None else 1.0 - noise / total
         input_power = np.where(a > 0.0, 1.0 / np.where(a > 0.0, a, 1.0), np.nan)
         cross = response * input_power[:, None, :]
     return Conditioned(
@@ -188,7 +188,7 @@ def condition_spectra(
         input_power=input_power,
         output_power=noise[:, :, None] + power * input_power[:, None, :],
         cross=np.asarray(cross, dtype=np.complex128),
-        own_share=own,
+        own_share=lone,
         error=random_error(coherence, averages - (inputs - 1)),
         noise=left,
         inverse=inverse,
@@ -203,8 +203,8 @@ def _unexplained(spectra: Complex, h: Complex) -> Complex:
     """
     n = h.shape[1]
     across = h.conj().transpose(0, 2, 1) @ spectra[:, :n, n:]
-    made = h.conj().transpose(0, 2, 1) @ spectra[:, :n, :n] @ h
-    return np.asarray(spectra[:, n:, n:] - across - across.conj().transpose(0, 2, 1) + made)
+    answered = h.conj().transpose(0, 2, 1) @ spectra[:, :n, :n] @ h
+    return np.asarray(spectra[:, n:, n:] - across - across.conj().transpose(0, 2, 1) + answered)
 
 
 def _freedom(averages: float, inputs: int) -> float:
@@ -219,18 +219,18 @@ def _inverse(normal: Complex) -> tuple[Array, Complex]:
     An input that no null vector touches is conditioned rightly by the pseudo-inverse; the others have no own share.
     """
     n_f, n = normal.shape[:2]
-    own = np.full((n_f, n), np.nan)
+    share = np.full((n_f, n), np.nan)
     inverse = np.full_like(normal, np.nan)
     finite = np.all(np.isfinite(normal), axis=(1, 2))
     lowest = np.full(n_f, np.nan)
     lowest[finite] = np.linalg.eigvalsh(normal[finite])[:, 0]
     well = finite & (lowest > 1e-9)
     inverse[well] = np.linalg.inv(normal[well])
-    own[well] = 1.0 / np.maximum(np.diagonal(inverse[well], axis1=1, axis2=2).real, 1.0)
+    share[well] = 1.0 / np.maximum(np.diagonal(inverse[well], axis1=1, axis2=2).real, 1.0)
     for f in np.flatnonzero(finite & ~well):
-        own[f] = _shares(normal[f])
+        share[f] = _shares(normal[f])
         inverse[f] = np.linalg.pinv(normal[f], rcond=1e-9, hermitian=True)
-    return own, inverse
+    return share, inverse
 
 
 def _shares(normal: Complex) -> Array:
@@ -241,8 +241,8 @@ def _shares(normal: Complex) -> Array:
         others = [j for j in range(n) if j != i]
         gii = normal[i, i].real
         across = normal[others, i]
-        told = float((across.conj() @ np.linalg.pinv(normal[np.ix_(others, others)], rcond=1e-9) @ across).real)
-        share[i] = max(gii - told, 0.0)
+        explained = float((across.conj() @ np.linalg.pinv(normal[np.ix_(others, others)], rcond=1e-9) @ across).real)
+        share[i] = max(gii - explained, 0.0)
     return share
 
 
@@ -274,14 +274,14 @@ def project_on_references(spectra: Complex, inputs: int, references: int) -> Com
         The matrix of explained inputs and outputs.
     """
     n = spectra.shape[1] - references
-    told = spectra[:, :inputs, n:]  # S_ur
+    cross = spectra[:, :inputs, n:]  # S_ur
     grr = spectra[:, n:, n:]
     out = spectra[:, :n, :n].copy()
     usable = np.all(np.isfinite(spectra), axis=(1, 2))
     inverse = np.full_like(grr, np.nan)
     inverse[usable] = np.linalg.pinv(grr[usable], rcond=1e-9, hermitian=True)
-    gain = told @ inverse
-    out[:, :inputs, :inputs] = gain @ told.conj().transpose(0, 2, 1)
+    gain = cross @ inverse
+    out[:, :inputs, :inputs] = gain @ cross.conj().transpose(0, 2, 1)
     out[:, :inputs, inputs:n] = gain @ spectra[:, n:, inputs:n]
     out[:, inputs:n, :inputs] = out[:, :inputs, inputs:n].conj().transpose(0, 2, 1)
     return out

@@ -39,18 +39,18 @@ _FOLDED = 0.45
 
 
 def own_references(
-    pieces: Sequence[Signals], told: Sequence[ToldSweeps], commands: Sequence[int]
+    pieces: Sequence[Signals], logged: Sequence[ToldSweeps], commands: Sequence[int]
 ) -> tuple[SweepOfCommand, ...]:
     """What sweeps in the commands serve as references for.
 
     Args:
-        pieces: records. told: what the log says of each (`told_sweeps`).
+        pieces: records. logged: what the log says of each (`told_sweeps`).
         commands: columns of the commands in the records.
     """
     places = list(commands)
     return tuple(
         excitation
-        for k, (piece, (_, events)) in enumerate(zip(pieces, told, strict=True))
+        for k, (piece, (_, events)) in enumerate(zip(pieces, logged, strict=True))
         for excitation in _sweeps_in(k, piece, piece.values[:, places], events)
     )
 
@@ -58,16 +58,16 @@ def own_references(
 def _sweeps_in(k: int, piece: Signals, commands: Array, events: Sequence[Event]) -> list[SweepOfCommand]:
     """The sweeps of one record: those that the log tells of, and where it tells none, those that are seen."""
     time: Array = np.asarray(piece.start + np.arange(len(commands)) * piece.dt, dtype=np.float64)
-    told = [one for event in events if (one := _told(k, time, commands, event)) is not None]
-    if told:
-        return told
-    seen: list[tuple[float, int, Ridge]] = []
+    logged = [one for event in events if (one := _logged_sweep(k, time, commands, event)) is not None]
+    if logged:
+        return logged
+    ridges: list[tuple[float, int, Ridge]] = []
     for i in range(commands.shape[1]):
         for ridge in all_rising(time, commands[:, i]):
             octaves = float(np.log2(ridge.frequency[-1] / ridge.frequency[0]))
-            seen.append((ridge.share * octaves, i, ridge))
+            ridges.append((ridge.share * octaves, i, ridge))
     kept: list[tuple[int, Ridge]] = []
-    for _, i, ridge in sorted(seen, key=lambda item: -item[0]):
+    for _, i, ridge in sorted(ridges, key=lambda item: -item[0]):
         if not any(ridge.start < other.stop and other.start < ridge.stop for _, other in kept):
             kept.append((i, ridge))
     return [
@@ -95,20 +95,20 @@ def _followed(
     """A sweep with what each command has of it; what the program added is its reference where that is known."""
     parts = np.stack([course.in_signal(command) for command in commands.T], axis=1)
     inside = course.inside
-    power, whole = np.mean(parts[inside] ** 2, axis=0), np.mean(commands[inside] ** 2, axis=0)
+    power, total = np.mean(parts[inside] ** 2, axis=0), np.mean(commands[inside] ** 2, axis=0)
     how = "the log's law" if added is not None else "its law" if course.lawful else "its phase"
     start, stop = time[inside][[0, -1]]
     return SweepOfCommand(
         references={k: parts if added is None else np.repeat(added[:, None], parts.shape[1], axis=1)},
         size=np.sqrt(power),
-        share=power / np.where(whole > 0.0, whole, 1.0),
-        words=f"{start:.1f} to {stop:.1f} s, {band[0]:.3g} to {band[1]:.3g} Hz, by {how}",
+        share=power / np.where(total > 0.0, total, 1.0),
+        times=f"{start:.1f} to {stop:.1f} s, {band[0]:.3g} to {band[1]:.3g} Hz, by {how}",
         axis="" if event is None else axis_of(event),
         channel="" if event is None else channel_of(event),
     )
 
 
-def _told(k: int, time: Array, commands: Array, event: Event) -> SweepOfCommand | None:
+def _logged_sweep(k: int, time: Array, commands: Array, event: Event) -> SweepOfCommand | None:
     """An autopilot's chirp by its law, as far as it was flown; None where it lies outside the record."""
     law = [event.details.get(field.name) for field in fields(Chirp)]
     numbers = [value for value in law if isinstance(value, int | float) and not isinstance(value, bool)]
@@ -120,11 +120,11 @@ def _told(k: int, time: Array, commands: Array, event: Event) -> SweepOfCommand 
     inside = (time >= start) & (time <= stop) & (chirp.frequency(time - start) < _FOLDED / float(time[1] - time[0]))
     if inside.sum() * float(time[1] - time[0]) < 2.0 / chirp.start_hz:
         return None
-    own = time[inside] - start
-    frequency = chirp.frequency(own)
+    elapsed = time[inside] - start
+    frequency = chirp.frequency(elapsed)
     phase = 2.0 * np.pi * np.cumsum(frequency) * float(time[1] - time[0])
     added = np.zeros(time.size)
-    added[inside] = chirp.signal(own)
+    added[inside] = chirp.signal(elapsed)
     course = Course(inside, phase, lawful=True)
     band = (float(frequency[0]), float(frequency[-1]))
     return _followed(k, time, commands, course, band=band, added=added, event=event)
@@ -148,7 +148,7 @@ class References:
         beside: inputs that are not named but were swept: the responses are conditioned on them.
         columns: for every record, shape (n, n_references).
         swept: whether each input, named and beside, has a sweep of its own.
-        own: the place among the references of that of each input, where it has one.
+        reference_of: the place among the references of that of each input, where it has one.
         sweeps: of the inputs, in words.
         unused: sweeps of commands that are not there, in words.
         answering: named inputs that only answer the sweeps of others.
@@ -158,29 +158,29 @@ class References:
     beside: tuple[str, ...]
     columns: tuple[Array, ...]
     swept: tuple[bool, ...]
-    own: Mapping[int, int]
+    reference_of: Mapping[int, int]
     sweeps: tuple[str, ...]
     unused: tuple[str, ...]
     answering: tuple[str, ...]
     tracked: bool
 
     def broken_loops(
-        self, pieces: Sequence[Signals], place: Mapping[str, int], whole: Sequence[str], outputs: Sequence[str]
+        self, pieces: Sequence[Signals], place: Mapping[str, int], inputs: Sequence[str], outputs: Sequence[str]
     ) -> tuple[str, ...]:
         """The outputs that are the rest of a named input beside its own reference: loops broken there.
 
         Args:
-            pieces: records. place: columns by name. whole: the inputs, named and beside. outputs: names.
+            pieces: records. place: columns by name. inputs: all, named and beside. outputs: names.
         """
         fed = {name: place[name] for name in outputs}
-        words = [
-            broken_at(pieces, [columns[:, self.own[i]] for columns in self.columns], place[name], fed)
-            for i, name in enumerate(whole[: len(whole) - len(self.beside)])
-            if i in self.own
+        broken = [
+            broken_at(pieces, [columns[:, self.reference_of[i]] for columns in self.columns], place[name], fed)
+            for i, name in enumerate(inputs[: len(inputs) - len(self.beside)])
+            if i in self.reference_of
         ]
-        return tuple(dict.fromkeys(name for names in words for name in names))
+        return tuple(dict.fromkeys(name for names in broken for name in names))
 
-    def words(self, hertz: Array, held: NDArray[np.bool_], outputs: Sequence[str], loops: Sequence[str]) -> list[str]:
+    def notes(self, hertz: Array, held: NDArray[np.bool_], outputs: Sequence[str], loops: Sequence[str]) -> list[str]:
         """What a reader must know of sweeps that the named inputs do not own.
 
         Args:
@@ -196,14 +196,14 @@ class References:
             )
         for name, still in zip(self.beside, held[:, len(self.swept) - len(self.beside) :].T, strict=True):
             inside = hertz[still] if aircraft else hertz[:0]
-            words = f"'{name}' was swept too."
+            text = f"'{name}' was swept too."
             if inside.size:
-                words += f" In the responses of {aircraft} it is held still"
-                words += "." if still.all() else f" from {inside.min():.3g} to {inside.max():.3g} Hz."
+                text += f" In the responses of {aircraft} it is held still"
+                text += "." if still.all() else f" from {inside.min():.3g} to {inside.max():.3g} Hz."
             if inside.size < hertz.size:
-                words += " Elsewhere" if inside.size else " Its stretch is left out, and else"
-                words += " its loop moves it along."
-            said.append(f"{words} Add it to --inputs for the responses to it.")
+                text += " Elsewhere" if inside.size else " Its stretch is left out, and else"
+                text += " its loop moves it along."
+            said.append(f"{text} Add it to --inputs for the responses to it.")
         if self.unused:
             said.append(f"sweeps of commands that are not in these records were not used: {'; '.join(self.unused)}.")
         return said
@@ -211,7 +211,7 @@ class References:
 
 def references_of(
     pieces: Sequence[Signals],
-    told: Sequence[ToldSweeps],
+    logged: Sequence[ToldSweeps],
     commands: Mapping[str, int],
     named: int,
     recorded: Mapping[str, int],
@@ -224,7 +224,7 @@ def references_of(
     log per axis is how axes are swept. Several recorded references stay as they are.
 
     Args:
-        pieces: records. told: what the log says of each.
+        pieces: records. logged: what the log says of each.
         commands: their columns in the records by name; the first `named` are the inputs that were asked for.
         recorded: columns of recorded references by name; none where the sweeps themselves serve.
         called: the log's names of commands that were given others.
@@ -234,34 +234,34 @@ def references_of(
     """
     names, places = list(commands), list(commands.values())
     inputs = names[:named]
-    groups = [_recorded(pieces, told, places, named, column) for column in recorded.values()]
-    excitations = [one for group in groups for one in group] if recorded else own_references(pieces, told, places)
+    groups = [_recorded(pieces, logged, places, named, column) for column in recorded.values()]
+    excitations = [one for group in groups for one in group] if recorded else own_references(pieces, logged, places)
     if not excitations:
         return None
     owners = owners_of(excitations, names, named, called=called)
     # Another recorded reference, as a set-point, may move what no sweep does.
     by_log = not recorded or all(one.channel for one in excitations)
-    answering = only_answering(told, inputs, called=called) if by_log else ()
+    answering = only_answering(logged, inputs, called=called) if by_log else ()
     if len(answering) == named:
         raise FlightError(
-            answering_words(told, answering).removeprefix(f"{', '.join(answering)}: "),
+            answering_words(logged, answering).removeprefix(f"{', '.join(answering)}: "),
             channel=", ".join(answering),
             hint="Name the command that was swept, or fly a sweep of this axis. --direct without --references gives "
             "what the records show, as it is.",
         )
     beside = tuple(name for name in names[named:] if name in owners)
-    whole = (*inputs, *beside)
-    if not recorded and not any(name in owners for name in whole):
+    every = (*inputs, *beside)
+    if not recorded and not any(name in owners for name in every):
         return None
-    swept = tuple(name in owners for name in whole)
+    swept = tuple(name in owners for name in every)
     columns: list[list[Array]] = []  # for every reference, one a record
-    own: dict[int, int] = {}
+    of_input: dict[int, int] = {}
     owned = list(zip(excitations, owners, strict=True))
     for group, place in zip(groups, recorded.values(), strict=True) if recorded else ((excitations, -1),):
         if len(recorded) > 1 and not all(one.axis for one in group):
             columns.append([piece.values[:, place] for piece in pieces])
             continue
-        for i, name in enumerate(whole):
+        for i, name in enumerate(every):
             parts = [np.zeros(len(piece.values)) for piece in pieces]
             mine = [one for one, owner in owned if owner == name and one in group]
             for one in mine:
@@ -270,24 +270,24 @@ def references_of(
             if not mine and not recorded:  # an input without a sweep is its own reference
                 parts = [piece.values[:, places[names.index(name)]] for piece in pieces]
             if mine or not recorded:
-                own |= {i: len(columns)} if mine else {}
+                of_input |= {i: len(columns)} if mine else {}
                 columns.append(parts)
     references = References(
         beside,
         tuple(np.stack(parts, axis=1) for parts in zip(*columns, strict=True)),
         swept,
-        own,
-        tuple(f"{owner}: {one.words}" for one, owner in owned if owner in whole),
-        tuple(f"{one.axis}: {one.words}" for one, owner in owned if owner not in whole),
+        of_input,
+        tuple(f"{owner}: {one.times}" for one, owner in owned if owner in every),
+        tuple(f"{one.axis}: {one.times}" for one, owner in owned if owner not in every),
         answering,
         tracked=not recorded,
     )
-    if len(columns) < len(whole):
-        lacking = ", ".join(f"'{name}'" for name, known in zip(whole, swept, strict=True) if not known)
+    if len(columns) < len(every):
+        lacking = ", ".join(f"'{name}'" for name, known in zip(every, swept, strict=True) if not known)
         raise FlightError(
-            f"{len(columns)} reference(s) cannot tell {len(whole)} inputs apart"
+            f"{len(columns)} reference(s) cannot tell {len(every)} inputs apart"
             + (f": no sweep of {lacking} was found." if lacking else "."),
-            channel=", ".join(whole),
+            channel=", ".join(every),
             hint="Give as many independent references as inputs, or sweeps of each axis, one after the other or in "
             "logs of their own.",
         )
@@ -295,12 +295,12 @@ def references_of(
 
 
 def _recorded(
-    pieces: Sequence[Signals], told: Sequence[ToldSweeps], commands: Sequence[int], named: int, column: int
+    pieces: Sequence[Signals], logged: Sequence[ToldSweeps], commands: Sequence[int], named: int, column: int
 ) -> list[SweepOfCommand]:
     """A recorded reference, split by the log's sweeps where it is one of them, otherwise by flight."""
     stretches: list[tuple[int, Event, NDArray[np.bool_]]] = []
     loud = quiet = 0.0
-    for k, (piece, (_, events)) in enumerate(zip(pieces, told, strict=True)):
+    for k, (piece, (_, events)) in enumerate(zip(pieces, logged, strict=True)):
         time = piece.start + np.arange(len(piece.values)) * piece.dt
         rest = np.ones(time.size, dtype=bool)
         for event in events:
@@ -317,7 +317,7 @@ def _recorded(
             for k, event, inside in stretches
         ]
     flights: dict[int, dict[int, tuple[Signals, NDArray[np.bool_]]]] = {}
-    for k, (piece, (flight, _)) in enumerate(zip(pieces, told, strict=True)):
+    for k, (piece, (flight, _)) in enumerate(zip(pieces, logged, strict=True)):
         flights.setdefault(flight, {})[k] = piece, np.ones(len(piece.values), dtype=bool)
     return [_followed_stretch(parts, commands, named, column, None) for parts in flights.values()]
 
@@ -352,7 +352,7 @@ def _followed_stretch(
         },
         size=size,
         share=share,
-        words=f"{start:.1f} to {stop:.1f} s, as recorded",
+        times=f"{start:.1f} to {stop:.1f} s, as recorded",
         axis="" if event is None else axis_of(event),
         channel="" if event is None else channel_of(event),
     )

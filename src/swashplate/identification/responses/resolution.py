@@ -87,8 +87,8 @@ def without(pieces: Sequence[Signals], omega: Array, guess: Complex) -> list[Sig
         for o in range(n_out):
             for i in np.flatnonzero(np.any(guess[:, o, :], axis=0)):
                 h = guess[:, o, i]
-                told = np.exp(between(np.log(np.abs(h))) + 1j * between(np.unwrap(np.angle(h))))
-                values[:, n_in + o] -= irfft(told * spectra[:, i], size)[:n]
+                response = np.exp(between(np.log(np.abs(h))) + 1j * between(np.unwrap(np.angle(h))))
+                values[:, n_in + o] -= irfft(response * spectra[:, i], size)[:n]
         left.append(replace(piece, values=values))
     return left
 

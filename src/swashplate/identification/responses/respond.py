@@ -152,22 +152,22 @@ def respond(
     fed = {name: place[name] for name in (*inputs, *outputs)}
     refuse_copied_references(pieces, recorded, fed)
     copies = copies_of(pieces, *({name: place[name] for name in names} for names in (inputs, outputs)))
-    called, moved = renamed_channels(flights, commands), None
+    called, refs = renamed_channels(flights, commands), None
     if references or not direct:
-        moved = references_of(pieces, logged, commands, len(inputs), recorded, called=called)
-    swept = [name for name, seen in zip(inputs, moved.swept, strict=False) if seen] if moved else []
+        refs = references_of(pieces, logged, commands, len(inputs), recorded, called=called)
+    swept = [name for name, is_swept in zip(inputs, refs.swept, strict=False) if is_swept] if refs else []
     motion = [name for name in outputs if all(name != copy.other for copy in copies)]
     excitation = of_inputs(excitations(flights, inputs, outputs=motion, references=references, swept=swept))
-    answering = moved.answering if moved else only_answering(logged, inputs, called=called)
+    answering = refs.answering if refs else only_answering(logged, inputs, called=called)
     # What was swept beside the named inputs is held still with them; the named ones are given.
-    whole = (*inputs, *(moved.beside if moved else ()))
-    n = len(whole) + len(outputs)
-    channels = [place[name] for name in (*whole, *outputs)]
-    own = [replace(piece, values=piece.values.take(channels, axis=1)) for piece in pieces]
-    if moved:
-        own = [
+    every = (*inputs, *(refs.beside if refs else ()))
+    n = len(every) + len(outputs)
+    channels = [place[name] for name in (*every, *outputs)]
+    cut = [replace(piece, values=piece.values.take(channels, axis=1)) for piece in pieces]
+    if refs:
+        cut = [
             replace(piece, values=np.concatenate([piece.values, c], axis=1))
-            for piece, c in zip(own, moved.columns, strict=True)
+            for piece, c in zip(cut, refs.columns, strict=True)
         ]
     rate = 1.0 / pieces[0].dt
     highest = min(band[1], 0.499 * rate) if band else rate / 10.0
@@ -182,32 +182,32 @@ def respond(
     chosen = choose_windows([piece.duration for piece in pieces], highest)
     if windows is not None:
         chosen = Windows(tuple(sorted((float(w) for w in windows), reverse=True)), ())
-    question = ResponseQuestion(whole, outputs, own[0].values.shape[1] - n, lines, moved is not None and moved.tracked)
+    question = ResponseQuestion(every, outputs, cut[0].values.shape[1] - n, lines, refs is not None and refs.tracked)
     limits = (band[0] if band else None, highest)
-    loops = moved.broken_loops(pieces, place, whole, outputs) if moved else ()
-    aside = {i: k for i, k in moved.own.items() if i >= len(inputs)} if moved else {}
+    loops = refs.broken_loops(pieces, place, every, outputs) if refs else ()
+    aside = {i: k for i, k in refs.reference_of.items() if i >= len(inputs)} if refs else {}
     beside = Beside(aside, [outputs.index(name) for name in loops])
-    estimate = estimate_beside(own, chosen.lengths, overlap, limits, question, beside)
+    estimate = estimate_beside(cut, chosen.lengths, overlap, limits, question, beside)
     half = min(piece.duration for piece in pieces) / 2.0
-    words = blur(*(each.select(outputs, inputs) for each in (estimate.blurred, estimate.made)))
+    blurred_by = blur(*(each.select(outputs, inputs) for each in (estimate.blurred, estimate.sharpened)))
     blur_words: list[str] = []
-    if words and half >= LONGER * chosen.lengths[0]:
-        words = f"windows of up to {chosen.lengths[0]:.3g} s {words}"
+    if blurred_by and half >= LONGER * chosen.lengths[0]:
+        blurred_by = f"windows of up to {chosen.lengths[0]:.3g} s {blurred_by}"
         if windows is None:
-            estimate = estimate_beside(own, (half, *chosen.lengths), overlap, limits, question, beside)
-            blur_words = [f"{words}; one of {half:.3g} s, half the shortest record, was added."]
+            estimate = estimate_beside(cut, (half, *chosen.lengths), overlap, limits, question, beside)
+            blur_words = [f"{blurred_by}; one of {half:.3g} s, half the shortest record, was added."]
         else:
             blur_words = [
-                f"{words}: something of it may be left. Longer windows (--settings windows={half:.3g},...) help."
+                f"{blurred_by}: something of it may be left. Longer windows (--settings windows={half:.3g},...) help."
             ]
-    omega, matrices, notes, blurred, made, free, held = estimate
+    omega, matrices, notes, blurred, result, free, held = estimate
     if scraps:
         notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
     if band and band[1] > highest and not slow_words:
         notes.append(
             f"the band ends at half the rate, {highest:.4g} Hz, not at {band[1]:.4g} Hz; read the logs faster."
         )
-    made = replace(made, sources=tuple(piece.name for piece in pieces))
+    result = replace(result, sources=tuple(piece.name for piece in pieces))
     data = sources_of(flights)
     warnings = [*slow_words, *chosen.warnings, *notes, *problem_words(data)]
     problems = [*response_warnings.damaged(data), *scale_words(data)]
@@ -225,58 +225,58 @@ def respond(
         biased = response_warnings.biased_by_feedback(blurred, free)
         named = biased[:, :, : len(inputs)]
         warnings += response_warnings.bias_words(blurred.select(outputs, inputs), free, named)
-        made = replace(made, direct=free.response, direct_error=free.error)
-        if moved and moved.tracked:
-            known = [has or name in answering for has, name in zip(moved.swept, whole, strict=True)]
-            made, words_of_unswept = response_warnings.without_unswept(made, known, biased)
+        result = replace(result, direct=free.response, direct_error=free.error)
+        if refs and refs.tracked:
+            known = [has or name in answering for has, name in zip(refs.swept, every, strict=True)]
+            result, words_of_unswept = response_warnings.without_unswept(result, known, biased)
             warnings += words_of_unswept
-    made = without_copies(made, copies)
-    if moved and answering:
-        response = made.response.copy()
-        response[:, :, [whole.index(name) for name in answering]] = np.nan
-        made = replace(made, response=response)
+    result = without_copies(result, copies)
+    if refs and answering:
+        response = result.response.copy()
+        response[:, :, [every.index(name) for name in answering]] = np.nan
+        result = replace(result, response=response)
     # The window that was added counts only where its own error says so.
     warnings += response_warnings.few_averages(matrices[len(blur_words) if windows is None else 0 :])
     warnings += blur_words
-    warnings += response_warnings.mixing_words(made, named=len(inputs))
-    silent = response_warnings.still(flights, (*whole, *outputs))
-    silent = (*silent, *whole[len(inputs) :], *(copy.other for copy in copies))
-    lacking = [*copy_words(copies), *response_warnings.correlated(made, dead=silent)]
+    warnings += response_warnings.mixing_words(result, named=len(inputs))
+    silent = response_warnings.still(flights, (*every, *outputs))
+    silent = (*silent, *every[len(inputs) :], *(copy.other for copy in copies))
+    lacking = [*copy_words(copies), *response_warnings.correlated(result, dead=silent)]
     lacking += [answering_words(logged, answering)] if answering else []
-    unswept = [name for name, known in zip(whole, moved.swept, strict=True) if not known] if moved else []
-    lacking += response_warnings.untold(made, dead=(*silent, *unswept))
-    made = made.select(outputs, inputs)
-    warnings += response_warnings.lead_words(made)
-    lacking += response_warnings.incoherent(made)
+    unswept = [name for name, known in zip(every, refs.swept, strict=True) if not known] if refs else []
+    lacking += response_warnings.untold(result, dead=(*silent, *unswept))
+    result = result.select(outputs, inputs)
+    warnings += response_warnings.lead_words(result)
+    lacking += response_warnings.incoherent(result)
     # A response that cannot be given is an error only where nothing else is given.
-    given = any(made.band(output, name) for output in outputs for name in inputs)
+    given = any(result.band(output, name) for output in outputs for name in inputs)
     warnings, problems = (warnings + lacking, problems) if given else (warnings, problems + lacking)
-    if moved:
-        warnings += moved.words(omega / TWO_PI, held, outputs, loops)
-    channels_of = renamed_channels(flights, (*inputs, *outputs))
+    if refs:
+        warnings += refs.notes(omega / TWO_PI, held, outputs, loops)
+    renamed = renamed_channels(flights, (*inputs, *outputs))
     problems += sign_problems(
-        made.select(outputs, tuple(name for name in inputs if excitation[name].outside)), flights[0], called=channels_of
+        result.select(outputs, tuple(name for name in inputs if excitation[name].outside)), flights[0], called=renamed
     )
     if not references:
         axes = max(len({event.details["axis"] for one in logged for event in one.sweeps}), len(flights))
-        warnings += response_warnings.unused_references(flights, whole, names=INJECTED, axes=axes)
-    rest = [name for name in others if name not in whole]
+        warnings += response_warnings.unused_references(flights, every, names=INJECTED, axes=axes)
+    rest = [name for name in others if name not in every]
     if rest and not all(name.startswith(INJECTED) for name in inputs):
         channels = [*channels, *(place[name] for name in rest)]
         warnings += response_warnings.bystander_words(
             [replace(piece, values=piece.values[:, channels]) for piece in pieces],
             omega,
-            whole,
+            every,
             outputs,
             rest,
             named=len(inputs),
             closed=loops,
             window=chosen.lengths[len(chosen.lengths) // 2],
             overlap=overlap,
-            incoherent=[o for o in outputs if all(made.band(o, name) is None for name in inputs)],
+            incoherent=[o for o in outputs if all(result.band(o, name) is None for name in inputs)],
         )
     return replace(
-        made,
+        result,
         input_units=tuple(unit_of(flights[0], name) for name in inputs),
         output_units=tuple(unit_of(flights[0], name) for name in outputs),
         warnings=tuple(warnings),
@@ -286,10 +286,10 @@ def respond(
             "band_hz": [float(omega[0] / TWO_PI), float(highest)],
             "overlap": overlap,
             "references": list(references),
-            **({"sweeps": list(moved.sweeps)} if moved and moved.tracked else {}),
-            **({"beside": list(moved.beside)} if moved and moved.beside else {}),
+            **({"sweeps": list(refs.sweeps)} if refs and refs.tracked else {}),
+            **({"beside": list(refs.beside)} if refs and refs.beside else {}),
             "averages": [m.averages for m in matrices],
-            **({"channels": channels_of} if channels_of else {}),
+            **({"channels": renamed} if renamed else {}),
             "excitation": {name: {"kind": one.kind, "words": one.words} for name, one in excitation.items()},
             **autopilot_facts(flights),
             "hashes": hashes(flights),

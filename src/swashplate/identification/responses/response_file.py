@@ -74,8 +74,8 @@ def save(fields: Mapping[str, Any], path: Path) -> Path:
         "output": list(fields["outputs"]),
         "input": list(fields["inputs"]),
     }
-    words = {name: fields[name] for name in _Words.__struct_fields__}
-    attributes = {"swashplate_response": SCHEMA, "words": json.dumps(words, default=str)}
+    texts = {name: fields[name] for name in _Words.__struct_fields__}
+    attributes = {"swashplate_response": SCHEMA, "words": json.dumps(texts, default=str)}
     data = xr.Dataset(variables, coords=coordinates, attrs=attributes)
     encoding: dict[Any, Any] = {name: {"_FillValue": None} for name in (*variables, "frequency")}
     file = io.BytesIO()  # not on the disk: where that is full, the HDF5 library ends the whole process
@@ -97,7 +97,7 @@ def load(path: Path) -> dict[str, Any]:
             raise ValueError("it says nothing of responses")
         attributes, data = groups[""].attributes, groups[""].variables
         schema = int(np.ravel(attributes["swashplate_response"])[0])
-        words = documents.parse_logged(attributes["words"], _Words, where=path, at="words", error=FlightError)
+        texts = documents.parse_logged(attributes["words"], _Words, where=path, at="words", error=FlightError)
         arrays: dict[str, Any] = {name: np.asarray(data[name].values, dtype=np.float64) for name in _ARRAYS}
         response = data["response_real"].values + 1j * data["response_imag"].values
         beside: dict[str, Any] = {}
@@ -131,4 +131,4 @@ def load(path: Path) -> dict[str, Any]:
     if together:
         beside["shared"] = SharedErrors(**together)
     channels = {"omega": omega, "inputs": inputs, "outputs": outputs}
-    return {**channels, "response": response, **arrays, **beside, **msgspec.structs.asdict(words)}
+    return {**channels, "response": response, **arrays, **beside, **msgspec.structs.asdict(texts)}

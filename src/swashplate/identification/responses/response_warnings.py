@@ -55,19 +55,19 @@ def dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str
     ]
 
 
-def answers(moved: Mapping[str, Excitation]) -> list[str]:
+def answers(inputs: Mapping[str, Excitation]) -> list[str]:
     """Inputs that are a controller's answer."""
     return [
         f"{one.record}: input '{name}' is {one.words} Its responses are minus the controller's inverse, not the "
         f"aircraft's, however coherent. {FLY}"
-        for name, one in moved.items()
+        for name, one in inputs.items()
         if one.kind == CONTROLLER
     ]
 
 
-def unsure(moved: Mapping[str, Excitation]) -> list[str]:
+def unsure(inputs: Mapping[str, Excitation]) -> list[str]:
     """Inputs of which nobody knows whether they are a controller's answer."""
-    return [f"{one.record}: input '{name}': {one.words}" for name, one in moved.items() if one.kind == UNKNOWN]
+    return [f"{one.record}: input '{name}': {one.words}" for name, one in inputs.items() if one.kind == UNKNOWN]
 
 
 def damaged(logs: Sequence[DataSource]) -> list[str]:
@@ -99,22 +99,22 @@ def correlated(pairs: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
 
 def untold(pairs: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
     """Inputs of which references tell too little somewhere inside the band that they tell."""
-    words = []
+    lines = []
     for i, name in enumerate(pairs.inputs):
         known = np.isfinite(pairs.response[:, :, i]).any(axis=1)
         lost = ~known & np.isfinite(pairs.input_power[:, i])
         if pairs.method == "direct" or name in dead or not lost.any():
             continue
         weak = "the references are" if pairs.method == "joint" else "its sweep is"
-        words.append(
+        lines.append(
             f"{weak} too weak in '{name}' at {_bands(pairs.omega, lost)}, where a loop's response to gusts dominates: "
             "no number is given there. Sweep slower or larger."
         )
-    return words
+    return lines
 
 
 def incoherent(pairs: FrequencyResponse) -> list[str]:
-    words = []
+    lines = []
     for output in pairs.outputs:
         o = pairs.outputs.index(output)
         # Where the inputs could not be told apart nearly everywhere, that is what is said.
@@ -122,11 +122,11 @@ def incoherent(pairs: FrequencyResponse) -> list[str]:
             continue
         if all(pairs.band(output, name) is None for name in pairs.inputs):
             best = float(np.nanmax(pairs.coherence[:, o, :]))
-            words.append(
+            lines.append(
                 f"{_logs(pairs)}: no input reaches a coherence of {LEAST_COHERENCE:g} with output '{output}' over a "
                 f"quarter of an octave (largest single value {best:.2f}): do not use its responses."
             )
-    return words
+    return lines
 
 
 def few_averages(matrices: Sequence[SpectralMatrix]) -> list[str]:
@@ -142,25 +142,25 @@ def mixing_words(pairs: FrequencyResponse, *, named: int) -> list[str]:
     Args:
         pairs: responses to all inputs, those that were asked for first. named: how many these are.
     """
-    words = []
+    lines = []
     for i, one in enumerate(pairs.inputs):
         for j, other in enumerate(pairs.inputs[: min(i, named)]):
             mixed = np.nan_to_num(pairs.input_coherence[:, i, j])
-            told = np.all(np.any(np.isfinite(pairs.response[:, :, [i, j]]), axis=1), axis=1)
-            mean = float(np.mean(mixed[told])) if told.any() else 0.0
+            known = np.all(np.any(np.isfinite(pairs.response[:, :, [i, j]]), axis=1), axis=1)
+            mean = float(np.mean(mixed[known])) if known.any() else 0.0
             if mean > MIXED:
-                words.append(
+                lines.append(
                     f"'{other}' and '{one}' moved together (mean coherence {mean:.2f}, over {MIXED:g}): "
                     "conditioning tells them apart, with larger errors."
                 )
-            nearly = told & (mixed > NEARLY_ONE)
+            nearly = known & (mixed > NEARLY_ONE)
             if nearly.any() and pairs.omega[nearly].max() >= pairs.omega[nearly].min() * 2.0**0.25:
-                words.append(
+                lines.append(
                     f"'{other}' and '{one}' were nearly one at {_hertz(pairs.omega, nearly)} (coherence up to "
                     f"{mixed[nearly].max():.2f}): what windows blur counts many times over there. Do not trust weak "
                     "responses to either, however coherent; fly one log per axis."
                 )
-    return words
+    return lines
 
 
 def biased_by_feedback(free: FrequencyResponse, direct: FrequencyResponse) -> NDArray[np.bool_]:
@@ -182,18 +182,18 @@ def biased_by_feedback(free: FrequencyResponse, direct: FrequencyResponse) -> ND
 
 def bias_words(free: FrequencyResponse, direct: FrequencyResponse, biased: NDArray[np.bool_]) -> list[str]:
     """For every response, the bands in which the loop makes the direct estimate another one."""
-    words = []
+    lines = []
     given = {"joint": "the joint estimate"}.get(free.method, "the estimate along the sweep")
     for o, output in enumerate(free.outputs):
         for i, name in enumerate(free.inputs):
             off = biased[:, o, i]
             if off.any():
                 apart = np.abs(np.log(direct.response[off, o, i] / free.response[off, o, i]))
-                words.append(
+                lines.append(
                     f"{output} / {name}: feedback biases the direct estimate by up to "
                     f"{20 / np.log(10.0) * np.nanmax(apart):.1f} dB at {_bands(free.omega, off)}; {given} is given."
                 )
-    return words
+    return lines
 
 
 def _bands(omega: Array, where: NDArray[np.bool_]) -> str:
@@ -267,7 +267,7 @@ def bystander_words(
     """
     n_in, n_out = len(inputs), len(outputs)
     first = pieces[0].values.shape[1] - len(others)
-    words: list[str] = []
+    lines: list[str] = []
     matrix = spectral_matrix(pieces, omega, window=window, overlap=overlap)
     if matrix is None:
         return []
@@ -283,7 +283,7 @@ def bystander_words(
             quieter = (1.0 - both.multiple) < EXPLAINED * (1.0 - alone.multiple)
         for o, output in enumerate(outputs):
             acts = quieter[:, o] & (both.coherence[:, o, n_in] >= CLEAR)
-            before = len(words)
+            before = len(lines)
             for i, mover in enumerate(inputs[:named] if output not in closed else ()):
                 h, b = alone.response[:, o, i], both.response[:, o, i]
                 with np.errstate(divide="ignore", invalid="ignore"):
@@ -291,16 +291,16 @@ def bystander_words(
                 bound = np.maximum(3.0 * both.error[:, o, i], np.log(10.0) / 40.0)
                 off = (both.error[:, o, i] < SURE) & (apart > bound) & acts
                 if off.sum() > max(2, 0.05 * np.isfinite(h).sum()):
-                    words.append(
+                    lines.append(
                         f"{output} / {mover}: '{name}' moved along and acts on {output} too at {_hertz(omega, off)}; "
                         f"this single response is wrong there. Add '{name}' to the inputs, and logs that move each."
                     )
-            if len(words) == before and output in incoherent and acts.sum() > max(2, 0.05 * omega.size):
-                words.append(
+            if len(lines) == before and output in incoherent and acts.sum() > max(2, 0.05 * omega.size):
+                lines.append(
                     f"{output}: '{name}' explains at {_hertz(omega, acts)} what the inputs leave. Add '{name}' to the "
                     "inputs."
                 )
-    return words
+    return lines
 
 
 RISING = 15.0
@@ -313,7 +313,7 @@ def lead_words(pairs: FrequencyResponse) -> list[str]:
     A stable system's phase rises only with its gain (Bode 1945: 90 degrees for 20 dB per decade), and delays make it
     fall. What is left is a controller that answers the motion, a time skew, or an unstable aircraft.
     """
-    words = []
+    lines = []
     for output in pairs.outputs:
         for name in pairs.inputs:
             h, _, error = pairs.pair(output, name)
@@ -329,13 +329,13 @@ def lead_words(pairs: FrequencyResponse) -> list[str]:
             gain, _ = _weighted_slope(decades, 20.0 * np.log10(np.abs(h[inside])), weight)
             ahead = phase * (decades[-1] - decades[0])
             if ahead > RISING and phase > 3.0 * sigma and gain < 1.0:
-                words.append(
+                lines.append(
                     f"{output} / {name}: the phase rises by {ahead:.0f} degrees over "
                     f"{_hertz(pairs.omega, inside)} while the gain does not: the output runs ahead of the input. A "
                     "controller that answers the motion looks like this, and so do channels skewed in time or an "
                     "unstable aircraft; do not take it for the aircraft unless an injected sweep (--references) agrees."
                 )
-    return words
+    return lines
 
 
 def _weighted_slope(x: Array, y: Array, weight: Array) -> tuple[float, float]:

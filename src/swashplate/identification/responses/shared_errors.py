@@ -85,11 +85,11 @@ def correlation_of_errors(omega: Sequence[Array], parts: Sequence[ErrorParts | N
     """
     sizes = [each.size for each in omega]
     alone = np.concatenate([np.full(n, one is None) for n, one in zip(sizes, parts, strict=True)])
-    told = [one for one in parts if one is not None]
+    known = [one for one in parts if one is not None]
     correlation = np.eye(alone.size, dtype=np.complex128)
-    if told:
+    if known:
         noise, inverse, window = (
-            np.concatenate([getattr(one, name) for one in told]) for name in ("noise", "inverse", "window")
+            np.concatenate([getattr(one, name) for one in known]) for name in ("noise", "inverse", "window")
         )
         lines = line_correlation(np.concatenate(omega)[~alone], window)
         correlation[np.ix_(~alone, ~alone)] = (noise @ noise.conj().T) * (inverse @ inverse.conj().T) * lines

@@ -48,9 +48,9 @@ def response_sign(
         return ResponseSign(output, input, expected, 0, 0.0, 0.0, (np.nan, np.nan), 0.0)
     lines = lines[np.unique(np.linspace(0, lines.size - 1, min(lines.size, LINES)).astype(int))]
     omega = pairs.omega[lines]
-    told, odds, misfit = sign_of(omega, h[lines], integrations=integrations, error=error[lines])
+    sign, odds, misfit = sign_of(omega, h[lines], integrations=integrations, error=error[lines])
     return ResponseSign(
-        output, input, expected, told, float(omega[0] / TWO_PI), float(omega[-1] / TWO_PI), misfit, odds
+        output, input, expected, sign, float(omega[0] / TWO_PI), float(omega[-1] / TWO_PI), misfit, odds
     )
 
 
@@ -71,10 +71,10 @@ def sign_problems(pairs: FrequencyResponse, flight: Flight, *, called: Mapping[s
         pairs: responses of inputs that were moved from outside.
         flight: that they are from. called: the log's channel by the name that it has here, where that is another one.
     """
-    words = []
+    problems = []
     for sign in response_signs(pairs):
         if sign.wrong:
-            own = called.get(sign.input, sign.input)
-            remedy = unit_to_give(flight, sign.input, sign="-").replace(f" {sign.input}=", f" {own}=")
-            words.append(sign.problem(remedy))
-    return words
+            name = called.get(sign.input, sign.input)
+            remedy = unit_to_give(flight, sign.input, sign="-").replace(f" {sign.input}=", f" {name}=")
+            problems.append(sign.problem(remedy))
+    return problems

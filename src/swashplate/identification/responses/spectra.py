@@ -111,10 +111,10 @@ def spectral_matrix(
     if not long_enough or n < 4:
         return None
     taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n)  # Hann's window, periodic
-    seen = omega * n * dt >= 2.0 * np.pi * periods * (1.0 - 1e-9)
-    kernel = _kernel(omega[seen], taper, dt)
+    resolved = omega * n * dt >= 2.0 * np.pi * periods * (1.0 - 1e-9)
+    kernel = _kernel(omega[resolved], taper, dt)
     step = max(1, round((1.0 - overlap) * n))
-    total = np.zeros((int(seen.sum()), channels, channels), dtype=np.complex128)
+    total = np.zeros((int(resolved.sum()), channels, channels), dtype=np.complex128)
     for piece in long_enough:
         # Half a window of nothing before and after: otherwise a taper would hide the ends, where sweeps begin and end,
         # and the more so the longer the window.
@@ -127,7 +127,7 @@ def spectral_matrix(
     values = np.full((omega.size, channels, channels), np.nan, dtype=np.complex128)
     length = sum(piece.duration for piece in long_enough)
     # Every sample lies under the same total of squared tapers: dividing by the records' length keeps the power.
-    values[seen] = total * (2.0 * dt / (length / (step * dt) * float(taper @ taper)))
+    values[resolved] = total * (2.0 * dt / (length / (step * dt) * float(taper @ taper)))
     averages = length / (n * dt)
     return SpectralMatrix(n * dt, averages, values, tuple(piece.name for piece in long_enough))
 

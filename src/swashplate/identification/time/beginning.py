@@ -103,11 +103,11 @@ def starting_samples(dt: float) -> int:
     return max(1, round(0.5 / dt))
 
 
-def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
+def begun(model: StochasticModel, numbers: FilterNumbers, first: FirstMotion) -> Begun:
     """The gain and the start of a run."""
     rows = FilterNumbers(*(np.asarray(row)[None] for row in numbers))
-    K, S, _ = steady_gain(*(part[0] for part in joined_at(model, rows, seen)))
-    return Begun(model.gain_of(K, S), starting_rows(model, rows, seen)[0])
+    K, S, _ = steady_gain(*(part[0] for part in joined_at(model, rows, first)))
+    return Begun(model.gain_of(K, S), starting_rows(model, rows, first)[0])
 
 
 def first_state(model: StochasticModel, x: Array, nuisance: Array) -> FilterState:
@@ -115,26 +115,26 @@ def first_state(model: StochasticModel, x: Array, nuisance: Array) -> FilterStat
     return FilterState(x, np.zeros((*x.shape[:-1], model.n_gusts)), nuisance[..., _PUSHES])
 
 
-def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
+def begun_moved(model: StochasticModel, numbers: FilterNumbers, first: FirstMotion, directions: FilterNumbers) -> Begun:
     """Slopes of `begun` along directions, which come first."""
     rows = _aside(numbers, directions)
-    matrices = joined_at(model, rows, seen)
+    matrices = joined_at(model, rows, first)
     here = A, C, Q, R = tuple(part[0] for part in matrices)
     P = steady_gain(A, C, Q, R)[2]
     dK, dS = steady_gain_moved(here, P, tuple(map(_slope_aside, matrices)))  # pyrefly: ignore[bad-argument-type]
-    return Begun(model.gain_of(dK, dS), _slope_aside(starting_rows(model, rows, seen)))
+    return Begun(model.gain_of(dK, dS), _slope_aside(starting_rows(model, rows, first)))
 
 
-def starting_row(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Array:
+def starting_row(model: StochasticModel, numbers: FilterNumbers, first: FirstMotion) -> Array:
     """The state that a run begins with; noise and mean velocity do not count."""
-    return np.asarray(starting_rows(model, FilterNumbers(*(np.asarray(row)[None] for row in numbers)), seen)[0])
+    return np.asarray(starting_rows(model, FilterNumbers(*(np.asarray(row)[None] for row in numbers)), first)[0])
 
 
 def starting_row_moved(
-    model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers
+    model: StochasticModel, numbers: FilterNumbers, first: FirstMotion, directions: FilterNumbers
 ) -> Array:
     """Slopes of `starting_row` along directions, which come first."""
-    return _slope_aside(starting_rows(model, _aside(numbers, directions), seen))
+    return _slope_aside(starting_rows(model, _aside(numbers, directions), first))
 
 
 def _aside(numbers: FilterNumbers, directions: FilterNumbers) -> FilterNumbers:
@@ -153,17 +153,17 @@ def _slope_aside(rows: Array) -> Array:
     return np.asarray(np.tensordot(_WEIGHTS, around, 1) / _ASIDE)
 
 
-def joined_at(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> tuple[Array, Array, Array, Array]:
+def joined_at(model: StochasticModel, rows: FilterNumbers, first: FirstMotion) -> tuple[Array, Array, Array, Array]:
     """A, C, Q and R of the joined system in steady flight, one of each for every row of numbers."""
     noise, nuisance = Noise(*rows.noise.T), Nuisance(*rows.nuisance.T)
-    mean = seen.voltage[1]
+    mean = first.voltage[1]
     decisive = np.concatenate([rows.parameters, rows.noise], axis=1) if model.windy else rows.parameters
-    own = np.flatnonzero(np.any(decisive != decisive[0], axis=1))
+    apart = np.flatnonzero(np.any(decisive != decisive[0], axis=1))
     which = np.zeros(len(decisive), dtype=np.intp)
-    which[own], own = 1 + np.arange(own.size), np.concatenate([[0], own])
-    x, u = steady_rows(model, rows.parameters[own], mean, seen.velocity)
-    places = model.places(x, Noise(*rows.noise[own].T))
-    taken = [_slopes(model, place, u, rows.parameters[own], mean) for place in places]
+    which[apart], apart = 1 + np.arange(apart.size), np.concatenate([[0], apart])
+    x, u = steady_rows(model, rows.parameters[apart], mean, first.velocity)
+    places = model.places(x, Noise(*rows.noise[apart].T))
+    taken = [_slopes(model, place, u, rows.parameters[apart], mean) for place in places]
     by_x, by_gust = (np.mean(parts, axis=0)[which] for parts in zip(*taken, strict=True))
     return model.joined(by_x, by_gust, measured_slopes(model, x[which], nuisance), noise)
 
@@ -232,19 +232,19 @@ def steady_rows(model: StochasticModel, parameters: Array, voltage: float, veloc
     return np.array([state for state, _ in rows]), np.array([inputs for _, inputs in rows])
 
 
-def starting_rows(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> Array:
+def starting_rows(model: StochasticModel, rows: FilterNumbers, motion: FirstMotion) -> Array:
     """The states that runs begin with, by row; the inner ones of the rows beside the first as in `steady_rows`."""
-    vehicle, first = model.vehicle, seen.voltage[0]
+    vehicle, first = model.vehicle, motion.voltage[0]
     starts = measured_start(
         vehicle,
         model.output_names,
         vehicle.parameters(*rows.parameters.T),
         Nuisance(*rows.nuisance.T),
-        value=seen.value,
-        rate=seen.rate,
+        value=motion.value,
+        rate=motion.rate,
         inputs=rows.inputs,
         voltage=first,
-        running=seen.running,
+        running=motion.running,
         xp=_XP,
     )
     starts = np.array(np.broadcast_to(starts, (len(rows.parameters), starts.shape[-1])))

@@ -49,8 +49,8 @@ class Solved:
         likelihood, criterion, optimum: what was sought, and where the search ended; the criterion is the likelihood, or
             the errors ahead that it leads to.
         prior: the priors' information (p, p).
-        plain, corrected: covariances (p, p) of the criterion's scaled row, without and with the errors' colour.
-        whole: the likelihood's row where the search ended.
+        bound, corrected: covariances (p, p) of the criterion's scaled row, without and with the errors' colour.
+        full_row: the likelihood's row where the search ended.
         numbers: of that, by name, in their units.
         colour: standard deviation of each parameter by the errors' autocorrelation, over that of white errors.
     """
@@ -59,9 +59,9 @@ class Solved:
     criterion: Criterion
     optimum: Optimum
     prior: Array
-    plain: Array
+    bound: Array
     corrected: Array
-    whole: Array
+    full_row: Array
     numbers: Mapping[str, float]
     colour: Array = field(default_factory=lambda: np.ones(1))
 
@@ -77,7 +77,7 @@ class Solved:
     def left(self) -> Array:
         """Newton's step from where the search ended to the exact optimum, scaled (p,)."""
         gradient = self.criterion.scores(self.optimum.row)[1] + self.row.prior(self.optimum.row)[1]
-        return np.asarray(-self.plain @ gradient)
+        return np.asarray(-self.bound @ gradient)
 
     def scaled(self, covariance: Array) -> Array:
         """A covariance of the parameters in their units."""
@@ -100,36 +100,36 @@ def solved_at(likelihood: Likelihood, optimum: Optimum, *, known: Array | None =
     row = likelihood.row
     prior = row.prior(optimum.row)[2] if known is None else known
     if known is None:
-        plain = accuracy.covariance(row, optimum.information, prior)
+        bound = accuracy.covariance(row, optimum.information, prior)
     else:  # noises that are not there have no information at all: what nothing tells is left out
-        plain = np.asarray(np.linalg.pinv(optimum.information + known, hermitian=True), dtype=np.float64)
+        bound = np.asarray(np.linalg.pinv(optimum.information + known, hermitian=True), dtype=np.float64)
     white, sensitivities, rest = likelihood.whitened(optimum.row)
     lags = round(LAGS / likelihood.records[0].dt)
-    corrected = accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=lags)
-    own, coloured = (np.diag(c)[row.places("parameter")] for c in (plain, corrected))
-    colour = np.sqrt(np.divide(coloured, own, out=np.ones_like(own), where=own > 0.0))
+    corrected = accuracy.corrected_covariance(bound, rest + prior, white, sensitivities, lags=lags)
+    uncoloured, coloured = (np.diag(c)[row.places("parameter")] for c in (bound, corrected))
+    colour = np.sqrt(np.divide(coloured, uncoloured, out=np.ones_like(uncoloured), where=uncoloured > 0.0))
     if known is not None:
-        by_octaves = accuracy.covariance_by_octaves(plain, rest + prior, white, sensitivities)
-        corrected = accuracy.covering(corrected, plain, by_octaves)
+        by_octaves = accuracy.covariance_by_octaves(bound, rest + prior, white, sensitivities)
+        corrected = accuracy.covering(corrected, bound, by_octaves)
     numbers = row.numbers(likelihood.sized(optimum.row))
-    return Solved(likelihood, likelihood, optimum, prior, plain, corrected, optimum.row, numbers, colour)
+    return Solved(likelihood, likelihood, optimum, prior, bound, corrected, optimum.row, numbers, colour)
 
 
 def solved_ahead(first: Solved, horizon: Horizon, solver: Solver, *, settling: float = 0.0) -> Solved:
     """The optimum of the errors ahead, from that of the likelihood and beside what that knows."""
     likelihood = first.likelihood
     criterion = MultiStepErrors(
-        likelihood, first.whole, likelihood.records, horizon=horizon, settling=settling, known=first.corrected
+        likelihood, first.full_row, likelihood.records, horizon=horizon, settling=settling, known=first.corrected
     )
     optimum = minimise(criterion, solver, start=criterion.start)
     optimum = replace(optimum, converged=optimum.converged and first.optimum.converged)
     prior = criterion.row.prior(optimum.row)[2]
-    plain = accuracy.covariance(criterion.row, optimum.information, prior)
+    bound = accuracy.covariance(criterion.row, optimum.information, prior)
     white, sensitivities, rest = criterion.whitened(optimum.row)
-    corrected = TWICE * accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=criterion.lags)
-    whole = criterion.whole_row(optimum.row)
-    numbers = likelihood.row.numbers(whole)
-    return Solved(likelihood, criterion, optimum, prior, plain, corrected, whole, numbers, first.colour)
+    corrected = TWICE * accuracy.corrected_covariance(bound, rest + prior, white, sensitivities, lags=criterion.lags)
+    row = criterion.whole_row(optimum.row)
+    numbers = likelihood.row.numbers(row)
+    return Solved(likelihood, criterion, optimum, prior, bound, corrected, row, numbers, first.colour)
 
 
 def estimates_of(
@@ -145,7 +145,7 @@ def estimates_of(
     known = parameter_table(start)
     sources = {} if table is None else {free.name: free.source for free in table.free}
     entries, scales = [solved.row.entries[i] for i in solved.places], solved.row.scale[solved.places]
-    sigma, corrected = (np.sqrt(np.maximum(np.diag(solved.scaled(c)), 0.0)) for c in (solved.plain, solved.corrected))
+    sigma, corrected = (np.sqrt(np.maximum(np.diag(solved.scaled(c)), 0.0)) for c in (solved.bound, solved.corrected))
     total = np.diag(solved.optimum.information + solved.prior)[solved.places]
     estimates = []
     for i, entry in enumerate(entries):
@@ -180,15 +180,15 @@ def estimates_of(
 
 
 def _tied(solved: Solved, start: Any, table: Parameterization) -> list[Estimate]:
-    card, values, made = parameter_table(start), solved.identified(table), []
+    card, values, estimates = parameter_table(start), solved.identified(table), []
     numbers = np.array([solved.numbers[name] for name in table.names])
     for name, expression in table.ties:
         gradient = np.array([_slope(table, numbers, name, i) for i in range(len(numbers))])
-        sizes = [np.sqrt(max(gradient @ solved.scaled(c) @ gradient, 0.0)) for c in (solved.plain, solved.corrected)]
-        own = card[name]
-        plain, wider = map(float, sizes)
-        made.append(Estimate(name, own.unit, own.value, values[name], plain, wider, tie=expression.text))
-    return made
+        sizes = [np.sqrt(max(gradient @ solved.scaled(c) @ gradient, 0.0)) for c in (solved.bound, solved.corrected)]
+        entry = card[name]
+        sigma, wider = map(float, sizes)
+        estimates.append(Estimate(name, entry.unit, entry.value, values[name], sigma, wider, tie=expression.text))
+    return estimates
 
 
 _SEEN = 1.0 - 1e-6
@@ -224,13 +224,13 @@ def constants(solved: Solved, names: Sequence[str], groups: Sequence[str]) -> tu
         solved: where the search ended. names: of the records, by the number in an entry's name.
         groups: of entries.
     """
-    sigma = np.sqrt(np.maximum(np.diag(solved.plain), 0.0)) * solved.row.scale
-    made = []
+    sigma = np.sqrt(np.maximum(np.diag(solved.bound), 0.0)) * solved.row.scale
+    listed = []
     for entry, spread in zip(solved.row.entries, sigma.tolist(), strict=True):
         if entry.group in groups:
             name, _, number = entry.name.partition("[")
             value = solved.numbers[entry.name]
             record = names[int(number[:-1])] if number else ""
             spread *= value if entry.logarithmic else 1.0
-            made.append(Constant(record, name, record_unit(name), value, spread))
-    return tuple(made)
+            listed.append(Constant(record, name, record_unit(name), value, spread))
+    return tuple(listed)

@@ -130,25 +130,25 @@ def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array])
     sos = butter(2, (_BAND[0], high), "bandpass", fs=rate, output="sos")
     power = float(np.std(sosfiltfilt(sos, command)))
     still = power < _MOVED
-    told, peak, phase = NOTHING, 0.0, float("nan")
+    shares, peak, phase = NOTHING, 0.0, float("nan")
     if not still:
         answered, response = MOTION[axis.name]
-        moved = np.stack([motion[name] for name in answered], axis=1)
-        (told,) = told_by_motion(command[:, None], moved, record.dt, memory=False)
+        answers = np.stack([motion[name] for name in answered], axis=1)
+        (shares,) = told_by_motion(command[:, None], answers, record.dt, memory=False)
         peak, phase = _coherence(command, motion[response], rate, high)
     # News is not asked: rates that were derived from a tracked pose know a little of what follows.
-    answer = told.known and told.past >= ANSWER and not told.follows
-    identifiable = told.known and not (answer and told.past >= EXPLAINED)
+    answer = shares.known and shares.past >= ANSWER and not shares.follows
+    identifiable = shares.known and not (answer and shares.past >= EXPLAINED)
     return AxisExcitation(
         record=record.name,
         axis=axis.name,
         command=_called(axis.inputs),
-        explained=told.past,
+        explained=shares.past,
         coherence=peak,
         phase=phase,
         power=power,
         identifiable=identifiable,
-        words=_words(axis.name, told, peak, phase, still=still, answer=answer),
+        words=_sentence(axis.name, shares, peak, phase, still=still, answer=answer),
         answer=answer,
     )
 
@@ -174,18 +174,18 @@ def _coherence(command: Array, response: Array, rate: float, high: float) -> tup
     return float(squared[best]), float(np.angle(cross[best]))
 
 
-def _words(axis: str, told: AnswerShares, peak: float, phase: float, *, still: bool, answer: bool) -> str:
+def _sentence(axis: str, shares: AnswerShares, peak: float, phase: float, *, still: bool, answer: bool) -> str:
     if still:
         return f"{axis}: the command does not move. Fly a sweep or a multisine in {axis}."
-    if not told.known:
+    if not shares.known:
         return f"{axis}: the record is too short to tell what moves the command. Fly longer."
-    share = f"past motion explains {100 * told.past:.0f} % of the command (coherence up to {peak:.2f}"
+    share = f"past motion explains {100 * shares.past:.0f} % of the command (coherence up to {peak:.2f}"
     share += f" at {np.degrees(phase):+.0f} deg)"
-    if not answer and told.past >= ANSWER:
+    if not answer and shares.past >= ANSWER:
         return f"{axis}: {share}, but the motion after it explains more: the motion follows the command."
     if not answer:
         return f"{axis}: {share}; the rest moves the axis independently."
-    if told.past < EXPLAINED:
+    if shares.past < EXPLAINED:
         return f"{axis}: {share}: mostly a controller's answer; the axis is weakly excited, believe it with its bound."
     return (
         f"{axis}: {share}: it is a controller's answer, and this record cannot tell the {axis} dynamics from the "
@@ -199,20 +199,20 @@ def mark_unmoved(vehicle: Vehicle, free: Collection[str], axes: Sequence[AxisExc
     Args:
         free: names that the fit moved. axes: how each record moves each axis.
     """
-    moved = {item.axis for item in axes if item.identifiable}
+    excited = {item.axis for item in axes if item.identifiable}
     fitted = [axis.name for axis in vehicle.traits.axes if axes and set(axis.parameters) & set(free)]
-    unmoved = {name: 1.0 for name in fitted if name not in moved}
+    unmoved = {name: 1.0 for name in fitted if name not in excited}
     card = vehicle.card
     return vehicle.with_card(replace(card, observer={**card.observer, UNMOVED: unmoved})) if unmoved else vehicle
 
 
-def mark_answers(vehicle: Vehicle, moved: Collection[Excitation]) -> Vehicle:
+def mark_answers(vehicle: Vehicle, inputs: Collection[Excitation]) -> Vehicle:
     """The identified vehicle whose card names the inputs that only a controller moved.
 
     Args:
-        moved: what moved each input of each record.
+        inputs: what moved each input of each record.
     """
-    unmoved = {name: 1.0 for name, one in of_inputs(tuple(moved)).items() if one.kind == CONTROLLER}
+    unmoved = {name: 1.0 for name, one in of_inputs(tuple(inputs)).items() if one.kind == CONTROLLER}
     card = vehicle.card
     return vehicle.with_card(replace(card, observer={**card.observer, UNMOVED: unmoved})) if unmoved else vehicle
 

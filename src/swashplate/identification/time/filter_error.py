@@ -194,11 +194,11 @@ class FilterError(Likelihood):
         noises = estimated_noises(self.model, self.noise) if estimate_noise else ()
         entries += noise_entries(noises, self.noise)
         self.row = Row(tuple(entries), table.prior_correlations)
-        seen = [seen_at_start(table.vehicle, piece) for piece in pieces]
+        motions = [seen_at_start(table.vehicle, piece) for piece in pieces]
         plan = FilterPlan(self.model, table.layout, len(self.logs), tuple(nuisances), noises)
         self._runs = tuple(
             RecordRun(plan, int(log), piece.outputs, piece.inputs, piece.voltage, first)
-            for log, piece, first in zip(self._log, pieces, seen, strict=True)
+            for log, piece, first in zip(self._log, pieces, motions, strict=True)
         )
         self._kept: dict[bytes, list[Filtered]] = {}
         self._last: tuple[bytes, list[MovedErrors]] | None = None
@@ -246,8 +246,8 @@ class FilterError(Likelihood):
         """The same, and the slopes by some entries of the row, (places, starts, horizons, outputs)."""
         given, count = (self.table.card_row, row * self.row.scale, self.row.scale), int(max(places)) + 1
         runs = zip(self._runs, self.runs(row), ahead.starts, strict=True)
-        told = [mine.ahead_moved(run, starts, ahead.steps, given, count) for mine, run, starts in runs]
-        return [errors for errors, _ in told], [slopes[places] for _, slopes in told]
+        pairs = [mine.ahead_moved(run, starts, ahead.steps, given, count) for mine, run, starts in runs]
+        return [errors for errors, _ in pairs], [slopes[places] for _, slopes in pairs]
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def errors_of(self, row: Array) -> list[Errors]:

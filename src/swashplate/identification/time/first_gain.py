@@ -49,32 +49,32 @@ def first_gain(phi: Array, c: Array, candidates: Sequence[Array], run: Run) -> t
         phi, c: transition and outputs. candidates: gains (n, m). run: what a gain costs.
     """
     ran = [(run(gain), gain) for gain in candidates]
-    (cheapest, _), plain = min(ran, key=lambda one: one[0][0])
+    (cheapest, _), gain_of_it = min(ran, key=lambda one: one[0][0])
     stable = [one for one in ran if np.max(np.abs(np.linalg.eigvals(phi - one[1] @ c))) < 1.0]  # others have no Gramian
     if not stable:
-        return cheapest, plain
+        return cheapest, gain_of_it
     (best, errors), gain = min(stable, key=lambda one: one[0][0])
     damping = _DAMPING
     for _ in range(_ITERATIONS):
         loop = phi - gain @ c
         if not np.isfinite(best) or np.max(np.abs(np.linalg.eigvals(loop))) >= 1.0:
             break
-        whole = np.concatenate(errors)
-        inverse = np.linalg.inv(whole.T @ whole / len(whole))
+        stack = np.concatenate(errors)
+        inverse = np.linalg.inv(stack.T @ stack / len(stack))
         gramian = solve_discrete_lyapunov(loop.T, c.T @ inverse @ c)
-        slope = np.sum([_backward(part @ inverse @ c, loop).T @ part for part in errors], axis=0) @ inverse / len(whole)
+        slope = np.sum([_backward(part @ inverse @ c, loop).T @ part for part in errors], axis=0) @ inverse / len(stack)
         gained = 0.0
         while damping <= _HOPELESS and gained <= 0.0:
             tried = gain + np.linalg.solve(gramian + damping * np.diag(np.diag(gramian) + 1e-300), slope)
-            cost, moved = run(tried)
+            cost, residuals = run(tried)
             gained = best - cost if np.isfinite(cost) else 0.0
             damping = damping / 10.0 if gained > 0.0 else 10.0 * damping
         if gained <= 0.0:
             break
-        best, errors, gain = cost, moved, tried
+        best, errors, gain = cost, residuals, tried
         if gained < _SMALL:
             break
-    return (best, gain) if best <= cheapest else (cheapest, plain)
+    return (best, gain) if best <= cheapest else (cheapest, gain_of_it)
 
 
 def _backward(pushed: Array, loop: Array) -> Array:

@@ -59,9 +59,9 @@ class FollowingError(FilterError):
         super().__init__(table, pieces, noise=noise)
         self._constant = FilterError(table, pieces, noise=noise)
         measured = [piece.measured for piece in pieces]
-        self.counted = tuple(counted & seen for counted, seen in zip(self.counted, measured, strict=True))
+        self.counted = tuple(counted & known for counted, known in zip(self.counted, measured, strict=True))
         self._readings = tuple(
-            np.where(seen[:, None], piece.outputs, np.nan) for piece, seen in zip(pieces, measured, strict=True)
+            np.where(known[:, None], piece.outputs, np.nan) for piece, known in zip(pieces, measured, strict=True)
         )
 
     @property
@@ -88,12 +88,12 @@ class FollowingError(FilterError):
         )
 
     def errors_of(self, row: Array) -> list[Errors]:
-        return self._seen(self._followed([row]))
+        return self._counted_errors(self._followed([row]))
 
     def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
         """Slopes are differences of whole runs."""
         runs, places = self._followed([row, *(row + step for step in _STEP * np.eye(len(row)))]), np.arange(len(row))
-        for run, counted, part in zip(runs, self.counted, self._seen(runs), strict=True):
+        for run, counted, part in zip(runs, self.counted, self._counted_errors(runs), strict=True):
             nu, S = run.innovations[:, counted], run.covariances[:, counted]
             slopes, Li = (nu[1:] - nu[0]) / _STEP, np.linalg.inv(part.factor)
             turned = Li @ ((S[1:] - S[0]) / _STEP) @ np.swapaxes(Li, 1, 2)
@@ -108,7 +108,7 @@ class FollowingError(FilterError):
             self._last = asked, list(self.moved_errors(row))
         return iter(self._last[1])
 
-    def _seen(self, runs: Sequence[Followed]) -> list[Errors]:
+    def _counted_errors(self, runs: Sequence[Followed]) -> list[Errors]:
         return [
             Errors(number, run.innovations[0][counted], factor_of(run.covariances[0][counted]))
             for number, (run, counted) in enumerate(zip(runs, self.counted, strict=True))
@@ -136,7 +136,7 @@ class FollowingError(FilterError):
             placed = [run.placed(*given, row * self.row.scale) for row in rows]
             commands = np.stack([reaching for reaching, _ in placed], axis=1)
             numbers = FilterNumbers(*map(np.stack, zip(*(numbers for _, numbers in placed), strict=True)))
-            begin = following_from(self.model, numbers, run.seen, spread)
+            begin = following_from(self.model, numbers, run.motion, spread)
             followed.append(
                 filter_code(self.model).follow(
                     self.model.dt, begin, RecordSeries(readings, driving_rows(commands, run.voltage))
@@ -218,21 +218,21 @@ def searched(likelihood: FollowingError, solver: Solver, *, start: Array) -> Opt
             return replace(optimum, information=likelihood.scores(optimum.row)[2], converged=settled)
 
 
-def following_from(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, spread: Array) -> Following:
+def following_from(model: StochasticModel, numbers: FilterNumbers, first: FirstMotion, spread: Array) -> Following:
     """What filters of a record begin with and depend on: a filter that has settled in steady flight, its first states
     off as far as the spread says, and the air, of which nothing is known.
 
     Args:
-        model: of the filters. numbers: by row. seen: of the record's beginning.
+        model: of the filters. numbers: by row. first: of the record's beginning.
         spread: how far off the states may be that it begins with, a second moment.
     """
     noise, n = Noise(*numbers.noise.T), len(spread)
-    matrices, fade = joined_at(model, numbers, seen), model.fade(noise)
+    matrices, fade = joined_at(model, numbers, first), model.fade(noise)
     covariances = np.array([steady_gain(*of_row)[2] for of_row in zip(*matrices, strict=True)])
     here, added = slice(n, n + model.n_gusts), np.diagonal(matrices[2], axis1=1, axis2=2)[:, n:]
     covariances[:, :n, :n] += spread
     covariances[:, here, here] += diagonal(added[:, : model.n_gusts] / (1.0 - fade**2))
-    state = first_state(model, starting_rows(model, numbers, seen), numbers.nuisance)
+    state = first_state(model, starting_rows(model, numbers, first), numbers.nuisance)
     return Following(
         states=np.concatenate(state, axis=1),
         covariances=covariances,

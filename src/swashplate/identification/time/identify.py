@@ -89,20 +89,20 @@ class FlightProblem:
             return solved
         if estimates_of(solved, self.start, self.table)[1]:
             return solved
-        each = [Nuisance(*numbers) for numbers in np.array(likelihood.nuisances_of(solved.whole)).T.tolist()]
-        physics, air = self.table.without(solved.optimum.at_bound), likelihood.noise_of(solved.whole)
+        each = [Nuisance(*numbers) for numbers in np.array(likelihood.nuisances_of(solved.full_row)).T.tolist()]
+        physics, air = self.table.without(solved.optimum.at_bound), likelihood.noise_of(solved.full_row)
         vehicle = self.table.vehicle.with_values(solved.identified(self.table))
-        found = fit_residual(vehicle, self.pieces, each, air, horizon=horizon, axes=self.axes, physics=physics)
-        self.residual = found
-        if not found.kept or horizon is not None:
+        fitted = fit_residual(vehicle, self.pieces, each, air, horizon=horizon, axes=self.axes, physics=physics)
+        self.residual = fitted
+        if not fitted.kept or horizon is not None:
             return solved
         # The search goes on with physics and residual free.
-        wider = self.likelihood_of(beside_physics(self.table, found))
-        begin = begun_where_it_ended(wider.row, likelihood.row, solved.whole, found)
+        wider = self.likelihood_of(beside_physics(self.table, fitted))
+        begin = begun_where_it_ended(wider.row, likelihood.row, solved.full_row, fitted)
         wider.refresh(begin)
         together = self._read(wider, minimise(wider, solver, start=begin), solver, horizon)
         vehicle = wider.table.vehicle.with_values(together.identified(wider.table))
-        self.residual = found.at(vehicle, physics_shifts(solved, together))
+        self.residual = fitted.at(vehicle, physics_shifts(solved, together))
         return together
 
     def _read(self, likelihood: FlightLikelihood, optimum: Optimum, solver: Solver, horizon: Horizon | None) -> Solved:
@@ -111,7 +111,7 @@ class FlightProblem:
         return solved if horizon is None else solved_ahead(solved, horizon, solver, settling=SETTLING)
 
     def interpret(self, solved: Solved) -> Interpreted[Vehicle]:
-        likelihood, residual, row = cast(FlightLikelihood, solved.likelihood), self.residual, solved.whole
+        likelihood, residual, row = cast(FlightLikelihood, solved.likelihood), self.residual, solved.full_row
         table, pieces, vehicle = likelihood.table, self.pieces, self.start
         began = begun(vehicle, residual) if residual is not None and table is not self.table else vehicle
         every, problems = estimates_of(solved, began, table)
@@ -121,7 +121,7 @@ class FlightProblem:
         if isinstance(likelihood, FilterError):  # output error fits starts to its commands: others lose
             apart = unrelated(lambda others: likelihood.of(table, others).cost(row), pieces)
             problems += [apart] if apart else []
-            notes += [told] if (told := moving_air(likelihood.noise_of(row))) else []
+            notes += [note] if (note := moving_air(likelihood.noise_of(row))) else []
         notes += [
             f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
             for e in parameters
@@ -140,9 +140,9 @@ class FlightProblem:
                 identified = residual.vehicle.with_card(card)
             settings["residual"] = residual.settings_entry
             notes.append(residual.summary_text)
-        own = constants(solved, likelihood.logs, ("nuisance",))
+        of_records = constants(solved, likelihood.logs, ("nuisance",))
         if vehicle.traits.balance is not None:
-            trims = {name: [c.value for c in own if c.name == name] for name in {c.name for c in own}}
+            trims = {name: [c.value for c in of_records if c.name == name] for name in {c.name for c in of_records}}
             notes += vehicle.traits.balance(
                 vehicle, identified, {name: sum(values) / len(values) for name, values in trims.items()}
             )
@@ -150,7 +150,7 @@ class FlightProblem:
         return Interpreted(
             identified,
             parameters,
-            own,
+            of_records,
             FlightDetails(tuple(self.axes)),
             {
                 "method": self.method,
@@ -292,11 +292,11 @@ def _identified(
     }
     card = card.with_values(changed, status="assumed", source="held during the identification")
     started = vehicle.card.parameters
-    moved = {name for name, entry in card.parameters.items() if entry.value != started[name].value}
+    adjusted = {name for name, entry in card.parameters.items() if entry.value != started[name].value}
     card = replace(
         card,
         parameters={
-            name: replace(entry, before=started[name].value if name in moved else None)
+            name: replace(entry, before=started[name].value if name in adjusted else None)
             for name, entry in card.parameters.items()
         },
     )

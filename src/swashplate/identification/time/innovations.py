@@ -73,7 +73,7 @@ class RecordRun:
         plan: of the fit.
         log: which flight it is of.
         readings, inputs, voltage: by sample.
-        seen: of its beginning.
+        motion: of its beginning.
     """
 
     plan: FilterPlan
@@ -81,7 +81,7 @@ class RecordRun:
     readings: Array
     inputs: Array
     voltage: Array
-    seen: FirstMotion
+    motion: FirstMotion
 
     def placed(self, card: Array, noise: Array, numbers: Array) -> tuple[Array, FilterNumbers]:
         """Commands as they arrive, and what the filter depends on, at a row of numbers in their units.
@@ -103,7 +103,7 @@ class RecordRun:
     def filtered(self, card: Array, noise: Array, numbers: Array) -> Filtered:
         """The run at a row, of arguments as `placed` has them."""
         reaching, at = self.placed(card, noise, numbers)
-        begin = begun(self.plan.model, at, self.seen)
+        begin = begun(self.plan.model, at, self.motion)
         run = self._filter.along(begin, at, self._series(reaching))
         return Filtered(reaching, at, begin, run)
 
@@ -116,8 +116,8 @@ class RecordRun:
     def ahead(self, run: Filtered, starts: Sequence[int], steps: Sequence[int]) -> Array:
         """Measured less predicted after `steps` samples from each start (starts, steps, outputs)."""
         at, of = np.asarray(starts, dtype=np.intp), np.asarray(steps, dtype=np.intp)
-        told = run.states, run.numbers, run.commands, self.voltage
-        states = self._filter.ahead_of(*told, at, int(of[-1]))[:, of - 1]
+        series = run.states, run.numbers, run.commands, self.voltage
+        states = self._filter.ahead_of(*series, at, int(of[-1]))[:, of - 1]
         return self.readings[at[:, None] + of] - np.real(self._measured(states, Nuisance(*run.numbers.nuisance)))
 
     def ahead_moved(
@@ -136,16 +136,16 @@ class RecordRun:
         at, of = np.asarray(starts, dtype=np.intp), np.asarray(steps, dtype=np.intp)
         moves, series = self._moves(run, *given, count), self._series(run.commands)
         _, by_start = self._filter.run_slopes(run.begin, run.numbers, series, run.run, moves, starts)
-        states, moved = self._filter.ahead_moved(run.states, by_start, run.numbers, series, moves, at, steps)
+        states, slopes = self._filter.ahead_moved(run.states, by_start, run.numbers, series, moves, at, steps)
         nuisance, to = run.numbers.nuisance, moves.numbers.nuisance
         errors = self.readings[at[:, None] + of] - np.real(self._measured(states, Nuisance(*nuisance)))
         aside = Nuisance(*(nuisance + 1j * IMAGINARY * to).T[..., None, None])
-        return errors, -np.imag(self._measured(states + 1j * IMAGINARY * moved, aside)) / IMAGINARY
+        return errors, -np.imag(self._measured(states + 1j * IMAGINARY * slopes, aside)) / IMAGINARY
 
     def _measured(self, states: Complex | Array, nuisance: Nuisance) -> Complex:
         """The measured channels of states (..., states), in the last axis too; imaginary parts are slopes."""
-        seen = self.plan.model.measure(np.moveaxis(states, -1, 0), nuisance, COMPLEX_ARRAYS)
-        return np.moveaxis(seen, 0, -1)
+        readings = self.plan.model.measure(np.moveaxis(states, -1, 0), nuisance, COMPLEX_ARRAYS)
+        return np.moveaxis(readings, 0, -1)
 
     def _series(self, commands: Array) -> RecordSeries:
         return RecordSeries(self.readings, driving_rows(commands, self.voltage))
@@ -157,9 +157,9 @@ class RecordRun:
     def _moves(self, run: Filtered, card: Array, numbers: Array, scale: Array, count: int) -> Moves:
         """How the run's numbers move along the first `count` entries of the scaled row."""
         model, k, m, p = self.plan.model, len(self.plan.layout.free), len(self.plan.nuisances), len(numbers)
-        late = commands_moved(model.vehicle, model.dt, self.inputs, Nuisance(*run.numbers.nuisance))[1]
-        by_command = commands_by(model.vehicle, late, self.plan.nuisances)
-        own, noises = k + self.log * m, _places(Noise, self.plan.noises)
+        slopes = commands_moved(model.vehicle, model.dt, self.inputs, Nuisance(*run.numbers.nuisance))[1]
+        by_command = commands_by(model.vehicle, slopes, self.plan.nuisances)
+        place, noises = k + self.log * m, _places(Noise, self.plan.noises)
         directions = FilterNumbers(
             np.zeros((p, len(run.numbers.parameters))),
             np.zeros((p, len(run.numbers.noise))),
@@ -167,13 +167,13 @@ class RecordRun:
             np.zeros((p, len(run.numbers.inputs))),
         )
         directions.parameters[:k] = self.plan.layout.value_slopes(card, numbers[:k])
-        directions.nuisance[np.arange(own, own + m), _places(Nuisance, self.plan.nuisances)] = 1.0
+        directions.nuisance[np.arange(place, place + m), _places(Nuisance, self.plan.nuisances)] = 1.0
         directions.noise[np.arange(p - noises.size, p), noises] = run.numbers.noise[noises]
-        directions.inputs[own : own + m] = by_command[:, : starting_samples(model.dt)].mean(axis=1)
+        directions.inputs[place : place + m] = by_command[:, : starting_samples(model.dt)].mean(axis=1)
         directions = FilterNumbers(*(scale[:count, None] * part[:count] for part in directions))
-        begin = begun_moved(model, run.numbers, self.seen, directions)
-        late = by_command * scale[own : own + m, None, None]
-        return Moves(begin, directions, own, late[: max(0, count - own)])
+        begin = begun_moved(model, run.numbers, self.motion, directions)
+        slopes = by_command * scale[place : place + m, None, None]
+        return Moves(begin, directions, place, slopes[: max(0, count - place)])
 
 
 def _places(of: type[Noise | Nuisance], names: Sequence[str]) -> NDArray[np.intp]:

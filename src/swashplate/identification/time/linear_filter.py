@@ -111,8 +111,8 @@ class GustErrors(FilterErrors):
     def sized(self, row: Array) -> Array:
         numbers = self._stepped(row, NOTHING)
         a, _, c, _, _ = self._systems(numbers)
-        told = np.real(self._kalman(numbers, a, c, self.records[0].dt)[1][0])
-        errors = np.linalg.solve(told, self.covariance)
-        larger = 0.5 * np.log(np.trace(errors) / len(told))
+        spread = np.real(self._kalman(numbers, a, c, self.records[0].dt)[1][0])
+        errors = np.linalg.solve(spread, self.covariance)
+        larger = 0.5 * np.log(np.trace(errors) / len(spread))
         noises = [i for i, entry in enumerate(self.row.entries) if entry.group == "noise"]
         return np.asarray(row + larger * np.isin(np.arange(row.size), noises))

@@ -84,8 +84,8 @@ class LinearErrors(OwnCovariance):
         if not places:
             return row
         batch = self._stepped(row, NOTHING)
-        made = self._coefficients(0, batch, self._systems(batch))
-        phi, c = (np.ascontiguousarray(part[0].real) for part in (made.phi, made.c))
+        model = self._coefficients(0, batch, self._systems(batch))
+        phi, c = (np.ascontiguousarray(part[0].real) for part in (model.phi, model.c))
 
         def with_gain(gain: Array) -> Array:
             changed = row.copy()
@@ -116,12 +116,12 @@ class LinearErrors(OwnCovariance):
         factor = factor_of(self.covariance)
         for number in range(len(self.records)):
             places, noises = self._places_of_record(number)
-            base, moved = self._tangents(number, row, places, noises)
-            late, later = self._later(number, base.lag)
-            inputs = np.real(late)
+            base, tangents = self._tangents(number, row, places, noises)
+            shifted, later = self._later(number, base.lag)
+            inputs = np.real(shifted)
             errors, states = _ran(*base[:4], *self._driven(number, base, inputs))
             every = np.concatenate([places, noises])
-            for part, slopes in slopes_along(base, moved, inputs, later, errors, states):
+            for part, slopes in slopes_along(base, tangents, inputs, later, errors, states):
                 yield MovedErrors(number, part, factor, every, slopes)
 
     def _places_of_record(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -137,15 +137,15 @@ class LinearErrors(OwnCovariance):
         """What makes one record's errors, and its slopes by the scaled row at places and noises, those first."""
         batch = self._stepped(row, places)
         systems = self._systems(batch)
-        whole = self._coefficients(number, batch, systems)
-        base = Coefficients(*(np.ascontiguousarray(part[0].real) for part in whole))
-        moved = Coefficients(*(part[1:].imag / STEP for part in whole))
+        stepped = self._coefficients(number, batch, systems)
+        base = Coefficients(*(np.ascontiguousarray(part[0].real) for part in stepped))
+        tangents = Coefficients(*(part[1:].imag / STEP for part in stepped))
         if not noises.size:
-            return base, moved
-        noisy, still = self._stepped(row, noises), (systems[0], systems[2], whole.phi)
+            return base, tangents
+        noisy, still = self._stepped(row, noises), (systems[0], systems[2], stepped.phi)
         a, c, phi = (np.broadcast_to(part[:1], (len(noisy), *part.shape[1:])) for part in still)
         gain = self._gain(noisy, a, c, phi, self.records[number].dt)[1:].imag / STEP
-        return base, moved._replace(gain=np.concatenate([moved.gain, gain]))
+        return base, tangents._replace(gain=np.concatenate([tangents.gain, gain]))
 
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
         """Per record errors ahead, and their slopes by some entries of the scaled row, (places, starts, ...)."""
@@ -158,13 +158,13 @@ class LinearErrors(OwnCovariance):
         for loops, starts in zip(self._loops(batch), ahead.starts, strict=True):
             after = np.stack([_ran(*loop)[1][np.array(starts, dtype=int) + 1] for loop in loops])
             _, phi, c, _, measured, drive = (np.stack(part) for part in zip(*loops, strict=True))
-            told = []
+            errors = []
             for step in range(1, ahead.steps[-1] + 1):
                 k = np.array(starts, dtype=int) + step
                 if step in ahead.steps:
-                    told.append(measured[:, k] - after @ c.swapaxes(1, 2))
+                    errors.append(measured[:, k] - after @ c.swapaxes(1, 2))
                 after = after @ phi.swapaxes(1, 2) + drive[:, k]
-            by_record.append(np.stack(told, axis=2))
+            by_record.append(np.stack(errors, axis=2))
         return by_record
 
     def _stepped(self, row: Array, places: Places) -> Any:
@@ -192,8 +192,8 @@ class LinearErrors(OwnCovariance):
         """Of every record and model of a batch, what `_ran` takes."""
         systems = self._systems(batch)
         for number in range(len(self.records)):
-            made = [Coefficients(*one) for one in zip(*self._coefficients(number, batch, systems), strict=True)]
-            yield [(*one[:4], *self._driven(number, one, self._later(number, one.lag)[0])) for one in made]
+            models = [Coefficients(*one) for one in zip(*self._coefficients(number, batch, systems), strict=True)]
+            yield [(*one[:4], *self._driven(number, one, self._later(number, one.lag)[0])) for one in models]
 
     def _coefficients(self, number: int, batch: Batch, systems: tuple[Any, ...]) -> Coefficients:
         """What makes one record's errors, for a batch of rows."""
@@ -223,20 +223,20 @@ class LinearErrors(OwnCovariance):
         values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
         return [0.0 if delay is None else delay(values) for delay in self.delays]
 
-    def _driven(self, number: int, made: Coefficients, u: Batch) -> tuple[Any, Any]:
+    def _driven(self, number: int, model: Coefficients, u: Batch) -> tuple[Any, Any]:
         """Of one model along one record: what is measured less what goes through, and what drives the states."""
-        drive = u @ made.g0.T + made.push
-        drive[:-1] += np.diff(u, axis=0) @ made.g1.T
+        drive = u @ model.g0.T + model.push
+        drive[:-1] += np.diff(u, axis=0) @ model.g1.T
         drive[-1] = 0.0
-        return self.records[number].outputs - u @ made.d.T - made.bias, drive
+        return self.records[number].outputs - u @ model.d.T - model.bias, drive
 
     def _later(self, number: int, lags: Batch) -> tuple[Batch, Array]:
         """A record's inputs later by their lags [samples], straight between samples, and their slopes by the lags."""
         u = self.records[number].inputs
-        whole = np.floor(np.real(lags)).astype(int)
-        at = np.arange(len(u))[:, None] - whole
+        full = np.floor(np.real(lags)).astype(int)
+        at = np.arange(len(u))[:, None] - full
         near, far = (np.take_along_axis(u, np.clip(at - k, 0, len(u) - 1), axis=0) for k in (0, 1))
-        return near + (lags - whole) * (far - near), far - near
+        return near + (lags - full) * (far - near), far - near
 
     def _gain(self, batch: Batch, a: Batch, c: Batch, phi: Batch, dt: float) -> Any:
         """Gains from innovations to the next states, (n_batch, n_states, n_outputs); zero for output error."""

@@ -52,16 +52,16 @@ class LinearKind:
         names, shifts, gain = tuple(question.outputs or model.outputs), question.shifts is not False, GAINS[method]
         kind = _likelihood_of(model, method, question.gusts)
         pieces, delays = linear_records(model, flights, names, biases=question.biases)
-        moved = of_inputs(excitations(flights, model.inputs, outputs=names))
-        model = model.with_unmoved(name for name, one in moved.items() if one.kind == CONTROLLER)
+        driven = of_inputs(excitations(flights, model.inputs, outputs=names))
+        model = model.with_unmoved(name for name, one in driven.items() if one.kind == CONTROLLER)
         likelihood = kind(model, names, pieces, shifts, tuple(question.biases), delays=delays, gain=gain != "none")
         # Of a model that no fit has brought near, the errors would be taken for gusts and the gain led astray.
         many = gain == "free" or kind is GustErrors
         near = many and all(np.isfinite(model.parameters[n].cramer_rao) for n in model.free)
 
         def identified(estimates: Mapping[str, Estimate]) -> StateSpaceModel:
-            told = {n: (estimates[n].best_sigma, estimates[n].insensitivity) for n in model.free}
-            return model.with_values({n: estimates[n].value for n in model.free}).with_bounds(told)
+            bounds = {n: (estimates[n].best_sigma, estimates[n].insensitivity) for n in model.free}
+            return model.with_values({n: estimates[n].value for n in model.free}).with_bounds(bounds)
 
         settings = {"shifts": shifts, "biases": list(question.biases)}
         return RecordProblem(
@@ -71,7 +71,7 @@ class LinearKind:
             flights,
             identified,
             settings if question.gusts is None else {**settings, "gusts": question.gusts},
-            words=lambda estimates: (*torn(estimates, model), *hold_remarks(model, delays, pieces)),
+            warnings_of=lambda estimates: (*torn(estimates, model), *hold_remarks(model, delays, pieces)),
             begin=likelihood.begun() if near else None,
             around=near,
         )
@@ -144,7 +144,7 @@ def torn(estimates: Sequence[Estimate], start: StateSpaceModel) -> list[str]:
             apart[f"{e.name} {e.start:.3g} before, {e.value:.3g} now"] = abs(e.value - e.start) / spread
     if not apart:
         return []
-    worst = sorted(apart, key=lambda words: -apart[words])
+    worst = sorted(apart, key=lambda pair: -apart[pair])
     return [
         f"{len(apart)} of the model's parameters are more than {_TORN:g} bounds away from the fit that it comes from "
         f"({'; '.join(worst[:3])}): both cannot be right. Gusts that last, in a loop, bias a fit in time whose noise "
@@ -168,14 +168,14 @@ def hold_remarks(
 
 
 def _delay_of(model: StateSpaceModel, outputs: Sequence[str], input: str) -> Expression | None:
-    late = {e.text: e for o in outputs if (e := model.delays.get(f"{o}/{input}", model.delays.get(input))) is not None}
-    if len(late) > 1:
+    lags = {e.text: e for o in outputs if (e := model.delays.get(f"{o}/{input}", model.delays.get(input))) is not None}
+    if len(lags) > 1:
         raise IdentificationError(
-            f"has different delays to different outputs ({', '.join(late)}).",
+            f"has different delays to different outputs ({', '.join(lags)}).",
             channel=input,
             hint="Give the input one delay; the fit in time delays inputs.",
         )
-    return next(iter(late.values()), None)
+    return next(iter(lags.values()), None)
 
 
 OUTPUT_ERROR, FILTER_ERROR, PREDICTION_ERROR = (RecordEstimator(method, LinearKind()) for method in GAINS)

@@ -49,21 +49,21 @@ class LinearResidual:
     noise: Noise
     units: Mapping[str, float] = field(default_factory=dict)
     along: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default=({}, {}), repr=False, compare=False)
-    moved: Mapping[str, float] = field(default_factory=dict)
+    shifts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def kept(self) -> bool:
         return bool(np.isfinite(self.strength))
 
-    def at(self, vehicle: Vehicle, moved: Mapping[str, float]) -> LinearResidual:
+    def at(self, vehicle: Vehicle, shifts: Mapping[str, float]) -> LinearResidual:
         """The same with what a search found for physics and residual together, and how far that moved the physics."""
-        return replace(self, vehicle=vehicle, moved=moved, shares=shares(vehicle, *self.along))
+        return replace(self, vehicle=vehicle, shifts=shifts, shares=shares(vehicle, *self.along))
 
     @property
     def settings_entry(self) -> dict[str, Any]:
         """For the settings of a result."""
         shares = {row: round(share, 1) for row, share in self.shares.items()}
-        joint = {"sigmas by which the physics moved": dict(self.moved)} if self.moved else {}
+        joint = {"sigmas by which the physics moved": dict(self.shifts)} if self.shifts else {}
         return {"ridge": self.strength if self.kept else "none", "gain on blocks left out": self.gain,
                 "its standard error": self.error, "share of each acceleration [%]": shares, **joint}  # fmt: skip
 
@@ -74,7 +74,7 @@ class LinearResidual:
         if not self.kept:
             return f"residual: none, the best would gain {gained}"
         parts = ", ".join(f"{name} {share:.0f} %" for name, share in self.shares.items())
-        far = ", ".join(f"{name} by {by:+.0f} sigma" for name, by in self.moved.items() if abs(by) > _FAR)
+        far = ", ".join(f"{name} by {by:+.0f} sigma" for name, by in self.shifts.items() if abs(by) > _FAR)
         joint = f"; with it the physics moves: {far}" if far else ""
         return f"residual: gains {gained} (ridge {self.strength:.3g}); its part of each acceleration: {parts}{joint}"
 
@@ -84,9 +84,9 @@ def none_found(vehicle: Vehicle, noise: Noise, gain: float, error: float) -> Lin
     return LinearResidual(vehicle, np.inf, gain, error, dict.fromkeys(ROWS, 0.0), noise)
 
 
-def units_of(names: Mapping[str, tuple[str, str]], columns: Mapping[str, Array], seen: Mapping[str, Array]) -> Array:
+def units_of(names: Mapping[str, tuple[str, str]], columns: Mapping[str, Array], acting: Mapping[str, Array]) -> Array:
     """Of each coefficient, how often one makes an acceleration as large as the disturbance that the filter saw."""
-    return np.array([np.sqrt(np.mean(columns[c] ** 2)) / np.std(seen[r]) for r, c in names.values()])
+    return np.array([np.sqrt(np.mean(columns[c] ** 2)) / np.std(acting[r]) for r, c in names.values()])
 
 
 def with_coefficients(vehicle: Vehicle, values: Mapping[str, float], sigma: Array, source: str) -> Vehicle:
@@ -99,10 +99,10 @@ def with_coefficients(vehicle: Vehicle, values: Mapping[str, float], sigma: Arra
 
 def shares(vehicle: Vehicle, columns: Mapping[str, Array], total: Mapping[str, Array]) -> dict[str, float]:
     """Of each acceleration's root mean square, the residual's part [%]."""
-    card, made = vehicle.card.values(), dict.fromkeys(ROWS, np.zeros(1))
+    card, parts = vehicle.card.values(), dict.fromkeys(ROWS, np.zeros(1))
     for name, (row, column) in coefficients(vehicle).items():
-        made[row] = made[row] + card[name] * columns[column]
-    return {row: 100.0 * float(np.std(part) / np.std(total[row])) for row, part in made.items()}
+        parts[row] = parts[row] + card[name] * columns[column]
+    return {row: 100.0 * float(np.std(part) / np.std(total[row])) for row, part in parts.items()}
 
 
 def kept(nuisance: Nuisance) -> tuple[Free, ...]:
@@ -122,7 +122,7 @@ def ran(likelihood: FilterError) -> Filtered:
 def seen_along(likelihoods: Sequence[FilterError]) -> tuple[dict[str, Array], dict[str, Array]]:
     """By name: what the coefficients multiply, and the disturbances that the filter saw, along all blocks."""
     columns: list[dict[str, Array]] = []
-    seen: list[Array] = []
+    disturbances: list[Array] = []
     for likelihood in likelihoods:
         run, counted, vehicle = ran(likelihood), likelihood.counted[0], likelihood.table.vehicle
         about = list(counted_from(vehicle).values())
@@ -130,19 +130,19 @@ def seen_along(likelihoods: Sequence[FilterError]) -> tuple[dict[str, Array], di
         states[HEADING] = states[HEADING] - heading_counted(vehicle)
         columns.append(states | dict(zip(vehicle.input_names, (run.commands - about)[counted].T, strict=True)))
         acting = np.asarray(run.states.gust)[counted, :N_DISTURBANCES] + np.asarray(run.states.drift)[counted]
-        seen.append(acting - acting.mean(axis=0))
+        disturbances.append(acting - acting.mean(axis=0))
     joined = {name: np.concatenate([each[name] for each in columns]) for name in columns[0]}
-    return joined, dict(zip(DISTURBED, np.concatenate(seen).T, strict=True))
+    return joined, dict(zip(DISTURBED, np.concatenate(disturbances).T, strict=True))
 
 
 def accelerations_along(likelihoods: Sequence[FilterError]) -> dict[str, Array]:
     """Rates of the disturbed states along the filtered motion, by name."""
-    made = []
+    rates = []
     for likelihood in likelihoods:
         vehicle = likelihood.table.vehicle
         states = np.asarray(ran(likelihood).states.x)[:, [vehicle.index(name) for name in DISTURBED]]
-        made.append(np.gradient(states, likelihood.model.dt, axis=0)[likelihood.counted[0]])
-    return dict(zip(DISTURBED, np.concatenate(made).T, strict=True))
+        rates.append(np.gradient(states, likelihood.model.dt, axis=0)[likelihood.counted[0]])
+    return dict(zip(DISTURBED, np.concatenate(rates).T, strict=True))
 
 
 def beside_physics(table: Parameterization, residual: LinearResidual) -> Parameterization:

@@ -84,21 +84,21 @@ def driven(start: NDArray[Any], phi: NDArray[Any], push: NDArray[Any]) -> tuple[
     n_t, k, n = push.shape
     length = max(1, round(np.sqrt(n_t)))
     pieces = -(-n_t // length)
-    made = np.zeros((length + 1, pieces, k, n), dtype=np.result_type(start, phi, push))
+    states = np.zeros((length + 1, pieces, k, n), dtype=np.result_type(start, phi, push))
     padded = np.zeros((pieces * length, k, n), dtype=push.dtype)
     padded[:n_t] = push
     padded = padded.reshape(pieces, length, k, n)
     powers = [np.eye(n)]
     for i in range(length):
-        made[i + 1] = made[i] @ phi.T + padded[:, i]
+        states[i + 1] = states[i] @ phi.T + padded[:, i]
         powers.append(powers[-1] @ phi.T)
-    begins = np.empty((pieces, k, n), dtype=made.dtype)
+    begins = np.empty((pieces, k, n), dtype=states.dtype)
     for piece in range(pieces):
         begins[piece] = start
-        start = start @ powers[-1] + made[-1, piece]
+        start = start @ powers[-1] + states[-1, piece]
     for i in range(length):
-        made[i] += begins @ powers[i]
-    every = made[:-1].swapaxes(0, 1).reshape(-1, k, n)
+        states[i] += begins @ powers[i]
+    every = states[:-1].swapaxes(0, 1).reshape(-1, k, n)
     after = every[n_t] if n_t < len(every) else start
     return every[:n_t], after
 
@@ -126,11 +126,11 @@ def answers(model: StateSpaceModel, outputs: Sequence[str], inputs: Array, dt: f
     forced = np.zeros((inputs.shape[0], len(rows), inputs.shape[1]))
     # Outputs whose inputs come equally late share one run.
     for lag in set(lags):
-        late = np.column_stack([delayed(inputs[:, j], lag[j]) for j in range(inputs.shape[1])])
-        states, free, pushed = two_sided(a, b, late, dt)
+        shifted = np.column_stack([delayed(inputs[:, j], lag[j]) for j in range(inputs.shape[1])])
+        states, free, pushed = two_sided(a, b, shifted, dt)
         for k, row in enumerate(rows):
             if lags[k] == lag:
-                forced[:, k] = np.einsum("n,tnm->tm", c[row], states) + late * d[row]
+                forced[:, k] = np.einsum("n,tnm->tm", c[row], states) + shifted * d[row]
     columns = [c[rows] @ part for part in (free, pushed)]
     level = np.broadcast_to(np.eye(len(rows)), (inputs.shape[0], len(rows), len(rows)))
     return forced, np.concatenate([*columns, level], axis=2)

@@ -42,34 +42,34 @@ class Coefficients(NamedTuple):
 
 
 def slopes_along(
-    base: Coefficients, moved: Coefficients, inputs: Array, later: Array, errors: Array, states: Array
+    base: Coefficients, slope: Coefficients, inputs: Array, later: Array, errors: Array, states: Array
 ) -> Iterator[tuple[Array, Array]]:
     """Block by block the errors (n, n_outputs) and their slopes (n_entries, n, n_outputs).
 
     Args:
         base: of one model, without a batch.
-        moved: their slopes by the entries; entries that move the gain alone stand last, and are missing in the others.
+        slope: their slopes by the entries; entries that move the gain alone stand last, and are missing in the others.
         inputs: later by their lags, (n_t, n_inputs). later: their slopes by the lag.
         errors, states: along the record, (n_t, n_outputs) and (n_t, n_states).
     """
-    (n_t, k), n, few, many = errors.shape, base.phi.shape[0], len(moved.x), len(moved.gain)
+    (n_t, k), n, few, many = errors.shape, base.phi.shape[0], len(slope.x), len(slope.gain)
     still = np.zeros((1, inputs.shape[1]))
     signals = [states, inputs, np.diff(inputs, axis=0, append=still), later, np.diff(later, axis=0, append=still)]
     signals += [np.ones((n_t, 1)), errors]
-    lag = moved.lag[:, None, :]
-    none = np.zeros_like(moved.d)
-    seen = -np.concatenate(
-        [moved.c, moved.d, none, base.d * lag, none, moved.bias[:, :, None], np.zeros((few, k, k))], axis=2
+    lag = slope.lag[:, None, :]
+    none = np.zeros_like(slope.d)
+    outputs = -np.concatenate(
+        [slope.c, slope.d, none, base.d * lag, none, slope.bias[:, :, None], np.zeros((few, k, k))], axis=2
     )
     driving = np.concatenate(
-        [moved.phi, moved.g0, moved.g1, base.g0 * lag, base.g1 * lag, moved.push[:, :, None], moved.gain[:few]], axis=2
+        [slope.phi, slope.g0, slope.g1, base.g0 * lag, base.g1 * lag, slope.push[:, :, None], slope.gain[:few]], axis=2
     )
-    pushing = np.zeros((many, n, seen.shape[2]))
-    pushing[:few] = driving + base.gain @ seen
-    pushing[few:, :, -k:] = moved.gain[few:]
-    by_signal, through = pushing.reshape(many * n, -1).T, seen.reshape(few * k, -1).T
+    pushing = np.zeros((many, n, outputs.shape[2]))
+    pushing[:few] = driving + base.gain @ outputs
+    pushing[few:, :, -k:] = slope.gain[few:]
+    by_signal, through = pushing.reshape(many * n, -1).T, outputs.reshape(few * k, -1).T
     table = np.hstack(signals)
-    x = np.concatenate([moved.x, np.zeros((many - few, n))])
+    x = np.concatenate([slope.x, np.zeros((many - few, n))])
     loop = base.phi - base.gain @ base.c
     for at in range(0, n_t, _BLOCK):
         block = table[at : at + _BLOCK]

@@ -129,8 +129,8 @@ class OutputError(Likelihood):
             piece, here = self.records[number], slice(first, first + self.length)
             value, rate = (part[0] for part in slopes(piece, np.array([first])))
             voltage = piece.voltage[here]
-            seen = FirstMotion(value, rate, np.zeros(3), np.array([voltage[0]]), float(piece.time[first]))
-            windows.append(Window(int(self._log[number]), first, piece.inputs, voltage, seen))
+            motion = FirstMotion(value, rate, np.zeros(3), np.array([voltage[0]]), float(piece.time[first]))
+            windows.append(Window(int(self._log[number]), first, piece.inputs, voltage, motion))
         return Shooting(
             self._plan,
             tuple(windows),
@@ -148,14 +148,14 @@ class OutputError(Likelihood):
         """Residuals (windows, n, outputs) and states (windows, n, states)."""
         return self._beside(self._shooting.simulate_windows(row))
 
-    def _beside(self, flown: list[FlownWindow]) -> tuple[Array, Array]:
+    def _beside(self, runs: list[FlownWindow]) -> tuple[Array, Array]:
         """Residuals and states of simulated windows."""
-        return self._outputs - np.stack([run.outputs for run in flown]), np.stack([run.run.states.x for run in flown])
+        return self._outputs - np.stack([run.outputs for run in runs]), np.stack([run.run.states.x for run in runs])
 
     def _with_slopes(self, row: Array) -> tuple[Array, Array]:
         """Residuals, and their slopes by the shared entries and by each window's own (windows, entries, n, outputs)."""
-        flown = self._shooting.simulate_windows(row)
-        return self._beside(flown)[0], -self._shooting.output_slopes(row, flown)
+        windows = self._shooting.simulate_windows(row)
+        return self._beside(windows)[0], -self._shooting.output_slopes(row, windows)
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def errors_of(self, row: Array) -> list[Errors]:
@@ -165,9 +165,9 @@ class OutputError(Likelihood):
         """Windows share only the first entries (an arrow-shaped matrix)."""
         residual, slopes = self._with_slopes(row)
         s, n = self._shared, len(self._own)
-        for place, (errors, moved) in enumerate(zip(residual, slopes, strict=True)):
-            own = np.concatenate([np.arange(s), s + place * n + np.arange(n)])
-            yield MovedErrors(place, errors, self._L, own, moved)
+        for place, (errors, by_entry) in enumerate(zip(residual, slopes, strict=True)):
+            entries = np.concatenate([np.arange(s), s + place * n + np.arange(n)])
+            yield MovedErrors(place, errors, self._L, entries, by_entry)
 
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
         """It has no filter to predict from."""
@@ -197,15 +197,15 @@ class OutputError(Likelihood):
     def nuisances_of(self, row: Array) -> Nuisance:
         """Constants at a row, one array entry per record."""
         k, n, m = len(self.table.layout.free), len(self.logs), len(self.nuisances)
-        told = (row[: self._shared] * self.row.scale[: self._shared])[k : k + n * m].reshape(n, m)[self._log]
-        still = Nuisance(*np.zeros((len(Nuisance._fields), len(told))))
-        return still._replace(**dict(zip(self.nuisances, told.T, strict=True)))
+        constants = (row[: self._shared] * self.row.scale[: self._shared])[k : k + n * m].reshape(n, m)[self._log]
+        still = Nuisance(*np.zeros((len(Nuisance._fields), len(constants))))
+        return still._replace(**dict(zip(self.nuisances, constants.T, strict=True)))
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside its simulated windows."""
         residual, simulated = (np.asarray(item) for item in self.residuals(row))
         kept = [self.table.vehicle.index(name) for name in PREDICTED]
-        sigma, made = np.sqrt(np.diag(self.covariance)), []
+        sigma, comparisons = np.sqrt(np.diag(self.covariance)), []
         for number, piece in enumerate(self.records):
             model, counted = np.full_like(piece.outputs, np.nan), np.zeros(piece.time.size, dtype=bool)
             body = np.full((piece.time.size, len(PREDICTED)), np.nan)
@@ -215,8 +215,8 @@ class OutputError(Likelihood):
                     model[here] = piece.outputs[here] - residual[place]
                     body[here] = simulated[place][:, kept]
                     counted[here] = True
-            made.append(Comparison(record=piece, counted=counted, model=model, sigma=sigma, states=body))
-        return tuple(made)
+            comparisons.append(Comparison(record=piece, counted=counted, model=model, sigma=sigma, states=body))
+        return tuple(comparisons)
 
     @property
     def covariance(self) -> Array:

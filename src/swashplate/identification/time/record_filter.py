@@ -111,10 +111,10 @@ class RecordFilter:
             starts: samples. ahead: how many samples to predict.
         """
         x, gust, drift = (np.asarray(part)[starts] for part in states[:3])
-        told = numbers_and_constants(self.model.vehicle, numbers.parameters)
+        given = numbers_and_constants(self.model.vehicle, numbers.parameters)
         fade, out = self.model.fade(Noise(*numbers.noise)), np.empty((len(starts), ahead, self._n))
         for k in range(ahead):
-            out[:, k] = x = self.step(x, gust, drift, commands[starts + k], voltage[starts + k], told)
+            out[:, k] = x = self.step(x, gust, drift, commands[starts + k], voltage[starts + k], given)
             gust = fade * gust
         return out
 
@@ -146,24 +146,24 @@ class RecordFilter:
         """
         x, gust, drift = (np.asarray(part)[starts] for part in states[:3])
         dx, d_gust, d_drift = slopes[:3]
-        told = numbers_and_constants(self.model.vehicle, numbers.parameters)
+        given = numbers_and_constants(self.model.vehicle, numbers.parameters)
         d_told = numbers_moved(self.model.vehicle, moves.numbers.parameters)
         fade, d_fade = self._fading(numbers.noise, moves.numbers.noise)
-        arriving, late, count = moves.arriving, moves.commands, len(d_told)
+        arriving, inputs, count = moves.arriving, moves.commands, len(d_told)
         commands, voltage = series.driving[:, :-4], series.driving[:, -1]
         d_commands = np.zeros((count, len(starts), commands.shape[1]))
-        still, reached, moved = np.zeros((count, len(starts))), [], []
+        still, reached, slopes_of = np.zeros((count, len(starts))), [], []
         for k in range(steps[-1]):
             here = starts + k
-            d_commands[arriving : arriving + len(late)] = late[:, here]
+            d_commands[arriving : arriving + len(inputs)] = inputs[:, here]
             pushed = _pushed(gust, drift, commands[here], voltage[here])
             along = dx, _pushed(d_gust, d_drift, d_commands, still), d_told
-            x, dx = self._code.step_moved(self.model.dt, x, pushed, told, along)
+            x, dx = self._code.step_moved(self.model.dt, x, pushed, given, along)
             d_gust, gust = fade * d_gust + d_fade[:, None] * gust, fade * gust
             if k + 1 in steps:
                 reached.append(x)
-                moved.append(dx)
-        return np.stack(reached, axis=1), np.stack(moved, axis=2)
+                slopes_of.append(dx)
+        return np.stack(reached, axis=1), np.stack(slopes_of, axis=2)
 
     def _fixed(self, begin: Begun, numbers: FilterNumbers) -> Fixed:
         fade = self.model.fade(Noise(*numbers.noise))
@@ -182,8 +182,8 @@ class RecordFilter:
     def _fading(self, noise: Array, directions: Array) -> tuple[Array, Array]:
         """What is left of gusts after a sample, and its slopes along directions of the noise."""
         fade = self.model.fade(Noise(*noise))
-        moved = self.model.fade(Noise(*(noise + 1j * IMAGINARY * directions).T))
-        return fade, np.imag(moved) / IMAGINARY
+        stepped = self.model.fade(Noise(*(noise + 1j * IMAGINARY * directions).T))
+        return fade, np.imag(stepped) / IMAGINARY
 
 
 def _pushed(gust: Array, drift: Array, commands: Array, voltage: Array) -> Pushed:

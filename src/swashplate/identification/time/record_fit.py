@@ -123,7 +123,7 @@ def fit(problem: FitProblem[Model], solver: Solver, *, horizon: Horizon | None =
     prior = solved.row.prior(optimum.row)[2]
     names = tuple(e.name for e in interpreted.estimates if e.free)
     k = len(names)
-    covariance = solved.scaled(solved.plain)[:k, :k]
+    covariance = solved.scaled(solved.bound)[:k, :k]
     return Result(
         method=problem.method,
         solution=interpreted.solution,
@@ -145,11 +145,11 @@ def fit(problem: FitProblem[Model], solver: Solver, *, horizon: Horizon | None =
         constants=interpreted.constants,
         noise=interpreted.noise,
         nuisance=interpreted.nuisance,
-        comparisons=solved.likelihood.comparisons(solved.whole),
+        comparisons=solved.likelihood.comparisons(solved.full_row),
         data=data,
         settings={**interpreted.settings, **told_horizon(horizon)},
         seconds=time.perf_counter() - began,
-        fitted=Fitted(solved.likelihood, solved.whole) if horizon is None else None,
+        fitted=Fitted(solved.likelihood, solved.full_row) if horizon is None else None,
     )
 
 
@@ -164,7 +164,7 @@ class RecordProblem(Generic[Model]):
         identified: the model of the estimates by name.
         settings: what was asked, for the result.
         table: ties and where priors come from (None: neither).
-        words: what is to be said of the estimates, for the result's warnings.
+        warnings_of: what is to be said of the estimates, for the result's warnings.
         begin: scaled row to begin with (None: the entries' starts).
         around: whether entries that want to go too far are held at their reach, see `Solver`.
     """
@@ -176,7 +176,7 @@ class RecordProblem(Generic[Model]):
     identified: Callable[[Mapping[str, Estimate]], Model]
     settings: Mapping[str, Any]
     table: Parameterization | None = None
-    words: Callable[[Sequence[Estimate]], Sequence[str]] = lambda _: ()
+    warnings_of: Callable[[Sequence[Estimate]], Sequence[str]] = lambda _: ()
     begin: Array | None = None
     around: bool = False
 
@@ -203,7 +203,7 @@ class RecordProblem(Generic[Model]):
             warnings=[
                 *_fit_warnings(free, solved.optimum),
                 *_colour_words(self.method, solved.colour),
-                *self.words(estimates),
+                *self.warnings_of(estimates),
             ],
         )
 
@@ -224,15 +224,15 @@ def _colour_words(method: str, colour: Array) -> tuple[str, ...]:
 
 
 def _fit_warnings(parameters: Sequence[Estimate], optimum: Optimum) -> tuple[str, ...]:
-    words = [] if optimum.converged else [stopping.unfinished()]
+    warnings = [] if optimum.converged else [stopping.unfinished()]
     vague = [p.name for p in parameters if not p.sigma_percent <= VAGUE]
     if vague:
-        words.append(f"standard deviation above {VAGUE:g} %: {', '.join(vague)}; the records hardly tell them.")
-    words += accuracy.sign_words(parameters)
+        warnings.append(f"standard deviation above {VAGUE:g} %: {', '.join(vague)}; the records hardly tell them.")
+    warnings += accuracy.sign_words(parameters)
     stopped = [p.name for p in parameters if p.at_bound]
     if stopped:
-        words.append(f"ended on a bound: {', '.join(stopped)}.")
-    return tuple(words)
+        warnings.append(f"ended on a bound: {', '.join(stopped)}.")
+    return tuple(warnings)
 
 
 def check_biases(biases: Sequence[str], outputs: Sequence[str]) -> None:

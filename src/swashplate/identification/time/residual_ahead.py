@@ -114,10 +114,10 @@ class LeftOutBlock:
         return self.start - self.cost - float(self.gradient @ away + 0.5 * away @ self.information @ away)
 
 
-def shrunk(told: Sequence[LeftOutBlock], strength: float, physics: Physics = ALONE) -> tuple[Array, Array]:
+def shrunk(blocks: Sequence[LeftOutBlock], strength: float, physics: Physics = ALONE) -> tuple[Array, Array]:
     """Physics and scaled coefficients (k,) and their covariance (k, k) from some blocks; infinite: physics alone."""
-    information = sum((block.information for block in told), start=np.zeros_like(told[0].information))
-    slope = sum((block.gradient - block.information @ block.at for block in told), start=np.zeros(len(information)))
+    information = sum((block.information for block in blocks), start=np.zeros_like(blocks[0].information))
+    slope = sum((block.gradient - block.information @ block.at for block in blocks), start=np.zeros(len(information)))
     k, n = len(information), len(physics.pull)
     slope[:n] += physics.pull
     held = np.diag(np.concatenate([_FLOOR * np.diag(information)[:n], np.full(k - n, strength)]))
@@ -129,19 +129,19 @@ def shrunk(told: Sequence[LeftOutBlock], strength: float, physics: Physics = ALO
     return coefficients, covariance
 
 
-def chosen_strength(told: Sequence[LeftOutBlock], physics: Physics = ALONE) -> tuple[float, float, float]:
+def chosen_strength(blocks: Sequence[LeftOutBlock], physics: Physics = ALONE) -> tuple[float, float, float]:
     """Strength by blocks left out, what they gain, and its standard error; infinite where that is nothing."""
     from scipy.stats import t as student
 
     def gains(strength: float) -> Array:
-        learnt = [shrunk([*told[:i], *told[i + 1 :]], strength, physics)[0] for i in range(len(told))]
-        return np.array([block.gain(coefficients) for block, coefficients in zip(told, learnt, strict=True)])
+        learnt = [shrunk([*blocks[:i], *blocks[i + 1 :]], strength, physics)[0] for i in range(len(blocks))]
+        return np.array([block.gain(coefficients) for block, coefficients in zip(blocks, learnt, strict=True)])
 
-    alone = gains(np.inf) if len(physics.pull) else np.zeros(len(told))
+    alone = gains(np.inf) if len(physics.pull) else np.zeros(len(blocks))
     gained = np.array([gains(strength) - alone for strength in STRENGTHS])
-    total, error = gained.sum(axis=1), np.std(gained, axis=1, ddof=1) * np.sqrt(len(told))
+    total, error = gained.sum(axis=1), np.std(gained, axis=1, ddof=1) * np.sqrt(len(blocks))
     best = int(np.argmax(total))
-    if total[best] <= student.ppf(_SURE, len(told) - 1) * error[best]:
+    if total[best] <= student.ppf(_SURE, len(blocks) - 1) * error[best]:
         return np.inf, float(total[best]), float(error[best])
     return float(STRENGTHS[best]), float(total[best]), float(error[best])
 
@@ -180,11 +180,11 @@ class FlightAhead:
         self, vehicle: Vehicle, record: Record, noise: Noise, usual: Nuisance, *, trims: Mapping[str, float],
         horizon: Horizon, sizes: Sequence[Array] | None = None,
     ) -> None:  # fmt: skip
-        own = calibrate(vehicle, record, noise=noise, prior=usual, trims=trims)
+        nuisance = calibrate(vehicle, record, noise=noise, prior=usual, trims=trims)
         names = coefficients(vehicle)
         bare = as_begun(vehicle.with_values(dict.fromkeys(names, 0.0)), record)
-        table = Parameterization(bare, tuple(Free(name, 1.0) for name in names), of_records=kept(own))
-        self.likelihood = FilterError(table, [record], noise=noise, estimate_noise=False, nuisance=own)
+        table = Parameterization(bare, tuple(Free(name, 1.0) for name in names), of_records=kept(nuisance))
+        self.likelihood = FilterError(table, [record], noise=noise, estimate_noise=False, nuisance=nuisance)
         self._steps = np.array(horizon.samples(record.dt))
         starts = np.arange(round(CALIBRATION / record.dt), record.time.size - self._steps[-1] - 1, self._steps[0])
         n = int(len(starts) * self._steps[0] * record.dt // BLOCK)
@@ -214,9 +214,9 @@ class FlightAhead:
     def blocks(self, scaled: Array, size: Array) -> Iterator[LeftOutBlock]:
         """Each block's cost to second order about scaled coefficients."""
         starts, here = self.costs(np.zeros(size.size)), self.errors(scaled / size)
-        moved = [self.errors((scaled + move) / size) for move in _ASIDE * np.eye(size.size)]
+        aside = [self.errors((scaled + move) / size) for move in _ASIDE * np.eye(size.size)]
         for i, (start, part) in enumerate(zip(starts, here, strict=True)):
-            slopes = np.stack([(errors[i] - part).ravel() / _ASIDE for errors in moved])
+            slopes = np.stack([(errors[i] - part).ravel() / _ASIDE for errors in aside])
             cost = 0.5 * float(np.sum(part**2))
             yield LeftOutBlock(start, scaled, cost, slopes @ part.ravel(), slopes @ slopes.T)
 
@@ -259,20 +259,20 @@ def fit_ahead(
 
     first = flights = met(np.zeros(len(names)), noise, ())
     enough_blocks(sum(len(flight.sizes) for flight in flights), pieces[0].name, after=CALIBRATION)
-    columns, seen = seen_along([flight.likelihood for flight in flights])
-    size, at, held = units_of(coefficients(vehicle), columns, seen), np.zeros(len(names)), _BETWEEN
+    columns, total = seen_along([flight.likelihood for flight in flights])
+    size, at, held = units_of(coefficients(vehicle), columns, total), np.zeros(len(names)), _BETWEEN
     for again in (True, False):
-        told = _search(flights, at, size, held)
-        strength, gain, error = chosen_strength(told)
+        blocks = _search(flights, at, size, held)
+        strength, gain, error = chosen_strength(blocks)
         if not np.isfinite(strength):
             return none_found(vehicle, noise, gain, error)
-        (at, covariance), held = shrunk(told, strength), strength
+        (at, covariance), held = shrunk(blocks, strength), strength
         if again:
             noise = _wandering(partial(_met_cost, met, at / size, first), noise)
             flights = met(at / size, noise, first)
-    if not _cost(flights, at / size) < sum(block.start for block in told):
+    if not _cost(flights, at / size) < sum(block.start for block in blocks):
         return none_found(vehicle, noise, gain, error)  # to second order it gained, and in fact it does not
-    source = f"residual by {len(told)} blocks, ridge {strength:.3g}"
+    source = f"residual by {len(blocks)} blocks, ridge {strength:.3g}"
     values = dict(zip(names, (at / size).tolist(), strict=True))
     made_of = with_coefficients(vehicle, values, np.sqrt(np.diag(covariance)) / size, source)
     along = columns, accelerations_along([flight.likelihood for flight in first])
@@ -298,18 +298,18 @@ def _search(flights: Sequence[FlightAhead], at: Array, size: Array, held: float)
     def cost(scaled: Array) -> float:
         return _cost(flights, scaled / size) + 0.5 * held * float(scaled @ scaled)
 
-    told, lowest = _blocks_of(flights, at, size), cost(at)
+    blocks, lowest = _blocks_of(flights, at, size), cost(at)
     for _ in range(_ROUNDS):
-        way = shrunk(told, held)[0] - at
+        way = shrunk(blocks, held)[0] - at
         lower = ((cost(at + share * way), share) for share in _SHORTER)
         least, share = next(((tried, share) for tried, share in lower if tried < lowest), (lowest, 0.0))
         if not share:
             break
         done, lowest, at = lowest - least < _ENOUGH, least, at + share * way
-        told = _blocks_of(flights, at, size)
+        blocks = _blocks_of(flights, at, size)
         if done:
             break
-    return told
+    return blocks
 
 
 def _wandering(cost: Callable[[Noise], float], noise: Noise) -> Noise:

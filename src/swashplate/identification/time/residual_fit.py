@@ -106,25 +106,25 @@ def fit_residual(
         )
         for block, nuisance in cut
     ]
-    columns, seen = seen_along(likelihoods)
-    size = units_of(names, columns, seen)
-    told, others = _one_step(likelihoods, size), _priors(likelihoods[0], len(beside))
-    strength, gain, error = chosen_strength(told, others)
+    columns, total = seen_along(likelihoods)
+    size = units_of(names, columns, total)
+    blocks, others = _one_step(likelihoods, size), _priors(likelihoods[0], len(beside))
+    strength, gain, error = chosen_strength(blocks, others)
     if not np.isfinite(strength):
         return none_found(vehicle, noise, gain, error)
-    away, covariance = shrunk(told, strength, others)
+    away, covariance = shrunk(blocks, strength, others)
     k = len(beside)
     factors, sigma = away[k:] / size, np.sqrt(np.diag(covariance))[k:] / size
     checked = [_cost(each, np.concatenate([away[:k], factors])) for each in likelihoods]
-    if not sum(checked) < sum(block.start for block in told):
+    if not sum(checked) < sum(block.start for block in blocks):
         return none_found(vehicle, noise, gain, error)  # to second order it gained, and in fact it does not
     row = likelihoods[0].row
     low, high = row.bounds()
     at = np.clip(row.starts()[:k] + away[:k], low[:k], high[:k]) * row.scale[:k]
     told_by = table.identified(np.concatenate([at, factors]))
-    moved = wider.with_values({name: value for name, value in told_by.items() if name not in names})
-    source = f"residual by {len(told)} blocks, ridge {strength:.3g}"
-    made_of = with_coefficients(moved, dict(zip(names, factors, strict=True)), sigma, source)
+    shifted = wider.with_values({name: value for name, value in told_by.items() if name not in names})
+    source = f"residual by {len(blocks)} blocks, ridge {strength:.3g}"
+    made_of = with_coefficients(shifted, dict(zip(names, factors, strict=True)), sigma, source)
     along = columns, accelerations_along(likelihoods)
     units = dict(zip(names, (1.0 / size).tolist(), strict=True))
     return LinearResidual(made_of, strength, gain, error, shares(made_of, *along), noise, units, along)
@@ -155,14 +155,14 @@ def _blocks(piece: Record) -> list[Record]:
 
 def _one_step(likelihoods: Sequence[FilterError], size: Array) -> list[LeftOutBlock]:
     """Innovations, linear in accelerations as small as these, and in the physics."""
-    made = []
+    blocks = []
     for likelihood in likelihoods:
         cost, gradient, information = likelihood.scores(likelihood.row.starts())
         places = likelihood.row.places("parameter")
         scale = np.concatenate([np.ones(places.size - size.size), 1.0 / size])
         hessian = information[np.ix_(places, places)] * np.outer(scale, scale)
-        made.append(LeftOutBlock(cost, np.zeros(places.size), cost, gradient[places] * scale, hessian))
-    return made
+        blocks.append(LeftOutBlock(cost, np.zeros(places.size), cost, gradient[places] * scale, hessian))
+    return blocks
 
 
 def _priors(likelihood: FilterError, k: int) -> Physics:

@@ -61,14 +61,14 @@ class Window:
         first: its first sample in the record.
         inputs: of the whole record: delays reach beyond the window.
         voltage: by sample of the window.
-        seen: of its beginning.
+        motion: of its beginning.
     """
 
     log: int
     first: int
     inputs: Array
     voltage: Array
-    seen: FirstMotion
+    motion: FirstMotion
 
 
 @dataclass(frozen=True)
@@ -77,13 +77,13 @@ class FlownWindow:
 
     Attributes:
         numbers: what it depends on. begin: where it begins.
-        commands: as they arrive. late: their slopes by the delay.
+        commands: as they arrive. command_slopes: their slopes by the delay.
         run: of the filter. outputs: what the model measures (n, outputs).
     """
 
     numbers: FilterNumbers
     commands: Array
-    late: Array
+    command_slopes: Array
     begin: Begun
     run: FilterRun
     outputs: Array
@@ -119,40 +119,40 @@ class Shooting:
         """Every window as simulated at a scaled row."""
         return [self._simulate_window(window, *self._parts(row, place)) for place, window in enumerate(self._windows)]
 
-    def output_slopes(self, row: Array, flown: list[FlownWindow]) -> Array:
+    def output_slopes(self, row: Array, windows: list[FlownWindow]) -> Array:
         """Slopes of the outputs by the shared entries and by the window's own (windows, entries, n, outputs)."""
         shared = row[: self._plan.shared] * self._scale
-        return np.array([self._window_slopes(*each, shared) for each in zip(self._windows, flown, strict=True)])
+        return np.array([self._window_slopes(*each, shared) for each in zip(self._windows, windows, strict=True)])
 
     def _parts(self, row: Array, place: int) -> tuple[Array, Array]:
         """The shared numbers and those of a window, in their units."""
         shared, size = self._plan.shared, self._own_scale.size
-        own = row[shared + place * size : shared + (place + 1) * size]
-        return row[:shared] * self._scale, own * self._own_scale
+        numbers = row[shared + place * size : shared + (place + 1) * size]
+        return row[:shared] * self._scale, numbers * self._own_scale
 
-    def _simulate_window(self, window: Window, shared: Array, own: Array) -> FlownWindow:
+    def _simulate_window(self, window: Window, shared: Array, starts: Array) -> FlownWindow:
         model, n = self._plan.model, len(self._plan.model.vehicle.state_names)
         k, m = len(self._plan.layout.free), self._nuisances.size
         nuisance = np.zeros(len(Nuisance._fields))
         nuisance[self._nuisances] = shared[k + window.log * m : k + (window.log + 1) * m]
-        nuisance[self._drifting] += own[n:]
-        reaching, late = commands_moved(model.vehicle, model.dt, window.inputs, Nuisance(*nuisance))
+        nuisance[self._drifting] += starts[n:]
+        reaching, slopes = commands_moved(model.vehicle, model.dt, window.inputs, Nuisance(*nuisance))
         here = slice(window.first, window.first + self._plan.length)
         parameters = np.array(self._plan.layout.values(self._card, shared[:k]), dtype=np.float64)
         numbers = FilterNumbers(parameters, self._noise, nuisance, reaching[window.first])
-        begin = Begun(self._no_gain(), starting_row(model, numbers, window.seen) + own[:n])
+        begin = Begun(self._no_gain(), starting_row(model, numbers, window.motion) + starts[:n])
         nothing = np.zeros((self._plan.length, model.n_outputs))
         run = self._filter.along(begin, numbers, RecordSeries(nothing, driving_rows(reaching[here], window.voltage)))
         outputs = np.asarray(model.measure(run.states.x.T, Nuisance(*nuisance), _XP)).T
-        return FlownWindow(numbers, reaching[here], late[here], begin, run, outputs)
+        return FlownWindow(numbers, reaching[here], slopes[here], begin, run, outputs)
 
-    def _window_slopes(self, window: Window, flown: FlownWindow, shared: Array) -> Array:
+    def _window_slopes(self, window: Window, simulated: FlownWindow, shared: Array) -> Array:
         """Directions of the filter: parameters, the flight's numbers, the window's drifts, its states."""
-        plan, model, numbers = self._plan, self._plan.model, flown.numbers
+        plan, model, numbers = self._plan, self._plan.model, simulated.numbers
         n, k, m, d = len(model.vehicle.state_names), len(plan.layout.free), self._nuisances.size, self._drifting.size
-        count, own = k + m + d + n, k + window.log * m
-        scale = np.concatenate([self._scale[:k], self._scale[own : own + m], self._own_scale[n:], self._own_scale[:n]])
-        by_command = commands_by(model.vehicle, flown.late, (*plan.nuisances, *plan.drifting))
+        count, at = k + m + d + n, k + window.log * m
+        scale = np.concatenate([self._scale[:k], self._scale[at : at + m], self._own_scale[n:], self._own_scale[:n]])
+        by_command = commands_by(model.vehicle, simulated.command_slopes, (*plan.nuisances, *plan.drifting))
         parts = FilterNumbers(*(np.zeros((count, np.size(part))) for part in numbers))
         parts.parameters[:k] = plan.layout.value_slopes(self._card, shared[:k])
         for i, place in enumerate([*self._nuisances, *self._drifting]):
@@ -161,17 +161,17 @@ class Shooting:
         directions = FilterNumbers(*(scale[:, None] * part for part in parts))
         begins = np.zeros((count, n))
         begins[: k + m + d] = starting_row_moved(
-            model, numbers, window.seen, FilterNumbers(*(part[: k + m + d] for part in directions))
+            model, numbers, window.motion, FilterNumbers(*(part[: k + m + d] for part in directions))
         )
         begins[k + m + d :] = np.diag(scale[k + m + d :])
-        late = by_command * scale[k : k + m + d, None, None]
-        series = RecordSeries(flown.outputs, driving_rows(flown.commands, window.voltage))
-        moves = Moves(Begun(self._no_gain(count), begins), directions, k, late)
-        slopes = -self._filter.run_slopes(flown.begin, numbers, series, flown.run, moves)[0]
-        heading = flown.run.states.x[:, model.vehicle.index("psi")]
+        by_delay = by_command * scale[k : k + m + d, None, None]
+        series = RecordSeries(simulated.outputs, driving_rows(simulated.commands, window.voltage))
+        moves = Moves(Begun(self._no_gain(count), begins), directions, k, by_delay)
+        slopes = -self._filter.run_slopes(simulated.begin, numbers, series, simulated.run, moves)[0]
+        heading = simulated.run.states.x[:, model.vehicle.index("psi")]
         slopes = turned_rows(slopes, model.output_names, heading)
         every = np.zeros((plan.shared + n + d, *slopes.shape[1:]))
-        every[:k], every[own : own + m] = slopes[:k], slopes[k : k + m]
+        every[:k], every[at : at + m] = slopes[:k], slopes[k : k + m]
         every[plan.shared : plan.shared + n], every[plan.shared + n :] = slopes[k + m + d :], slopes[k + m : k + m + d]
         return every
 

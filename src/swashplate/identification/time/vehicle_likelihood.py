@@ -107,8 +107,8 @@ class VehicleErrors(OwnCovariance):
         return gain_entries(states, size, spread) if self.gain == "free" else []
 
     def _covariance(self, errors: Array) -> Array:
-        whole = super()._covariance(errors)
-        return np.diag(np.diag(whole)) if self.gain == "from the noise" else whole
+        matrix = super()._covariance(errors)
+        return np.diag(np.diag(matrix)) if self.gain == "from the noise" else matrix
 
     def _errors_in_a_row(self, row: Array) -> Array:
         every = range(len(self.records))
@@ -117,8 +117,8 @@ class VehicleErrors(OwnCovariance):
     def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
         factor = factor_of(self.covariance)
         for number in range(len(self.records)):
-            own = [i for i, n in enumerate(self.row.names) if n.endswith(f"[{number}]") or not n.endswith("]")]
-            ran, _ = self._ran(number, row, places := np.array(own, dtype=np.intp))
+            entries = [i for i, n in enumerate(self.row.names) if n.endswith(f"[{number}]") or not n.endswith("]")]
+            ran, _ = self._ran(number, row, places := np.array(entries, dtype=np.intp))
             yield MovedErrors(number, ran.errors, factor, places, ran.errors_moved)
 
     def _ran(self, number: int, row: Array, places: Places) -> tuple[Ran, Array]:
@@ -126,10 +126,10 @@ class VehicleErrors(OwnCovariance):
         start, numbers = self._given(number, row * self.row.scale, places)
         return self._filters[number].run(start, numbers, self._driving[number], self.records[number].outputs), numbers
 
-    def _given(self, number: int, plain: Array, places: Places) -> tuple[Array, Array]:
+    def _given(self, number: int, row: Array, places: Places) -> tuple[Array, Array]:
         """Where the filter begins and its numbers, and behind both how they move with some entries of the row."""
         directions = np.diag(self.row.scale)[places]
-        every = np.concatenate([plain[None], directions])
+        every = np.concatenate([row[None], directions])
 
         def at(names: Sequence[str]) -> Array:
             places = [self._place.get(name) for name in names]
@@ -138,9 +138,9 @@ class VehicleErrors(OwnCovariance):
         states, layout, card = self.table.vehicle.state_names, self.table.layout, self.table.card_row
         free = len(layout.free)
         p = np.zeros((len(every), len(card) + len(CONSTANTS)))
-        p[0] = *layout.values(card, plain[:free]), *self._constants
+        p[0] = *layout.values(card, row[:free]), *self._constants
         if free:
-            p[1:, : len(card)] = directions[:, :free] @ layout.value_slopes(card, plain[:free])
+            p[1:, : len(card)] = directions[:, :free] @ layout.value_slopes(card, row[:free])
         start, shift = (at([f"{what} {s}[{number}]" for s in states]) for what in ("start", "shift"))
         bias = at([f"bias {o}[{number}]" for o in self.outputs])
         if self.gain == "from the noise":
@@ -177,8 +177,8 @@ class VehicleErrors(OwnCovariance):
                 for table in (self._driving[number], self.records[number].outputs)
             )
             parts.append(self._filters[number].run(begin, numbers, *tables))
-        told = list(ahead.steps)
-        return np.stack([p.errors[told] for p in parts]), np.stack([p.errors_moved[:, told] for p in parts], axis=1)
+        steps = list(ahead.steps)
+        return np.stack([p.errors[steps] for p in parts]), np.stack([p.errors_moved[:, steps] for p in parts], axis=1)
 
 
 def driving_rows(record: Record, environment: Environment) -> Array:

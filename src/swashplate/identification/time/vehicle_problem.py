@@ -63,15 +63,15 @@ class VehicleKind:
             shifts=bool(question.shifts),
             biases=question.biases,
         )
-        moved = excitations(flights, model.input_names, outputs=outputs)
-        answers = tuple(f"{one.input}: {one.words}" for one in of_inputs(moved).values() if one.kind == CONTROLLER)
+        driven = excitations(flights, model.input_names, outputs=outputs)
+        answers = tuple(f"{one.input}: {one.words}" for one in of_inputs(driven).values() if one.kind == CONTROLLER)
         sources = ", ".join(piece.name for piece in likelihood.records)
         return RecordProblem(
             likelihood,
             model,
             method,
             flights,
-            _Identified(table, method, sources, moved).vehicle,
+            _Identified(table, method, sources, driven).vehicle,
             {
                 "free": list(table.names),
                 "ties": [f"{name} = {tie.text}" for name, tie in table.ties],
@@ -80,7 +80,7 @@ class VehicleKind:
                 "biases": list(question.biases),
             },
             table=table,
-            words=lambda _: answers,
+            warnings_of=lambda _: answers,
         )
 
 
@@ -91,7 +91,7 @@ class _Identified:
     table: Parameterization
     method: str
     sources: str
-    moved: Sequence[Excitation]
+    excited: Sequence[Excitation]
 
     def vehicle(self, estimates: Mapping[str, Estimate]) -> Vehicle:
         table, origin = self.table, f"identified by {self.method} from {self.sources}"
@@ -100,7 +100,7 @@ class _Identified:
             sigma = estimates[name].sigma if name in table.names else None
             card = card.with_values({name: value}, status="identified", sigma=sigma, source=origin)
         title = f"{card.title}, identified from {self.sources}"
-        return mark_answers(table.vehicle.with_card(replace(card, title=title, path="")), self.moved)
+        return mark_answers(table.vehicle.with_card(replace(card, title=title, path="")), self.excited)
 
 
 def _outputs(model: Vehicle, flights: Sequence[Flight], question: Question) -> tuple[str, ...]:

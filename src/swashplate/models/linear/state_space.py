@@ -156,7 +156,7 @@ class StateSpaceModel:
         """A copy whose parameters carry what a fit told of them, and nothing of earlier fits.
 
         Args:
-            told: standard deviation and insensitivity by name [the parameter's unit].
+            bounds: standard deviation and insensitivity by name [the parameter's unit].
         """
         nothing = (np.nan, np.nan)
         return replace(

@@ -44,7 +44,7 @@ def test_a_search_stopped_after_its_second_iteration_keeps_the_second_row(number
     assert found.history == two.history
     assert not found.converged
     assert stop.code == 128 + number
-    assert stop.words.startswith(f"stopped after 2 iterations by {number.name}")
+    assert stop.sentence.startswith(f"stopped after 2 iterations by {number.name}")
     assert len(again.history) == 1
     assert not again.converged
     assert later.converged

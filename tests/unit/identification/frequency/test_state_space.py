@@ -16,7 +16,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.identification.core.result import Estimate, percent
 from swashplate.identification.frequency.start_values import at_flown_trim, from_linear_model, from_models
 from swashplate.identification.frequency.state_space_fit import fit_state_space
-from swashplate.identification.frequency.state_space_result import words
+from swashplate.identification.frequency.state_space_result import fit_warnings
 from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.linearised_model import model_of
@@ -419,11 +419,13 @@ def test_parameters_that_are_told_only_together_are_named() -> None:
         return Estimate(name, "", 1.0, 1.0, sigma=bound, insensitivity=0.02)
 
     correlation = np.array([[1.0, 0.2, 0.999], [0.2, 1.0, 0.2], [0.999, 0.2, 1.0]])
-    found = words(
+    found = fit_warnings(
         [], [], [one("Nrfb", 30.0), one("Nr", 0.1), one("Kr", 30.0)], correlation, at_bound=(), converged=True
     )
     assert any("told only together" in text and "Nrfb and Kr. Hold one" in text for text in found), found
-    told = words([], [], [one("Nrfb", 0.1), one("Nr", 0.1), one("Kr", 0.1)], correlation, at_bound=(), converged=True)
+    told = fit_warnings(
+        [], [], [one("Nrfb", 0.1), one("Nr", 0.1), one("Kr", 0.1)], correlation, at_bound=(), converged=True
+    )
     assert told == []
     assert percent(29120.5) == "   >9999"
 

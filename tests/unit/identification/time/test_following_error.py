@@ -55,7 +55,7 @@ def _beside(rows: int = 1) -> FollowingRows:
     run, start = likelihood._runs[0], likelihood.row.starts()
     numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), start)[1]
     many = FilterNumbers(*(np.repeat(np.asarray(part)[None], rows, axis=0) for part in numbers))
-    beside = _rows(likelihood, many, run.seen, likelihood._spread[0])
+    beside = _rows(likelihood, many, run.motion, likelihood._spread[0])
     states = likelihood.constant.runs(start)[0].states
     beside.state = FilterState(*(np.repeat(part[100][None], rows, axis=0) for part in states))
     return beside
@@ -143,7 +143,7 @@ def test_a_record_that_begins_in_a_maneuver_says_how_far_off_its_states_may_be()
         np.testing.assert_allclose([part[place] for part in slopes_ahead(piece)], [seen.value, seen.rate], atol=1e-9)
         numbers = went.numbers._replace(inputs=went.commands[place : place + 50].mean(axis=0))
         rows = FilterNumbers(*(np.asarray(row)[None] for row in numbers))
-        begun = _rows(likelihood, rows, run.seen._replace(value=seen.value, rate=seen.rate), spread)
+        begun = _rows(likelihood, rows, run.motion._replace(value=seen.value, rate=seen.rate), spread)
         off.append(begun.state.x[0] - went.states.x[place])
         sure = begun.covariance[0].copy()
         sure[:n, :n] -= spread
@@ -252,7 +252,7 @@ def test_in_c_it_is_the_same() -> None:
     placed = [run.placed(*given, one * likelihood.row.scale) for one in (row, row + 0.01)]
     numbers = FilterNumbers(*map(np.stack, zip(*(each for _, each in placed), strict=True)))
     series = RecordSeries(readings, driving_rows(np.stack([u for u, _ in placed], axis=1), run.voltage))
-    begin = following_from(likelihood.model, numbers, run.seen, likelihood._spread[0])
+    begin = following_from(likelihood.model, numbers, run.motion, likelihood._spread[0])
     codes = filter_code(likelihood.model), VirtualFilter(likelihood.model)
     assert [code.compiled_by for code in codes] == ["C", "NumPy"]
     for found, expected in zip(*(code.follow(likelihood.model.dt, begin, series) for code in codes), strict=True):

@@ -34,7 +34,7 @@ def test_words_say_what_was_gained_and_where() -> None:
 def test_words_name_the_physics_that_moved_far() -> None:
     vehicle = sp.vehicle("crazyflie")
     shares = dict.fromkeys(("u", "v", "w", "p", "q", "r"), 0.0)
-    found = LinearResidual(vehicle, 2.0, 120.0, 9.0, shares, Noise(), moved={"tau_drive": 24.2, "inertia_xx": -1.4})
+    found = LinearResidual(vehicle, 2.0, 120.0, 9.0, shares, Noise(), shifts={"tau_drive": 24.2, "inertia_xx": -1.4})
     assert found.summary_text.endswith("; with it the physics moves: tau_drive by +24 sigma")
     assert found.settings_entry["sigmas by which the physics moved"] == {"tau_drive": 24.2, "inertia_xx": -1.4}
 
