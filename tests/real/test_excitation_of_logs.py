@@ -31,7 +31,7 @@ def test_a_log_without_a_sweep_is_a_controllers_answer_at_any_rate(
     bare = log.with_streams({"rates": log.streams["rates"][["p", "mixer_roll"]]})
     told = of(bare, "mixer_roll")["mixer_roll"]
     assert told.kind == CONTROLLER
-    assert told.told.answer
+    assert told.shares.answer
 
 
 def of(flight: Flight, *inputs: str, start: float = 0.0, stop: float = np.inf) -> dict[str, Excitation]:

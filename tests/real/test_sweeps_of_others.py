@@ -72,8 +72,8 @@ def test_no_unstable_model_is_suggested_of_the_stable_x8(shared_data: Path) -> N
     for name in ("K", "pole"):
         assert best.fit[name].value == pytest.approx(other.fit[name].value, rel=0.05)
     sign = response_sign(cut, "p", "command", expected=1, integrations=1)
-    assert sign.told == 0, "where loop and sweep mix, no sign is told"
-    assert response_sign(whole, "p", "command", expected=1, integrations=1).told == 1
+    assert sign.sense == 0, "where loop and sweep mix, no sign is told"
+    assert response_sign(whole, "p", "command", expected=1, integrations=1).sense == 1
 
 
 def test_trex_tells_what_it_cannot(shared_data: Path) -> None:

@@ -13,7 +13,15 @@ import swashplate
 HOUSE = Path(swashplate.__file__).parent
 WORDS = ("found", "moved", "words", "told", "plain", "flown", "made", "own", "late", "whole", "seen")
 MOST = dict.fromkeys(("bench", "models", "physics"), 0)
-MOST |= {"control": 41, "export": 7, "identification": 2, "reporting": 8, "simulation": 9, "validation": 7}
+MOST |= {
+    "control": 41,
+    "export": 7,
+    "flights": 5,
+    "identification": 2,
+    "reporting": 8,
+    "simulation": 9,
+    "validation": 7,
+}
 """Today, of all words together: fields of results and of the page's parts that other folders read, and "found"."""
 MOST_IN_ALL = {"found": 14}
 """Today, in the whole package."""

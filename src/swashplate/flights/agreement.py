@@ -92,9 +92,9 @@ def thinned(time: Array, table: Array) -> tuple[Array, Array]:
         return time, table
     blocks = time.size // k
     stamps = time[: blocks * k].reshape(blocks, k)
-    whole = stamps[:, -1] - stamps[:, 0] < 2.0 * k * step
+    steady = stamps[:, -1] - stamps[:, 0] < 2.0 * k * step
     means = table[: blocks * k].reshape(blocks, k, *table.shape[1:]).mean(axis=1)
-    return stamps.mean(axis=1)[whole], means[whole]
+    return stamps.mean(axis=1)[steady], means[steady]
 
 
 def pieces(flight: Flight, names: Sequence[str], time: Array, reference: Reference) -> Iterator[tuple[float, Array]]:
@@ -105,9 +105,9 @@ def pieces(flight: Flight, names: Sequence[str], time: Array, reference: Referen
     stamps, table = thinned(stamps[good], table[good])
     if stamps.size < SHORTEST or time.size < SHORTEST:
         return
-    own = 1.0 / float(np.median(np.diff(stamps)))
-    rate = min(own, 1.0 / float(np.median(np.diff(time))), _FASTEST)
-    width = round(own / rate)
+    native = 1.0 / float(np.median(np.diff(stamps)))
+    rate = min(native, 1.0 / float(np.median(np.diff(time))), _FASTEST)
+    width = round(native / rate)
     if width > 1:  # vibration must not fold into the band
         from scipy.ndimage import uniform_filter1d  # a quarter of a second that most logs need not wait
 
@@ -140,18 +140,18 @@ def agreements(
         if band[1] <= 0.4 * rate and columns.shape[0] >= max(SHORTEST, window * rate)
         for centred in _windows(columns, rate, band, int(window * rate))
     ]
-    made: dict[int, dict[int, Agreement]] = {}
+    found_pairs: dict[int, dict[int, Agreement]] = {}
     if not products:
-        return made
+        return found_pairs
     every, k = np.array(products), len(there)
     power = np.diagonal(every, axis1=1, axis2=2)
     for row, i in enumerate(there):
         for j in axes:
-            axis, own = power[:, k + j], power[:, row]
-            moves = (axis > _QUIET**2 * np.median(axis)) & (own > 0.0) & (axis > 0.0)
-            if moves.sum() >= _FEWEST and (pair := _agreement(own[moves], axis[moves], every[moves, row, k + j])):
-                made.setdefault(i, {})[j] = pair
-    return made
+            axis, channel = power[:, k + j], power[:, row]
+            moves = (axis > _QUIET**2 * np.median(axis)) & (channel > 0.0) & (axis > 0.0)
+            if moves.sum() >= _FEWEST and (pair := _agreement(channel[moves], axis[moves], every[moves, row, k + j])):
+                found_pairs.setdefault(i, {})[j] = pair
+    return found_pairs
 
 
 def _windows(columns: Array, rate: float, band: tuple[float, float], n: int) -> Iterator[Array]:
@@ -160,18 +160,18 @@ def _windows(columns: Array, rate: float, band: tuple[float, float], n: int) -> 
         yield part - part.mean(axis=0)
 
 
-def _agreement(own: Array, axis: Array, cross: Array) -> Agreement | None:
+def _agreement(channel: Array, axis: Array, cross: Array) -> Agreement | None:
     """Of the powers of both sides and their product by window, shape (n,) each; None where they share nothing."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        correlation = float(np.median(cross / np.sqrt(own * axis)))
-    sums = np.array([own.sum(), axis.sum(), abs(cross.sum())])
-    without = np.abs(sums - np.stack([own, axis, np.sign(cross.sum()) * cross], axis=1))
+        correlation = float(np.median(cross / np.sqrt(channel * axis)))
+    sums = np.array([channel.sum(), axis.sum(), abs(cross.sum())])
+    without = np.abs(sums - np.stack([channel, axis, np.sign(cross.sum()) * cross], axis=1))
     least = np.sqrt(np.finfo(np.float64).tiny)
     if not (np.isfinite(correlation) and (sums > least).all() and (without > least).all()):
         return None
     low, high = np.log(sums[2] / sums[1]), np.log(sums[0] / sums[2])
     errors = [
-        np.sqrt((own.size - 1) * np.var(np.log(without[:, above] / without[:, below])))
+        np.sqrt((channel.size - 1) * np.var(np.log(without[:, above] / without[:, below])))
         for above, below in ((2, 1), (0, 2))
     ]
     return Agreement(correlation, float(np.exp(low)), float(np.exp(high)), *map(float, errors))

@@ -19,19 +19,19 @@ class AircraftKind:
     """What carries an aircraft.
 
     Attributes:
-        words: what it is, with its article.
+        noun: what it is, with its article.
         main_rotors: of a helicopter; 0 where it has none. coaxial: whether they share an axis.
         multirotor: whether rotors alone carry it, none of which is a main rotor.
         rotors: of a multirotor; 0 where the log does not say how many.
-        told: what the log says that shows it.
+        source: what the log says that shows it.
     """
 
-    words: str
+    noun: str
     main_rotors: int = 0
     coaxial: bool = False
     multirotor: bool = False
     rotors: int = 0
-    told: str = ""
+    source: str = ""
 
     @property
     def made_for(self) -> str:
@@ -40,10 +40,8 @@ class AircraftKind:
             return ""
         looked = "is read, checked and plotted, and its rate loops, filters, noise and incidents are told"
         if self.multirotor:
-            return (
-                f"{self.words}: it {looked}; sweeps give responses and gains. Models from geometry are of helicopters"
-            )
-        return f"{self.words}: it {looked}. Models and gains are made here for helicopters and multirotors only"
+            return f"{self.noun}: it {looked}; sweeps give responses and gains. Models from geometry are of helicopters"
+        return f"{self.noun}: it {looked}. Models and gains are made here for helicopters and multirotors only"
 
 
 def _rotors(number: int) -> AircraftKind:
@@ -86,18 +84,18 @@ _LEAST = 3
 def aircraft_kind(flight: Flight) -> AircraftKind | None:
     """What the log says that flew; None where it does not."""
     said = flight.provenance
-    told = _ardupilot(said.vehicle, said.parameters) if said.reader in ("ardupilot", "tlog") else None
+    kind = _ardupilot(said.vehicle, said.parameters) if said.reader in ("ardupilot", "tlog") else None
     if said.reader == "tlog" and not said.parameters.get("Q_ENABLE"):
-        told = _of_parameter(said.parameters, "MAV_TYPE", _MAV_TYPES) or told
+        kind = _of_parameter(said.parameters, "MAV_TYPE", _MAV_TYPES) or kind
     if said.reader in ("ulog", "px4log"):
-        told = _of_parameter(said.parameters, "CA_AIRFRAME", _CONTROL_ALLOCATION)
-        told = told or _of_parameter(said.parameters, "MAV_TYPE", _MAV_TYPES)
+        kind = _of_parameter(said.parameters, "CA_AIRFRAME", _CONTROL_ALLOCATION)
+        kind = kind or _of_parameter(said.parameters, "MAV_TYPE", _MAV_TYPES)
     if said.reader == "blackbox" and re.search(r"\brotorflight\b", said.vehicle, re.IGNORECASE):
-        told = (_HELICOPTER, said.vehicle)
-    told = told or _of_motors(flight)
-    if told is None and said.reader == "blackbox" and re.search(r"\bbetaflight\b", said.vehicle, re.IGNORECASE):
-        told = (AircraftKind("a multirotor", multirotor=True), said.vehicle)
-    return None if told is None else replace(told[0], told=told[1])
+        kind = (_HELICOPTER, said.vehicle)
+    kind = kind or _of_motors(flight)
+    if kind is None and said.reader == "blackbox" and re.search(r"\bbetaflight\b", said.vehicle, re.IGNORECASE):
+        kind = (AircraftKind("a multirotor", multirotor=True), said.vehicle)
+    return None if kind is None else replace(kind[0], source=kind[1])
 
 
 Told = tuple[AircraftKind, str]

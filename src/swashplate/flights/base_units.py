@@ -90,8 +90,8 @@ def _product(tokens: Iterator[str]) -> tuple[float, dict[str, int]]:
     def take(part: tuple[float, dict[str, int]], power: int) -> None:
         nonlocal total
         total *= part[0] ** power
-        for name, own in part[1].items():
-            powers[name] = powers.get(name, 0) + own * power
+        for name, exponent in part[1].items():
+            powers[name] = powers.get(name, 0) + exponent * power
 
     for token in tokens:
         if token == ")":

@@ -42,14 +42,14 @@ def with_names(flight: Flight, wanted: Mapping[str, str]) -> Flight:
 
 def renamed_channels(flights: Iterable[Flight], names: Iterable[str]) -> dict[str, str]:
     """The log's channel by the name that `with_names` gave it, of these names as far as they were given."""
-    told = {
+    renamed = {
         str(name): source
         for flight in flights
         for step in flight.history
         if step.operation == "rename"
         for source, name in step.details.items()
     }
-    return {name: told[name] for name in names if name in told}
+    return {name: renamed[name] for name in names if name in renamed}
 
 
 def slowest_of(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, float]:

@@ -25,15 +25,15 @@ def checked(flight: Flight, used: Collection[str] | None = None) -> Flight:
         FlightError: channels that contradict each other, as `refuse_inconsistent` says.
     """
     taken = any(step.operation == UNCHECKED for step in flight.history)
-    told = [Problem(str(finding), () if taken else finding.scale) for finding in refuse_inconsistent(flight, used=used)]
+    said = [Problem(str(finding), () if taken else finding.scale) for finding in refuse_inconsistent(flight, used=used)]
     if used is not None:
         kept = {home: data[[n for n in data.data_vars if n in used]] for home, data in flight.streams.items()}
-        flight, whole = flight.with_streams({home: data for home, data in kept.items() if data.data_vars}), flight
+        flight, entire = flight.with_streams({home: data for home, data in kept.items() if data.data_vars}), flight
     else:
-        whole = flight
-    told += [Problem(text) for text in problems(flight, whole)]
-    before = whole.provenance.problems
-    return replace(whole, provenance=replace(whole.provenance, problems=tuple(dict.fromkeys((*before, *told)))))
+        entire = flight
+    said += [Problem(text) for text in problems(flight, entire)]
+    before = entire.provenance.problems
+    return replace(entire, provenance=replace(entire.provenance, problems=tuple(dict.fromkeys((*before, *said)))))
 
 
 def check_disjoint(flights: Sequence[Flight], names: Sequence[str] | None = None) -> None:

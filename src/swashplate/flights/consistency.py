@@ -16,16 +16,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.flights.agreement import (
-    BANDS,
-    SHORTEST,
-    Agreement,
-    Reference,
-    agreements,
-    pieces,
-    series,
-    thinned,
-)
+from swashplate.flights.agreement import BANDS, SHORTEST, Agreement, Reference, agreements, pieces, series, thinned
 from swashplate.flights.conditioning.attitude import continuous, interpolate, quaternion_from_euler, to_body
 from swashplate.flights.conditioning.derive import GRAVITY, body_rates, differentiate
 from swashplate.flights.flight import Flight
@@ -76,13 +67,13 @@ class Inconsistency:
 
 def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
     """Every contradiction between the flight's measured channels; none where nothing can be held against anything."""
-    made = {name for step in flight.history if step.operation == "derive" for name in step.details.get("derived", ())}
+    inner = {name for step in flight.history if step.operation == "derive" for name in step.details.get("derived", ())}
     contradictions: list[Inconsistency] = []
     if (attitude := _attitude(flight, contradictions)) is not None:
-        for names in _families(flight, RATES, made):
-            told = _compared(flight, names, attitude.time, attitude.turning, attitude.axes, _RATE)
+        for names in _families(flight, RATES, inner):
+            findings = _compared(flight, names, attitude.time, attitude.turning, attitude.axes, _RATE)
             # Pitch without roll: on its back, q and the change of theta have opposite signs.
-            contradictions += [replace(one, decisive=one.decisive and attitude.axes != (1,)) for one in told]
+            contradictions += [replace(one, decisive=one.decisive and attitude.axes != (1,)) for one in findings]
     if all(name in flight for name in POSITION):
         place = [thinned(*series(flight, name)) for name in POSITION]
 
@@ -93,12 +84,12 @@ def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
             assert attitude is not None
             return to_body(interpolate(attitude.time, attitude.quaternion, grid), local(grid))
 
-        whole = attitude is not None and len(attitude.axes) == 3
-        for names, reference in ((_LOCAL, local), *([(VELOCITY, body)] if whole else [])):
-            measured = tuple(name if name in flight and name not in made else "" for name in names)
+        complete = attitude is not None and len(attitude.axes) == 3
+        for names, reference in ((_LOCAL, local), *([(VELOCITY, body)] if complete else [])):
+            measured = tuple(name if name in flight and name not in inner else "" for name in names)
             if any(measured):
                 contradictions += _compared(flight, measured, place[0][0], reference, (0, 1, 2), _SPEED)
-    return (*contradictions, *_weight(flight, made, attitude if attitude and len(attitude.axes) > 1 else None))
+    return (*contradictions, *_weight(flight, inner, attitude if attitude and len(attitude.axes) > 1 else None))
 
 
 def refuse_inconsistent(flight: Flight, *, used: Collection[str] | None = None) -> tuple[Inconsistency, ...]:
@@ -113,21 +104,21 @@ def refuse_inconsistent(flight: Flight, *, used: Collection[str] | None = None) 
     Raises:
         FlightError: naming the channels, the ratios and the option that mends them.
     """
-    told = consistency(flight)
+    findings = consistency(flight)
     if used is not None:
-        told = tuple(finding for finding in told if {finding.channel, *finding.against} & set(used))
+        findings = tuple(finding for finding in findings if {finding.channel, *finding.against} & set(used))
     taken = any(step.operation == UNCHECKED for step in flight.history)
-    decisive = [finding for finding in told if finding.decisive]
+    decisive = [finding for finding in findings if finding.decisive]
     if decisive and not taken:
-        words = [f"{'' if i == 0 else one.channel + ': '}{one.text}" for i, one in enumerate(decisive)]
+        texts = [f"{'' if i == 0 else one.channel + ': '}{one.text}" for i, one in enumerate(decisive)]
         raise FlightError(
-            f"{'; '.join(words)}.",
+            f"{'; '.join(texts)}.",
             where=flight.provenance.source or None,
             channel=decisive[0].channel,
             hint=" ".join(dict.fromkeys(finding.mend for finding in decisive))
             + " To use the log as it is: --as-logged (in Python condition(check=False)).",
         )
-    return told
+    return findings
 
 
 # ---- what is held against what ---------------------------------------------------------------------------------------
@@ -156,13 +147,13 @@ _SPEED = _Kind(
 )
 
 
-def _families(flight: Flight, plain: Sequence[str], made: set[str]) -> list[tuple[str, ...]]:
+def _families(flight: Flight, bases: Sequence[str], inner: set[str]) -> list[tuple[str, ...]]:
     """The measured channels of a kind, axis by axis ("" where one is missing), with second opinions."""
     families = []
     for variant in ("", *VARIANTS):
-        names = tuple(f"{name}_{variant}" if variant else name for name in plain)
+        names = tuple(f"{name}_{variant}" if variant else name for name in bases)
         if variant != "demand" and any(name in flight for name in names):
-            families.append(tuple(name if name in flight and name not in made else "" for name in names))
+            families.append(tuple(name if name in flight and name not in inner else "" for name in names))
     return [names for names in families if any(names)]
 
 
@@ -235,14 +226,14 @@ def _compared(
         there = [i for i, name in enumerate(here) if name]
         both = [agreements(parts, there, axes, band=band, window=window) for band, window in BANDS]
         for i, name in enumerate(here):
-            told = [made[i] for made in both if i in made]
-            if name and told:
+            pairs = [by_row[i] for by_row in both if i in by_row]
+            if name and pairs:
                 # The band in which the two sides know each other best: noise of a derivative, drift of a gyroscope.
-                clearest = max(told, key=lambda by_axis: max(abs(at.correlation) for at in by_axis.values()))
-                every = next(made for made in both if made.get(i) is clearest)
+                clearest = max(pairs, key=lambda by_axis: max(abs(at.correlation) for at in by_axis.values()))
+                every = next(by_row for by_row in both if by_row.get(i) is clearest)
                 owners = {j: by_axis[j] for j, by_axis in every.items() if j in by_axis}
-                own = [by_axis[i] for by_axis in told if i in by_axis]
-                wrong = _judged(flight, here, i, clearest, kind, owners) or _scaled(name, own, kind)
+                of_axis = [by_axis[i] for by_axis in pairs if i in by_axis]
+                wrong = _judged(flight, here, i, clearest, kind, owners) or _scaled(name, of_axis, kind)
                 contradictions += [replace(one, against=kind.made_of[i]) for one in wrong]
     return contradictions
 
@@ -259,7 +250,7 @@ def _judged(
 
     An axis whose own channel follows it more closely (`owners`, by axis) is not exchanged: the two move together.
     """
-    name, own = names[i], by_axis.get(i)
+    name, its = names[i], by_axis.get(i)
     best = max(by_axis, key=lambda j: abs(by_axis[j].correlation))
     at = by_axis[best]
     fixed = flight.provenance.reader in _FIXED and LOGGED_UNIT not in flight[name].attrs
@@ -269,13 +260,13 @@ def _judged(
     number = f"ratio {at.ratio:.3g} ± {at.sigma:.1g}, correlation {at.correlation:+.2f}"
     if best != i:
         clear = abs(at.correlation) >= _TOGETHER and unit is not None
-        if not clear or own is None or abs(own.correlation) > _APART * abs(at.correlation):
+        if not clear or its is None or abs(its.correlation) > _APART * abs(at.correlation):
             return []
         if best in owners and abs(owners[best].correlation) > abs(at.correlation) + _CLOSER:
             return []
         other = names[best] or f"axis {best + 1}"
         text = (
-            f"moves with {kind.reference} for {other}, not for {name} ({number}; with its own {own.correlation:+.2f}): "
+            f"moves with {kind.reference} for {other}, not for {name} ({number}; with its own {its.correlation:+.2f}): "
             "axes seem to be exchanged"
         )
         return [Inconsistency(name, text, f"Name the right column in a mapping file: {name} = {{column = ...}}.")]
@@ -286,20 +277,20 @@ def _judged(
         return [Inconsistency(name, text, "Check its unit.")] if at.ratio < 0.0 else []
     inside, sign = channel(name).unit, "-" if at.ratio < 0.0 else ""
     doubled = unit.startswith("/")
-    words = [f"is {unit[1:]} times too small (converted twice?)" if doubled else f"looks like {unit}, not {inside}"]
-    words = words * bool(unit) + ["has the other sign"] * bool(sign)
-    text = f"{' and '.join(words)}, against {kind.reference} ({number})"
+    faults = [f"is {unit[1:]} times too small (converted twice?)" if doubled else f"looks like {unit}, not {inside}"]
+    faults = faults * bool(unit) + ["has the other sign"] * bool(sign)
+    text = f"{' and '.join(faults)}, against {kind.reference} ({number})"
     mend = "Check the units of both sides." if doubled else unit_to_give(flight, name, sign=sign, looks_like=unit)
-    return [Inconsistency(name, text, mend)] if words else []
+    return [Inconsistency(name, text, mend)] if faults else []
 
 
-def _scaled(name: str, told: Sequence[Agreement], kind: _Kind) -> list[Inconsistency]:
+def _scaled(name: str, pairs: Sequence[Agreement], kind: _Kind) -> list[Inconsistency]:
     """A factor between a channel and its own axis that is none of 1, nor of a filter: alike in every band."""
-    sure = [at for at in told if at.scaled and at.correlation > _SURE]
+    sure = [at for at in pairs if at.scaled and at.correlation > _SURE]
     if not sure:
         return []
     at = min(sure, key=lambda one: one.sigma / one.ratio)
-    if any(other.excludes(at.ratio) for other in told):
+    if any(other.excludes(at.ratio) for other in pairs):
         return []
     text = f"is {at.ratio:.4g} ± {at.sigma:.1g} times {kind.reference}: one of the two has a wrong scale"
     mend = f"If it is {name}'s, correct the log (in a mapping file: factor = {1.0 / at.ratio:.4g}); what is fitted to "
@@ -317,10 +308,10 @@ def _unit_of(ratio: float, kind: _Kind, *, within: float) -> str | None:
     return unit if abs(np.log(ratio / near[unit])) < (within if unit else _SAME) else None
 
 
-def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[Inconsistency]:
+def _weight(flight: Flight, inner: set[str], attitude: _Attitude | None) -> list[Inconsistency]:
     """The accelerometers' mean along body z: what neither falls nor climbs away feels its weight, -9.81 m/s^2 level."""
     contradictions, gravity = [], flight.gravity or GRAVITY
-    for (name,) in _families(flight, ("az",), made):
+    for (name,) in _families(flight, ("az",), inner):
         stamps, values = thinned(*series(flight, name))
         if values.size < SHORTEST:
             continue
@@ -332,8 +323,8 @@ def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[
         felt = float(np.median(values[upright] / -down[upright])) if upright.sum() >= SHORTEST else gravity
         for unit, weight in (("m/s^2", gravity), ("g", 1.0)):
             if abs(abs(felt) - weight) < 0.3 * weight and (unit, felt > 0.0) != ("m/s^2", True):
-                words = ["looks like g, not m/s^2"] * (unit == "g") + ["has the other sign"] * (felt < 0.0)
-                text = f"{' and '.join(words)}: its median is {-felt:+.3g} when level, expected {-gravity:.3g} m/s^2"
+                faults = ["looks like g, not m/s^2"] * (unit == "g") + ["has the other sign"] * (felt < 0.0)
+                text = f"{' and '.join(faults)}: its median is {-felt:+.3g} when level, expected {-gravity:.3g} m/s^2"
                 mend = unit_to_give(flight, name, sign="-" * (felt < 0.0), looks_like=unit.removeprefix("m/s^2"))
                 # Without an attitude it may have lain on its back.
                 contradictions.append(Inconsistency(name, text, mend, decisive=attitude is not None))

@@ -53,8 +53,8 @@ _NANOBENCH = "https://raw.githubusercontent.com/syediu/nanobench-iros2026/d45bc5
 
 def _nanobench(sha256: str, name: str) -> tuple[str, DataFile]:
     """A flight of the Crazyflie, by its trajectory."""
-    told = name.split("_", 1)[1].replace("_rep", ", flight ").replace("_", " ")
-    return f"{name}.csv", DataFile(sha256, f"{_NANOBENCH}/datasets/dataset/{name}.csv", f"{told}; at 100 Hz")
+    flight = name.split("_", 1)[1].replace("_rep", ", flight ").replace("_", " ")
+    return f"{name}.csv", DataFile(sha256, f"{_NANOBENCH}/datasets/dataset/{name}.csv", f"{flight}; at 100 Hz")
 
 
 REGISTRY: Mapping[str, Dataset] = {
@@ -126,9 +126,9 @@ def cache_folder() -> Path:
 def places() -> Iterator[Path]:
     """The folders that are searched, in order; not all of them need exist."""
     yield cache_folder()
-    told = os.environ.get("SWASHPLATE_DATA")
-    if told:
-        yield Path(told)
+    folders = os.environ.get("SWASHPLATE_DATA")
+    if folders:
+        yield Path(folders)
     for start in (Path(__file__).resolve().parent, Path.cwd()):
         for folder in (start, *start.parents):
             yield folder / "shared" / "data"
@@ -170,7 +170,7 @@ def find(name: str, file: str, *, registry: Mapping[str, Dataset] = REGISTRY) ->
 
 def listing(*, registry: Mapping[str, Dataset] = REGISTRY) -> tuple[DatasetFile, ...]:
     """Every file: data set, name, where it is found (or None), description; first those that come with the package."""
-    shipped = tuple(DatasetFile(example_logs.NAME, one.file, one.path, one.words) for one in example_logs.EXAMPLES)
+    shipped = tuple(DatasetFile(example_logs.NAME, one.file, one.path, one.summary) for one in example_logs.EXAMPLES)
     return shipped + tuple(
         DatasetFile(name, file, find(name, file, registry=registry), entry.description)
         for name, dataset in registry.items()
@@ -228,9 +228,9 @@ def locate(path_or_name: str | Path, *, registry: Mapping[str, Dataset] = REGIST
         return path
     files = registry[name].files
     full = next((known for known in files if file in (known, Path(known).stem)), file)
-    found = find(name, full, registry=registry)
-    if found is None:
+    match = find(name, full, registry=registry)
+    if match is None:
         raise DatasetError(
             "the file is not on this machine.", channel=f"{name}/{full}", hint=f"Get it with `swash data fetch {name}`."
         )
-    return found
+    return match

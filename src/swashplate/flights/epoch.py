@@ -67,17 +67,17 @@ def rebased(flight: Flight) -> Flight:
 
 def note(epoch: float) -> str:
     """Where time zero lies, in words."""
-    plain = f"{epoch:.9f}".rstrip("0").rstrip(".")
-    return f"time zero is {plain} s of the log's clock ({iso(epoch)} if it counts from 1970)"
+    seconds = f"{epoch:.9f}".rstrip("0").rstrip(".")
+    return f"time zero is {seconds} s of the log's clock ({iso(epoch)} if it counts from 1970)"
 
 
 def iso(epoch: float) -> str:
     """Seconds since 1970 as ISO 8601 in UTC, with every digit of the number."""
     exact = Decimal(repr(float(epoch)))
-    whole = math.floor(exact)
-    fraction = f"{exact - whole:f}".partition(".")[2].rstrip("0")
+    seconds = math.floor(exact)
+    fraction = f"{exact - seconds:f}".partition(".")[2].rstrip("0")
     try:
-        day = datetime.fromtimestamp(whole, UTC)
+        day = datetime.fromtimestamp(seconds, UTC)
     except (ValueError, OverflowError, OSError):
         return "no date"
     return f"{day:%Y-%m-%dT%H:%M:%S}{'.' if fraction else ''}{fraction}Z"

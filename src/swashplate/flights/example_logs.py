@@ -19,12 +19,12 @@ class ExampleLog:
 
     Attributes:
         file: its name in the folder.
-        title, words: what it is, and what can be seen with it.
+        title, summary: what it is, and what can be seen with it.
     """
 
     file: str
     title: str
-    words: str
+    summary: str
 
     @property
     def path(self) -> Path:

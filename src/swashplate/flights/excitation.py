@@ -68,15 +68,15 @@ class Excitation:
         record: the record's name. input: channel.
         kind: "sweep", "reference", "sticks", "maneuver" (anything else that past motion does not explain),
             "controller" (an answer to the motion), "unknown".
-        words: why.
-        told: what the motion tells of it, where that was asked.
+        why: in words.
+        shares: what the motion tells of it, where that was asked.
     """
 
     record: str
     input: str
     kind: str
-    words: str
-    told: AnswerShares = NOTHING
+    why: str
+    shares: AnswerShares = NOTHING
 
     @property
     def outside(self) -> bool:
@@ -100,18 +100,18 @@ def excitations(
         references: excitations or set-points that are said to have moved the inputs.
         swept: inputs in which a sweep was seen.
     """
-    moved = []
+    judged = []
     for flight in (flights,) if isinstance(flights, Flight) else flights:
         for piece in flight.split():
             record = _Record(piece, tuple(inputs), tuple(outputs), tuple(references))
-            moved += [record.judged(name, swept=name in swept) for name in inputs]
-    return tuple(moved)
+            judged += [record.judged(name, swept=name in swept) for name in inputs]
+    return tuple(judged)
 
 
-def of_inputs(moved: Sequence[Excitation]) -> dict[str, Excitation]:
+def of_inputs(judged: Sequence[Excitation]) -> dict[str, Excitation]:
     """The best excitation of each input over all records: one sweep is enough."""
     best: dict[str, Excitation] = {}
-    for one in sorted(moved, key=lambda one: _BEST_FIRST.index(one.kind)):
+    for one in sorted(judged, key=lambda one: _BEST_FIRST.index(one.kind)):
         best.setdefault(one.input, one)
     return best
 
@@ -159,15 +159,15 @@ class _Record:
         return tuple(n for n in self.states if n in self.outputs or n not in spare)
 
     @cached_property
-    def told(self) -> dict[str, AnswerShares]:
+    def shares(self) -> dict[str, AnswerShares]:
         """What the motion tells of each input; what the outputs tell, where the record is too short for more."""
-        moved: tuple[AnswerShares, ...] = ()
+        shares: tuple[AnswerShares, ...] = ()
         for names in (self.motion, self.outputs or tuple(n for n in self.motion if n in RATES)):
             forces = [str(self.flight[n].attrs.get("units", "")) in _AT_ONCE for n in names]
-            moved = told_by_motion(self.at(self.inputs), self.at(names), self.dt, at_once=forces)
-            if any(one.known for one in moved):
+            shares = told_by_motion(self.at(self.inputs), self.at(names), self.dt, at_once=forces)
+            if any(one.known for one in shares):
                 break
-        return dict(zip(self.inputs, moved, strict=True))
+        return dict(zip(self.inputs, shares, strict=True))
 
     def share(self, name: str, causes: Sequence[str]) -> float:
         """Share of an input that other channels explain."""
@@ -203,11 +203,11 @@ class _Record:
         """Sticks of an axis that moved; any stick where the axis of an input is not known."""
         received = self.flight.provenance.parameter(f"RCMAP_{_FUNCTION.get(axis, axis).upper()}")
         number = _RECEIVED.get(axis, 0) if received is None else int(received)
-        own = (f"stick_{axis}", f"stick_{_FUNCTION.get(axis, axis)}", f"rcin_{number}")
-        names = [n for n in self.sticks if n in own or not axis]
+        known = (f"stick_{axis}", f"stick_{_FUNCTION.get(axis, axis)}", f"rcin_{number}")
+        names = [n for n in self.sticks if n in known or not axis]
         size = np.ptp(self.at(names), axis=0)
         travel = np.array([_TRAVEL.get(str(self.flight[n].attrs.get("units", "")), 2.0) for n in names])
-        return tuple(n for n, moved in zip(names, size > _MOVED * travel, strict=True) if moved)
+        return tuple(n for n, moves in zip(names, size > _MOVED * travel, strict=True) if moves)
 
     @cached_property
     def set_points(self) -> tuple[str, ...]:
@@ -221,8 +221,8 @@ class _Record:
         axis = axis_of(logged)
         own_axis = [event.text for event in self.sweeps if axis and axis in _axes_in(event.text)]
         if own_axis:
-            told = f"the log tells of a sweep: {own_axis[0]}."
-            return Excitation(self.name, name, SWEEP, told)
+            why = f"the log tells of a sweep: {own_axis[0]}."
+            return Excitation(self.name, name, SWEEP, why)
         named = self._by_references(name, injected=not (axis and self.sweeps))
         if named is not None:
             return named
@@ -254,44 +254,44 @@ class _Record:
 
     def _by_set_points(self, name: str, axis: str, *, swept: bool) -> Excitation:
         """In a log with set-points: a controller's answer, unless sticks or a set-point moved by themselves."""
-        moved = self.moved_sticks(axis)
-        share = self.share(name, moved) if moved else 0.0
+        stick = self.moved_sticks(axis)
+        share = self.share(name, stick) if stick else 0.0
         if share >= _MOSTLY:
-            words = f"sticks moved it: {', '.join(moved)} explain {100.0 * share:.0f} % of it."
-            return Excitation(self.name, name, SWEEP if swept else STICKS, words)
+            why = f"sticks moved it: {', '.join(stick)} explain {100.0 * share:.0f} % of it."
+            return Excitation(self.name, name, SWEEP if swept else STICKS, why)
         # While the sticks rest, an outer loop may hold a speed or a place that this log does not tell.
-        told = bool(moved) or not self.sticks or swept or any(n in (*VELOCITY, *_LOCAL, *POSITION) for n in self.states)
+        sure = bool(stick) or not self.sticks or swept or any(n in (*VELOCITY, *_LOCAL, *POSITION) for n in self.states)
         for demand in [n for n in self.set_points if n == _RATE_OF.get(axis, n) and n in _RATE_OF.values()]:
-            if np.std(self.at([demand])) > _TURNED and told and not self.held(demand):
+            if np.std(self.at([demand])) > _TURNED and sure and not self.held(demand):
                 followed = self.share(name, [demand])
                 if followed >= _MOSTLY:
-                    words = f"'{demand}' moved by itself, and explains {100.0 * followed:.0f} % of it."
-                    return Excitation(self.name, name, SWEEP if swept else REFERENCE, words)
+                    why = f"'{demand}' moved by itself, and explains {100.0 * followed:.0f} % of it."
+                    return Excitation(self.name, name, SWEEP if swept else REFERENCE, why)
         if swept and self.pure(name):
             return Excitation(self.name, name, SWEEP, "a sweep is seen in it, and hardly anything else.")
-        hands = f"; the sticks explain {100.0 * max(share, 0.0):.0f} % of it" if moved else ""
-        words = (
+        hands = f"; the sticks explain {100.0 * max(share, 0.0):.0f} % of it" if stick else ""
+        why = (
             "a controller's answer: the log holds the set-points of its loop, and neither a sweep nor a stick nor a "
             f"set-point moved it from outside{hands}."
         )
-        return Excitation(self.name, name, CONTROLLER, words)
+        return Excitation(self.name, name, CONTROLLER, why)
 
     def _by_motion(self, name: str, *, stick: bool, swept: bool) -> Excitation:
-        told = self.told[name]
-        share = f"the motion until then explains {100.0 * told.past:.1f} % of it"
-        if told.answer and not (swept and self.pure(name)):
-            words = f"a controller's answer: {share}, and the motion that follows tells it no better."
-            return Excitation(self.name, name, CONTROLLER, words, told)
+        part = self.shares[name]
+        share = f"the motion until then explains {100.0 * part.past:.1f} % of it"
+        if part.answer and not (swept and self.pure(name)):
+            text = f"a controller's answer: {share}, and the motion that follows tells it no better."
+            return Excitation(self.name, name, CONTROLLER, text, part)
         if swept or stick:
-            words = "a sweep is seen in it." if swept else "it is a pilot's stick."
-            return Excitation(self.name, name, SWEEP if swept else STICKS, words, told)
-        if told.own:
-            how = "the motion that follows tells it better" if told.follows else "something else moves it"
-            return Excitation(self.name, name, MANEUVER, f"{share}, and {how}.", told)
-        why = share if told.known else "the record is too short, or nothing moves"
-        return Excitation(self.name, name, UNKNOWN, f"whether it answers the motion cannot be told: {why}. {FLY}", told)
+            text = "a sweep is seen in it." if swept else "it is a pilot's stick."
+            return Excitation(self.name, name, SWEEP if swept else STICKS, text, part)
+        if part.independent:
+            how = "the motion that follows tells it better" if part.follows else "something else moves it"
+            return Excitation(self.name, name, MANEUVER, f"{share}, and {how}.", part)
+        why = share if part.known else "the record is too short, or nothing moves"
+        return Excitation(self.name, name, UNKNOWN, f"whether it answers the motion cannot be told: {why}. {FLY}", part)
 
 
-def _axes_in(words: str) -> set[str]:
+def _axes_in(text: str) -> set[str]:
     """The axes that the head of a sweep's words names ("roll mixer, 0.5-20 Hz in 40 s")."""
-    return {_AXES[word] for word in words.lower().partition(",")[0].split() if word in _AXES}
+    return {_AXES[word] for word in text.lower().partition(",")[0].split() if word in _AXES}

@@ -70,15 +70,15 @@ class AnswerShares:
         return self.known and 1.0 - self.past + _FLOOR >= FOLLOWS * (1.0 - self.later + _FLOOR)
 
     @property
-    def own(self) -> bool:
+    def independent(self) -> bool:
         """Whether something else than past motion moves the command."""
         surprising = self.fresh >= FRESH and self.news < NO_NEWS
         return self.known and (self.past < OWN or self.follows or surprising)
 
     @property
     def answer(self) -> bool:
-        """Whether the command is an answer to past motion; neither this nor `own` where it cannot be told."""
-        return self.known and not self.own and self.past >= ANSWER and self.news >= NEWS
+        """Whether the command is an answer to past motion; neither this nor `independent` where it cannot be told."""
+        return self.known and not self.independent and self.past >= ANSWER and self.news >= NEWS
 
 
 NOTHING = AnswerShares(*[float("nan")] * 4)
@@ -103,12 +103,12 @@ def told_by_motion(
     until_then = ("now", "before", *(("long before", "sum") if memory else ()))
     from_then = ("now", "at once", "after", *(("long after", "sum") if memory else ()))
     past, later = table.left(*until_then), table.left(*from_then)
-    told = []
+    shares = []
     for j in range(commands.shape[1]):
         fresh, news = (float(table.left(f"own {j}", *more)[j]) + _DUST for more in ((), until_then))
         share = AnswerShares(1.0 - float(past[j]), 1.0 - float(later[j]), 1.0 - news / fresh, fresh - _DUST)
-        told.append(share if table.moves[j] else NOTHING)
-    return tuple(told)
+        shares.append(share if table.moves[j] else NOTHING)
+    return tuple(shares)
 
 
 def share_of(command: Array, causes: Array, dt: float, *, past: bool = True) -> float:
@@ -203,8 +203,8 @@ class _Table:
 
 def _normal(values: Array) -> Array:
     """Columns about their means, of unit size."""
-    moved = values - values.mean(axis=0)
-    return np.asarray(moved / np.maximum(moved.std(axis=0), 1e-300))
+    centred = values - values.mean(axis=0)
+    return np.asarray(centred / np.maximum(centred.std(axis=0), 1e-300))
 
 
 def _fading(values: Array, keep: float) -> Array:

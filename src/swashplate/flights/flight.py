@@ -82,12 +82,12 @@ class Flight(Shown):
     segments: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        seen: set[str] = set()
+        names: set[str] = set()
         for name, data in self.streams.items():
-            doubled = seen & set(map(str, data.data_vars))
+            doubled = names & set(map(str, data.data_vars))
             if doubled:
                 raise FlightError(f"stream '{name}' repeats channels of another stream: {sorted(doubled)}.")
-            seen |= set(map(str, data.data_vars))
+            names |= set(map(str, data.data_vars))
 
     # ---- looking -----------------------------------------------------------------------------------------------
     @property

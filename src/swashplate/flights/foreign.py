@@ -92,15 +92,15 @@ def frames(
     question = {"job": job, "path": os.path.abspath(path), "asked": asked, "limits": asdict(may), "scratch": None}
     if scratch is not None:
         question |= {"scratch": os.path.abspath(scratch), "asked": {**asked, "disk": may.disk}}
-    for told, content in _process().ask(path, question, may):
-        if "failed" in told:
-            raise ValueError(told["failed"])
-        if "refused" in told:
-            problem, channel, hint = told["refused"]
+    for head, content in _process().ask(path, question, may):
+        if "failed" in head:
+            raise ValueError(head["failed"])
+        if "refused" in head:
+            problem, channel, hint = head["refused"]
             raise FlightError(problem, where=path, channel=channel, hint=hint)
-        if "limit" in told:
-            raise _stopped(path, _MET[told["limit"]].format(may=may, memory=may.memory >> 20, disk=may.disk >> 20), may)
-        yield told, content
+        if "limit" in head:
+            raise _stopped(path, _MET[head["limit"]].format(may=may, memory=may.memory >> 20, disk=may.disk >> 20), may)
+        yield head, content
 
 
 _MET = {
@@ -134,10 +134,10 @@ class _Process:
         """The frames that answer a question; the last one is empty, or says what was wrong."""
         with self._one:
             process = self._started(path)
-            whole, late, left = False, threading.Event(), may.handed
+            ended, expired, left = False, threading.Event(), may.handed
 
             def end() -> None:
-                late.set()
+                expired.set()
                 process.kill()
 
             watch = threading.Timer(may.seconds, end)
@@ -146,20 +146,20 @@ class _Process:
             try:
                 process.stdin.write(json.dumps(question).encode() + b"\n")  # pyrefly: ignore[missing-attribute]
                 process.stdin.flush()  # pyrefly: ignore[missing-attribute]
-                while not whole:
+                while not ended:
                     left, text = self._bytes(process, int.from_bytes(self._bytes(process, 8, 8)[1], "little"), left)
-                    told = json.loads(text)
-                    left, content = self._bytes(process, told.get("bytes", 0), left)
-                    whole = not told or bool(_LAST & told.keys())
-                    yield told, content
+                    head = json.loads(text)
+                    left, content = self._bytes(process, head.get("bytes", 0), left)
+                    ended = not head or bool(_LAST & head.keys())
+                    yield head, content
             except _LimitError as error:
                 raise _stopped(path, f"gave more than {may.handed >> 20:,} MB ({error})", may) from None
             except (EOFError, BrokenPipeError):
-                met = f"took more than {may.seconds:g} s" if late.is_set() else self._end(process, may)
+                met = f"took more than {may.seconds:g} s" if expired.is_set() else self._end(process, may)
                 raise _stopped(path, met, may) from None
             finally:
                 watch.cancel()
-                if not whole or late.is_set():  # what is left of the answer belongs to nobody
+                if not ended or expired.is_set():  # what is left of the answer belongs to nobody
                     self._close()
 
     def _started(self, path: Path) -> subprocess.Popen[bytes]:
@@ -203,13 +203,13 @@ class _Process:
         running, self._running = self._running, None
         if running is None:
             return
-        own = self.owner == os.getpid()  # a fork has its parent's process
-        if own:
+        ours = self.owner == os.getpid()  # a fork has its parent's process
+        if ours:
             running.kill()
         with suppress(OSError):
             running.stdin.close()  # pyrefly: ignore[missing-attribute]
         running.stdout.close()  # pyrefly: ignore[missing-attribute]
-        if own:
+        if ours:
             running.wait()
 
 

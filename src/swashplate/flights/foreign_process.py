@@ -38,9 +38,9 @@ class UnpackedError(Exception):
 
 def limit_met(error: BaseException | None) -> str:
     """Which limit an error comes from: "memory", "disk" or ""; libraries put errors of their own around it."""
-    seen: set[int] = set()
-    while error is not None and id(error) not in seen:
-        seen.add(id(error))
+    visited: set[int] = set()
+    while error is not None and id(error) not in visited:
+        visited.add(id(error))
         if isinstance(error, MemoryError):
             return "memory"
         if isinstance(error, UnpackedError) or (isinstance(error, OSError) and error.errno == errno.EFBIG):
@@ -68,8 +68,8 @@ def _limit(may: Mapping[str, Any]) -> None:
         return
     used = resource.getrusage(resource.RUSAGE_SELF)
     had = 0
-    with suppress(OSError, ValueError, IndexError), open("/proc/self/statm", "rb") as told:
-        had = int(told.read().split()[5]) * resource.getpagesize()
+    with suppress(OSError, ValueError, IndexError), open("/proc/self/statm", "rb") as pages:
+        had = int(pages.read().split()[5]) * resource.getpagesize()
     for kind, most in (
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + 1 + may["processor"]),
@@ -88,8 +88,8 @@ def main() -> None:
         question = json.loads(line)
         tempfile.tempdir = question["scratch"]
         _limit(question["limits"])
-        for told, content in answered(question["job"], Path(question["path"]), question["asked"]):
-            text = json.dumps(told).encode()
+        for head, content in answered(question["job"], Path(question["path"]), question["asked"]):
+            text = json.dumps(head).encode()
             out.write(len(text).to_bytes(8, "little") + text)
             out.write(content)
         out.flush()

@@ -72,7 +72,7 @@ class Growing:
         self._file = _claimed(path)
         try:
             self._size = 0
-            head = MAGIC + json.dumps(header, default=storage.plain).encode()
+            head = MAGIC + json.dumps(header, default=storage.json_value).encode()
             self._write(head + b" " * (-(len(head) + 1) % 8) + b"\n")
         except BaseException:
             self.discard()
@@ -125,14 +125,14 @@ class Growing:
 def _claimed(path: Path) -> int:
     """A new, locked file. Somebody who cleans up may have removed it between being made and being locked."""
     while True:
-        made = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | systems.BYTES, 0o666)
-        systems.lock(made, wait=True)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | systems.BYTES, 0o666)
+        systems.lock(handle, wait=True)
         try:
-            if os.stat(path).st_ino == os.fstat(made).st_ino:
-                return made
+            if os.stat(path).st_ino == os.fstat(handle).st_ino:
+                return handle
         except FileNotFoundError:
             pass
-        os.close(made)
+        os.close(handle)
 
 
 class Abandoned:
@@ -213,21 +213,21 @@ def parse(content: bytes | mmap.mmap, *, where: str) -> Flight:
         raise FlightError(
             f"does not read as a recording of swashplate: {str(error) or type(error).__name__}.", where=where
         ) from None
-    rows, damage = _whole(content, end + 1, width=1 + len(columns))
+    rows, damage = _complete_rows(content, end + 1, width=1 + len(columns))
     series = {c: rows[:, 1 + j] for j, c in enumerate(columns)}
     try:
         data = stream(rows[:, 0], series, {c: unit for c, unit in columns.items() if unit})
     except FlightError as error:
         raise FlightError(error.problem, where=where, channel=error.channel, hint="The file is damaged.") from None
-    told = replace(provenance, damage=(*provenance.damage, *damage))
-    return Flight({name: data}, told, history)
+    damaged = replace(provenance, damage=(*provenance.damage, *damage))
+    return Flight({name: data}, damaged, history)
 
 
 def _checked(part: Any, schema: type[Schema], where: str | Path, at: str) -> Schema:
     return documents.parse_logged(json.dumps(part), schema, where=where, at=at, error=FlightError)
 
 
-def _whole(content: bytes | mmap.mmap, start: int, *, width: int) -> tuple[NDArray[np.float64], list[str]]:
+def _complete_rows(content: bytes | mmap.mmap, start: int, *, width: int) -> tuple[NDArray[np.float64], list[str]]:
     """The rows whose check sums are right, shape (n, width), and words about the others."""
     kind = np.dtype([("crc", "<u4"), ("number", "<u4"), ("row", "<f8", (width,))])
     count, torn = divmod(len(content) - start, kind.itemsize)

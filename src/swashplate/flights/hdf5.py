@@ -50,13 +50,13 @@ def read(path: Path, *, wanted: str) -> dict[str, Group] | None:
         ValueError: for damaged bytes, in the library's words.
     """
     groups: dict[str, Group] = {}
-    for told, content in foreign.frames("hdf5", path, size=path.stat().st_size, wanted=wanted):
-        if "foreign" in told:
+    for head, content in foreign.frames("hdf5", path, size=path.stat().st_size, wanted=wanted):
+        if "foreign" in head:
             return None
-        if "group" in told:
-            at = groups.setdefault(told["group"], Group(told["attributes"]))
-        elif told:
-            kind = np.dtype(object) if "texts" in told else np.dtype(told["dtype"])
-            flat = np.array(told["texts"], kind) if "texts" in told else np.frombuffer(content, kind)
-            at.variables[told["variable"]] = StoredVariable(flat.reshape(told["shape"]), told["attributes"])
+        if "group" in head:
+            at = groups.setdefault(head["group"], Group(head["attributes"]))
+        elif head:
+            kind = np.dtype(object) if "texts" in head else np.dtype(head["dtype"])
+            flat = np.array(head["texts"], kind) if "texts" in head else np.frombuffer(content, kind)
+            at.variables[head["variable"]] = StoredVariable(flat.reshape(head["shape"]), head["attributes"])
     return groups

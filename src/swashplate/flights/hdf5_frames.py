@@ -56,55 +56,55 @@ def frames(path: Path, *, wanted: str) -> Iterator[Frame]:
     yield {}, b""
 
 
-def _group(path: Path, group: h5py.Group, name: str, seen: set[int], *, strict: bool) -> Iterator[Frame]:
+def _group(path: Path, group: h5py.Group, name: str, visited: set[int], *, strict: bool) -> Iterator[Frame]:
     yield {"group": name, "attributes": _attributes(group)}, b""
     inner: list[tuple[str, h5py.Group]] = []
     for key in group:
         place = h5py.h5o.get_info(group.id, key.encode("utf-8", "surrogateescape")).addr
-        if place in seen:
+        if place in visited:
             continue
-        seen.add(place)
+        visited.add(place)
         item = group[key]
         if isinstance(item, h5py.Group):
             inner.append((f"{name}/{key}".removeprefix("/"), item))
         elif isinstance(item, h5py.Dataset):
             yield _variable(path, key, item, strict=strict)
     for below, item in inner:
-        yield from _group(path, item, below, seen, strict=strict)
+        yield from _group(path, item, below, visited, strict=strict)
 
 
 def _variable(path: Path, name: str, item: h5py.Dataset, *, strict: bool) -> Frame:
-    told: dict[str, Any] = {"variable": name, "attributes": _attributes(item), "shape": item.shape}
+    head: dict[str, Any] = {"variable": name, "attributes": _attributes(item), "shape": item.shape}
     if h5py.check_string_dtype(item.dtype) is not None:
-        return told | {"texts": [_plain(text) for text in np.ravel(item.asstr(errors="replace")[()])]}, b""
+        return head | {"texts": [_json_value(text) for text in np.ravel(item.asstr(errors="replace")[()])]}, b""
     if item.dtype.kind not in "fiub" and not strict:  # a cell's references, a compound: named, not read
-        return told | {"shape": (1,), "texts": [str(item.dtype)]}, b""
+        return head | {"shape": (1,), "texts": [str(item.dtype)]}, b""
     if item.dtype.kind not in "fiub" or item.shape is None:
         raise FlightError(f"has the type {item.dtype}, expected numbers or texts.", where=path, channel=item.name[1:])
     values = np.ascontiguousarray(item[()])
-    if told["attributes"].get("dtype") == "bool":  # netCDF knows none: they are written as bytes
-        values, _ = values.astype(bool), told["attributes"].pop("dtype")
-    return told | {"dtype": values.dtype.str, "bytes": values.nbytes}, values.tobytes()
+    if head["attributes"].get("dtype") == "bool":  # netCDF knows none: they are written as bytes
+        values, _ = values.astype(bool), head["attributes"].pop("dtype")
+    return head | {"dtype": values.dtype.str, "bytes": values.nbytes}, values.tobytes()
 
 
 def _attributes(of: h5py.Group | h5py.Dataset) -> dict[str, Any]:
-    return {name: _plain(of.attrs[name]) for name in of.attrs if name not in _OF_NETCDF}
+    return {name: _json_value(of.attrs[name]) for name in of.attrs if name not in _OF_NETCDF}
 
 
-def _plain(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     """A number, text or list of them as JSON has it; a list of one as its entry, as netCDF writes single numbers."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     if isinstance(value, np.ndarray):
-        entries = [_plain(entry) for entry in value.ravel().tolist()]
+        entries = [_json_value(entry) for entry in value.ravel().tolist()]
         return entries[0] if len(entries) == 1 else entries
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return _json_value(value.item())
     return value if isinstance(value, str | int | float | bool) else str(value)
 
 
 # ---- what is refused before it is read ----------------------------------------------------------------------------
-def _claimed(path: Path, group: h5py.h5g.GroupID, name: str, seen: set[int]) -> int:
+def _claimed(path: Path, group: h5py.h5g.GroupID, name: str, visited: set[int]) -> int:
     """Bytes that the data sets of a group claim, those of the groups in it included."""
     if name.count("/") > _DEEPEST:
         raise _refused(path, name, "its groups are nested too deeply")
@@ -114,25 +114,25 @@ def _claimed(path: Path, group: h5py.h5g.GroupID, name: str, seen: set[int]) -> 
         if group.links.get_info(link).type != h5py.h5l.TYPE_HARD:
             raise _refused(path, inner, "it is a link, to another file perhaps")
         place = h5py.h5o.get_info(group, link).addr
-        if place in seen:  # a group that lies within itself
+        if place in visited:  # a group that lies within itself
             continue
-        seen.add(place)
+        visited.add(place)
         item = h5py.h5o.open(group, link)
         if isinstance(item, h5py.h5g.GroupID):
-            claimed += _claimed(path, item, inner, seen)
+            claimed += _claimed(path, item, inner, visited)
         elif isinstance(item, h5py.h5d.DatasetID):
             claimed += _claimed_by(path, item, inner)
     return claimed
 
 
 def _claimed_by(path: Path, item: h5py.h5d.DatasetID, name: str) -> int:
-    made = item.get_create_plist()
-    if made.get_layout() == h5py.h5d.VIRTUAL:
+    creation = item.get_create_plist()
+    if creation.get_layout() == h5py.h5d.VIRTUAL:
         raise _refused(path, name, "it is virtual: its numbers lie in other files")
-    if made.get_external_count():
+    if creation.get_external_count():
         raise _refused(path, name, "its numbers lie in other files")
-    for k in range(made.get_nfilters()):
-        if made.get_filter(k)[0] not in _OWN_FILTERS:
+    for k in range(creation.get_nfilters()):
+        if creation.get_filter(k)[0] not in _OWN_FILTERS:
             raise _refused(path, name, "it is packed by a plugin")
     return int(np.prod(item.shape or (), dtype=object)) * int(item.dtype.itemsize)
 

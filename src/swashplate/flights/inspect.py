@@ -87,14 +87,14 @@ class Inspection(Shown):
     def to_document(self) -> dict[str, object]:
         """The same as plain JSON types (NaN becomes None)."""
 
-        def plain(value: Any) -> Any:
+        def as_json(value: Any) -> Any:
             if isinstance(value, dict):
-                return {key: plain(entry) for key, entry in value.items()}
+                return {key: as_json(entry) for key, entry in value.items()}
             if isinstance(value, list | tuple):
-                return [plain(entry) for entry in value]
+                return [as_json(entry) for entry in value]
             return None if isinstance(value, float) and not np.isfinite(value) else value
 
-        return {key: plain(value) for key, value in asdict(self).items()}
+        return {key: as_json(value) for key, value in asdict(self).items()}
 
     def stream_rows(self) -> list[tuple[str, ...]]:
         """Cells of the streams' table, its heading first."""
@@ -130,8 +130,8 @@ class Inspection(Shown):
 
     def _tables(self) -> Iterator[TextTable]:
         for heading, *rows in (self.stream_rows(), self.channel_rows()):
-            words = [i for i in range(len(heading)) if not (rows and _is_number(rows[0][i]))]
-            yield TextTable(heading, rows, words)
+            left = [i for i in range(len(heading)) if not (rows and _is_number(rows[0][i]))]
+            yield TextTable(heading, rows, left)
 
     def __str__(self) -> str:
         lines = [self._title()]
@@ -245,17 +245,17 @@ def _looked(
     return streams, channels
 
 
-def _told(flight: Flight, streams: Sequence[StreamSummary], channels: Sequence[ChannelSummary]) -> list[str]:
+def _problems_of(flight: Flight, streams: Sequence[StreamSummary], channels: Sequence[ChannelSummary]) -> list[str]:
     labels = {channel: name for name, group in attitudes(flight).items() for channel in group}
     outliers = {labels.get(summary.name, summary.name): summary.outliers for summary in channels if summary.outliers}
-    told = [*(text for stream in streams for text in stream.problems), *jittering(streams)]
-    told += [text for summary in channels for text in _channel_problems(summary)]
-    return told + _shared_problems(channels, outliers)
+    lines = [*(text for stream in streams for text in stream.problems), *jittering(streams)]
+    lines += [text for summary in channels for text in _channel_problems(summary)]
+    return lines + _shared_problems(channels, outliers)
 
 
 def problems(flight: Flight, beside: Flight | None = None) -> tuple[str, ...]:
     """What is wrong with a flight's streams and channels, each by itself, in words (`beside`: as of `jumps`)."""
-    return tuple(_told(flight, *_looked(flight, beside)))
+    return tuple(_problems_of(flight, *_looked(flight, beside)))
 
 
 def inspect(flight: Flight) -> Inspection:
@@ -284,7 +284,7 @@ def inspect(flight: Flight) -> Inspection:
             *([note(flight.epoch)] if flight.epoch else ()),
             *(text for stream in streams for text in stream.notes),
         ),
-        problems=(*damage, *contradictions, *turned, *_told(flight, streams, channels)),
+        problems=(*damage, *contradictions, *turned, *_problems_of(flight, streams, channels)),
         sweeps=swept,
         damage=damage,
         vehicle=flight.provenance.vehicle,

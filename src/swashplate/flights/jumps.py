@@ -54,8 +54,8 @@ def attitudes(flight: Flight) -> dict[str, tuple[str, ...]]:
     groups = {"attitude": QUATERNION}
     ends = ("", *(f"_{variant}" for variant in VARIANTS if variant != "demand"))
     groups |= {f"angles{end}": tuple(f"{name}{end}" for name in ATTITUDE) for end in ends}
-    whole = {name: group for name, group in groups.items() if all(channel in flight for channel in group)}
-    return {name: group for name, group in whole.items() if len({flight.stream_of(each) for each in group}) == 1}
+    complete = {name: group for name, group in groups.items() if all(channel in flight for channel in group)}
+    return {name: group for name, group in complete.items() if len({flight.stream_of(each) for each in group}) == 1}
 
 
 def jumps(flight: Flight, beside: Flight | None = None) -> dict[str, int]:
@@ -80,13 +80,13 @@ def jumps(flight: Flight, beside: Flight | None = None) -> dict[str, int]:
     for name in changes:
         out = outstanding[name]
         if out.any():
-            told = out & _impossible(changes[name], "attitude" if name in groups else _base(name))
+            jumped = out & _impossible(changes[name], "attitude" if name in groups else _base(name))
             if name not in groups:
-                told |= _spikes(name, changes[name], out, felt)
+                jumped |= _spikes(name, changes[name], out, felt)
             if name.startswith("mixer_") or name.endswith("_demand"):
                 later = changes[name][0][1:, None] - _changes_of_mode(flight)
-                told &= ~np.any((later >= 0.0) & (later <= _SWITCHED), axis=1)
-            if count := int(np.sum(told)):
+                jumped &= ~np.any((later >= 0.0) & (later <= _SWITCHED), axis=1)
+            if count := int(np.sum(jumped)):
                 counts[name] = count
     return counts
 
@@ -169,7 +169,7 @@ def _spikes(name: str, changes: Changes, out: NDArray[np.bool_], felt: Mapping[s
     """Jumps that one of the next samples takes back, far out of the samples around them, and that were not felt."""
     time, (row,) = changes
     values = np.concatenate([[0.0], np.cumsum(row)])
-    told = np.zeros(out.shape, dtype=np.bool_)
+    spikes = np.zeros(out.shape, dtype=np.bool_)
     for k in np.flatnonzero(out).tolist():
         for back in range(k + 1, min(k + _BRIEF, row.size - 1) + 1):
             left = abs(float(np.sum(row[k : back + 1])))
@@ -179,16 +179,16 @@ def _spikes(name: str, changes: Changes, out: NDArray[np.bool_], felt: Mapping[s
                 # A change is known at its later sample, and a channel of another rate knows of it up to a step away.
                 reach = max(_TOGETHER, 1.5 * float(time[back + 1] - time[k]))
                 if abs(row[k]) > _BEYOND * (high - low) and not _shaken(name, float(time[k + 1]), reach, felt):
-                    told[[k, back]] = True
+                    spikes[[k, back]] = True
                 break
-    return told
+    return spikes
 
 
 def _shaken(name: str, at: float, reach: float, felt: Mapping[str, Array]) -> bool:
     """Whether the inertial sensors jump with a channel: any for a command, another sensor or two others for theirs."""
-    own = _base(name)
+    base = _base(name)
     together = [other for other, times in felt.items() if np.any(np.abs(times - at) <= reach)]
-    if own not in _INERTIAL:
+    if base not in _INERTIAL:
         return bool(together)
-    again = any(_base(other) == own and other.endswith(_OTHERS) != name.endswith(_OTHERS) for other in together)
-    return again or sum(_base(other) != own for other in together) >= _FELT
+    again = any(_base(other) == base and other.endswith(_OTHERS) != name.endswith(_OTHERS) for other in together)
+    return again or sum(_base(other) != base for other in together) >= _FELT

@@ -55,7 +55,7 @@ class ResponseSign:
     Attributes:
         output, input: names.
         expected: what the names promise, 1 or -1.
-        told: what the response says, 1 or -1; 0 where it cannot tell.
+        sense: what the response says, 1 or -1; 0 where it cannot tell.
         low, high: band that was used [Hz].
         misfit: rms of the logarithm of the gain, and of the phase [rad], with the better sign and with the other one.
         odds: logarithm of the odds for the better sign.
@@ -64,7 +64,7 @@ class ResponseSign:
     output: str
     input: str
     expected: int
-    told: int
+    sense: int
     low: float
     high: float
     misfit: tuple[float, float]
@@ -73,10 +73,10 @@ class ResponseSign:
     @property
     def wrong(self) -> bool:
         """Whether the response contradicts what the names promise."""
-        return self.told == -self.expected
+        return self.sense == -self.expected
 
     @property
-    def words(self) -> str:
+    def facts(self) -> str:
         """What was found, in a sentence's part."""
         if not self.low < self.high:
             return f"it has no coherent band above {LOWEST / 2.0 / np.pi:g} Hz"
@@ -84,7 +84,7 @@ class ResponseSign:
         both = f"{better:.2f} and {worse:.2f} rad off"
         if better > _FOLLOWS:
             return f"{band} neither sign follows an aircraft's response ({both}); a controller's answer looks like this"
-        if not self.told:
+        if not self.sense:
             return f"{band} both signs follow ({both}): the band is too narrow to tell"
         turned, kept = (better, worse) if self.wrong else (worse, better)
         return f"{band} it is {turned:.2f} rad off an aircraft's response with the sign turned, {kept:.2f} rad as it is"
@@ -97,7 +97,7 @@ class ResponseSign:
         """
         return (
             f"{self.output} / {self.input} has the wrong sign: a positive {self.input} makes {self.output} "
-            f"{SIGNED[self.told]}, expected {SIGNED[self.expected]} ({self.words}). {remedy} If it is "
+            f"{SIGNED[self.sense]}, expected {SIGNED[self.expected]} ({self.facts}). {remedy} If it is "
             f"{self.output} that counts the other way, turn the unit of that channel instead. If nothing but the "
             f"controller moved {self.input}, no sign mends it."
         )
@@ -122,12 +122,12 @@ def sign_of(
             *(s / (s**2 + 2.0 * zeta * w * s + w**2) for zeta, w in _MODES),
         ]
     )
-    late = np.exp(-s * _DELAYS[:, None])
+    lags = np.exp(-s * _DELAYS[:, None])
     weight = 1.0 / ((2.0 * _FORM) ** 2 + (0.0 if error is None else error**2))
     weight = np.broadcast_to(weight / np.sum(np.broadcast_to(weight, omega.shape)), omega.shape)
     gain = np.log(np.abs(acceleration)) - np.log(np.abs(forms))
     gain -= (gain @ weight)[:, None]
-    turned = acceleration / (forms[:, None] * late)
+    turned = acceleration / (forms[:, None] * lags)
     off = [
         float(np.sqrt(0.5 * np.min((gain**2 @ weight)[:, None] + np.angle(sign * turned) ** 2 @ weight)))
         for sign in (1.0, -1.0)
@@ -169,7 +169,7 @@ INTEGRATIONS: Mapping[str, int] = {"az": 0, "w": 1, "vz": 1, "p": 1, "q": 1, "r"
 """How often the acceleration that a command makes is integrated to this motion."""
 
 
-def plain(name: str) -> str:
+def base_motion(name: str) -> str:
     """A motion without the suffix of a second opinion: p of `p_imu`."""
     base, _, variant = name.partition("_")
     return base if variant in VARIANTS and variant != "demand" else name
@@ -187,7 +187,7 @@ def expected_sense(output: str, input: str) -> int:
         for axis, sense in _COMMANDS.get(input, {}).items()
         for motion, sign in _MOTION[axis].items()
     }
-    return promised.get(plain(output), 0)
+    return promised.get(base_motion(output), 0)
 
 
 _MOTIONS = (("p",), ("q",), ("r",), ("az", "w", "vz"))
@@ -211,7 +211,7 @@ def input_signs(flight: Flight, sweeps: Sequence[Sweep]) -> tuple[tuple[Response
         if has_sense(name) and _moves(flight.values(name)):
             outputs = [next((n for n in kind if n in flight and expected_sense(n, name)), "") for kind in _MOTIONS]
             asked = [output for output in outputs if output]
-            part, why = _moved(flight, name, sweeps, asked) if asked else (None, "")
+            part, why = _driven(flight, name, sweeps, asked) if asked else (None, "")
             for output in asked:
                 sign = ResponseSign(output, name, expected_sense(output, name), 0, 0.0, 0.0, (np.nan, np.nan), 0.0)
                 signs.append((sign, why) if part is None else _judged(part, sign))
@@ -220,10 +220,10 @@ def input_signs(flight: Flight, sweeps: Sequence[Sweep]) -> tuple[tuple[Response
 
 def sign_words(sign: ResponseSign, why: str) -> str:
     """One of them as a line."""
-    if not sign.told:
+    if not sign.sense:
         return f"{sign.input} to {sign.output}: not told, {why}"
     named = "NOT as its name says" if sign.wrong else "as its name says"
-    return f"{sign.input} to {sign.output}: {SIGNED[sign.told]}, {named} ({sign.low:.2g}-{sign.high:.2g} Hz)"
+    return f"{sign.input} to {sign.output}: {SIGNED[sign.sense]}, {named} ({sign.low:.2g}-{sign.high:.2g} Hz)"
 
 
 def sign_problem(flight: Flight, sign: ResponseSign) -> str:
@@ -231,20 +231,20 @@ def sign_problem(flight: Flight, sign: ResponseSign) -> str:
     return sign.problem(unit_to_give(flight, sign.input, sign="-"))
 
 
-def _moved(flight: Flight, name: str, sweeps: Sequence[Sweep], outputs: Sequence[str]) -> tuple[Flight | None, str]:
+def _driven(flight: Flight, name: str, sweeps: Sequence[Sweep], outputs: Sequence[str]) -> tuple[Flight | None, str]:
     """The part of a flight in which something from outside moved a command; or why there is none."""
-    own = [s for s in sweeps if s.channel == name or (axis_of(name) and axis_of(name) in s.axis.split())]
-    if own:
-        longest = max(own, key=lambda s: s.stop - s.start)
+    of_axis = [s for s in sweeps if s.channel == name or (axis_of(name) and axis_of(name) in s.axis.split())]
+    if of_axis:
+        longest = max(of_axis, key=lambda s: s.stop - s.start)
         return flight.between(longest.start - _AROUND, longest.stop + _AROUND), ""
     if min(flight.time(n).size for n in (name, *outputs)) < 4 * FEWEST or flight.stop <= flight.start:
         return None, "the record is too short"
     if not name.startswith(STICK) and any(n.endswith(SET_POINT) for n in flight.channels):
         return None, _LOOPS
-    moved = of_inputs(excitations(flight, (name,), outputs=outputs)).get(name)
-    if moved is not None and moved.kind in OUTSIDE:
+    excited = of_inputs(excitations(flight, (name,), outputs=outputs)).get(name)
+    if excited is not None and excited.kind in OUTSIDE:
         return flight, ""
-    return None, "nothing is known to have moved it from outside" if moved is None else moved.words.rstrip(".")
+    return None, "nothing is known to have moved it from outside" if excited is None else excited.why.rstrip(".")
 
 
 def _moves(values: Array) -> bool:
@@ -258,10 +258,10 @@ def _judged(flight: Flight, sign: ResponseSign) -> tuple[ResponseSign, str]:
     omega, h = _coherent_response(flight, inputs, sign.output)
     if omega.size < FEWEST:
         return sign, f"it moves {sign.output} coherently at too few lines"
-    told, odds, misfit = sign_of(omega, h, integrations=INTEGRATIONS[sign.output])
+    sense, odds, misfit = sign_of(omega, h, integrations=INTEGRATIONS[sign.output])
     low, high = float(omega[0] / 2.0 / np.pi), float(omega[-1] / 2.0 / np.pi)
-    sign = replace(sign, told=told, low=low, high=high, misfit=misfit, odds=odds)
-    return sign, "" if told else sign.words
+    sign = replace(sign, sense=sense, low=low, high=high, misfit=misfit, odds=odds)
+    return sign, "" if sense else sign.facts
 
 
 def _coherent_response(flight: Flight, inputs: Sequence[str], output: str) -> tuple[Array, Complex]:
@@ -290,11 +290,11 @@ def _coherent_response(flight: Flight, inputs: Sequence[str], output: str) -> tu
     left = spectra[:, [0, k]][:, :, [0, k]]
     if k > 1:  # what the others explain is taken away
         left = left - spectra[:, [0, k], 1:k] @ np.linalg.solve(others, spectra[:, 1:k][:, :, [0, k]])
-    own, cross, whole = left[:, 0, 0].real, left[:, 0, 1], left[:, 1, 1].real
-    known = (own > 1e-6 * spectra[:, 0, 0].real) & (whole > 0.0)
+    power, cross, total = left[:, 0, 0].real, left[:, 0, 1], left[:, 1, 1].real
+    known = (power > 1e-6 * spectra[:, 0, 0].real) & (total > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        known &= np.abs(cross) ** 2 / (own * whole) >= _COHERENT
-        h = cross / own
+        known &= np.abs(cross) ** 2 / (power * total) >= _COHERENT
+        h = cross / power
     return 2.0 * np.pi * frequency[lines][known], h[known]
 
 

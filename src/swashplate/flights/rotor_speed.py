@@ -90,7 +90,7 @@ def rotor_speed(
         )
     # A sweep is a line too, and so are its harmonics: it is left out.
     swept = [(sweep.start, sweep.stop) for sweep in sweeps(flight) if 2.0 * sweep.high > LOWEST]
-    made, told = dict(flight.streams), {}
+    streams, found_lines = dict(flight.streams), {}
     for name, band in (lines or {MAIN: (0.0, 0.0)}).items():
         if name in flight:
             raise FlightError("is there already.", where=source, channel=name, hint="Choose another name for the line.")
@@ -105,10 +105,10 @@ def rotor_speed(
         if not lines:
             _refuse_wandering(speed[part], name, source)
         time, speed, sigma, frequency = line.time[part], speed[part], sigma[part], line.frequency[part]
-        made[f"rotor_{name}" if lines and len(lines) > 1 else "rotor"] = stream(
+        streams[f"rotor_{name}" if lines and len(lines) > 1 else "rotor"] = stream(
             time, {name: speed, f"{name}_sigma": sigma}, {name: "rad/s", f"{name}_sigma": "rad/s"}
         )
-        told[name] = {
+        found_lines[name] = {
             "mean": float(speed.mean()),
             "sigma_of_mean": float(np.sqrt(np.mean(sigma**2) * WINDOW / (HOP * sigma.size))),
             "spread": float(speed.std()),
@@ -120,7 +120,7 @@ def rotor_speed(
             "folded_from_hertz": sorted(float(frequency.mean()) + k * rate for k in (-1, 1)),
             "remarks": [*remarks, *_motor_words(flight, float(speed.mean()))],
         }
-    return flight.with_streams(made).done("rotor_speed", per_turn=per_turn, lines=told)
+    return flight.with_streams(streams).done("rotor_speed", per_turn=per_turn, lines=found_lines)
 
 
 def _running(speed: Array, sigma: Array) -> slice:
@@ -176,15 +176,15 @@ def _motor_words(flight: Flight, speed: float) -> list[str]:
 
 def _telemetry(flight: Flight) -> str:
     """What the log itself says of speeds, as a sentence."""
-    told = [f"{name} {motor:.4g} rad/s ({motor / (2.0 * np.pi):.3g} Hz)" for name, motor in _motors(flight).items()]
-    return f" The motors' speed controllers tell {', '.join(told)}." if told else ""
+    speeds = [f"{name} {motor:.4g} rad/s ({motor / (2.0 * np.pi):.3g} Hz)" for name, motor in _motors(flight).items()]
+    return f" The motors' speed controllers tell {', '.join(speeds)}." if speeds else ""
 
 
 def _refuse_without_rotor(flight: Flight) -> None:
     kind = aircraft_kind(flight)
     if kind is not None and not kind.main_rotors:
         raise FlightError(
-            f"the log is of {kind.words} ({kind.told}), which has no main rotor.{_telemetry(flight)}",
+            f"the log is of {kind.noun} ({kind.source}), which has no main rotor.{_telemetry(flight)}",
             where=flight.provenance.source or None,
             channel=MAIN,
             hint="A line of something else is measured where you say what it is and where it lies: "
@@ -322,15 +322,15 @@ def _against_commands(flight: Flight, line: SpectralLine, name: str, rate: float
     if not by_motor or max(by_motor.values()) >= _FOLLOWS or min(by_motor.values()) >= -_FOLLOWS:
         return []
     motor = min(by_motor, key=lambda m: by_motor[m])
-    words = (
+    text = (
         f"the line at {line.frequency.mean():+.1f} Hz falls where '{motor}' rises (correlation {by_motor[motor]:.2f}): "
         f"the rotor sags under load, or it is the image of a line at {image:.1f} Hz, which {rate:.0f} samples a second "
         "fold"
     )
     if sure:
-        return [words]
+        return [text]
     raise FlightError(
-        f"{words}.{_telemetry(flight)}",
+        f"{text}.{_telemetry(flight)}",
         where=flight.provenance.source or None,
         channel=name,
         hint="Log the vibration faster, take the speed from elsewhere, or give the band in which the line lies.",
@@ -359,19 +359,19 @@ def lines_of(texts: Sequence[str]) -> dict[str, tuple[float, float]] | None:
 
 def line_words(lines: Mapping[str, Any]) -> Iterator[str]:
     """What `rotor_speed` found, a text each."""
-    for name, told in lines.items():
-        start, stop = told["runs"]
-        if told.get("logged"):
+    for name, line in lines.items():
+        start, stop = line["runs"]
+        if line.get("logged"):
             yield (
-                f"{name}: {told['mean']:.4g} rad/s on average, spread {told['spread']:.2g}, from {start:.1f} to "
+                f"{name}: {line['mean']:.4g} rad/s on average, spread {line['spread']:.2g}, from {start:.1f} to "
                 f"{stop:.1f} s, as the log has it. Vibration was not asked; --settings line=... asks it."
             )
         else:
-            folded = " or ".join(f"{hertz:+.1f}" for hertz in told["folded_from_hertz"])
+            folded = " or ".join(f"{hertz:+.1f}" for hertz in line["folded_from_hertz"])
             yield (
-                f"{name}: {told['mean']:.1f} ± {told['sigma_of_mean']:.2g} rad/s on average, spread "
-                f"{told['spread']:.2g}, from {start:.1f} to {stop:.1f} s; line at {told['hertz']:+.2f} Hz in "
-                f"{', '.join(told['signals'])}, {told['decibel']:.0f} dB over its surroundings. A line at {folded} Hz "
+                f"{name}: {line['mean']:.1f} ± {line['sigma_of_mean']:.2g} rad/s on average, spread "
+                f"{line['spread']:.2g}, from {start:.1f} to {stop:.1f} s; line at {line['hertz']:+.2f} Hz in "
+                f"{', '.join(line['signals'])}, {line['decibel']:.0f} dB over its surroundings. A line at {folded} Hz "
                 "would look the same."
             )
-        yield from (f"! {words}." for words in told["remarks"])
+        yield from (f"! {text}." for text in line["remarks"])

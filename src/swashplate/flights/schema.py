@@ -186,8 +186,8 @@ def _family(name: str) -> Channel | None:
         return _LOGGED[name]
     base, _, variant = name.partition("_")
     if base in _VARIED and variant in VARIANTS:
-        plain = CHANNELS[base]
-        return replace(plain, name=name, description=f"{plain.description}, {VARIANTS[variant]}")
+        entry = CHANNELS[base]
+        return replace(entry, name=name, description=f"{entry.description}, {VARIANTS[variant]}")
     return None
 
 

@@ -132,7 +132,7 @@ class Harmonics(Shown):
         spectrum: of the channel.
         rotor: the channel of the rotor's speed; speed: its mean there [Hz].
         harmonics: those that the sample rate shows; total: rms of all above 2 Hz.
-        words: what is strongest, or why nothing is seen.
+        summary: what is strongest, or why nothing is seen.
         notches: for the harmonics that stand out; None where none does.
     """
 
@@ -141,7 +141,7 @@ class Harmonics(Shown):
     speed: float
     harmonics: tuple[Harmonic, ...]
     total: float
-    words: str
+    summary: str
     notches: Notches | None = None
 
     @property
@@ -162,7 +162,7 @@ class Harmonics(Shown):
         unit = self.spectrum.unit
         lines = [f"  {h.number} x: {h.frequency:.2f} Hz, rms {h.rms:.4g} {unit}" for h in self.harmonics]
         lines.append(f"  {self.about_notches}")
-        return "\n".join([f"{self.spectrum.channel} beside {self.rotor} ({self.speed:.2f} Hz): {self.words}", *lines])
+        return "\n".join([f"{self.spectrum.channel} beside {self.rotor} ({self.speed:.2f} Hz): {self.summary}", *lines])
 
 
 def _piece(flight: Flight, name: str, start: float | None, stop: float | None) -> tuple[Array, Array, float]:
@@ -268,27 +268,27 @@ def harmonics(
         raise FlightError("does not turn there.", where=flight.provenance.source or None, channel=name)
     turning, highest = abs(turning), 0.5 * measured.rate
     step = float(measured.frequency[1] - measured.frequency[0])
-    seen = [k for k in range(1, HARMONICS + 1) if k * turning * (1.0 + _WIDTH) < highest]
-    made = []
-    for k in seen:
+    orders = [k for k in range(1, HARMONICS + 1) if k * turning * (1.0 + _WIDTH) < highest]
+    lines = []
+    for k in orders:
         half = max(_WIDTH * turning, 2.0 * step)
         rms = measured.rms(k * turning - half, k * turning + half)
-        made.append(Harmonic(k, k * turning, rms, _above(measured, k, turning, half, rms)))
+        lines.append(Harmonic(k, k * turning, rms, _above(measured, k, turning, half, rms)))
     total = measured.rms(2.0, highest)
-    if not made:
-        words = (
+    if not lines:
+        text = (
             f"nothing of the rotor can be seen: it turns at {turning:.2f} Hz, and {measured.rate:.4g} samples a second "
             f"show up to {highest:.4g} Hz. What it shakes folds back to other frequencies: log faster."
         )
     else:
-        most = max(made, key=lambda harmonic: harmonic.rms)
+        most = max(lines, key=lambda harmonic: harmonic.rms)
         share = (most.rms / total) ** 2 if total > 0.0 else 0.0
-        words = (
+        text = (
             f"the strongest is {most.number} x at {most.frequency:.2f} Hz with {most.rms:.3g} {measured.unit} rms, "
             f"{100.0 * share:.0f} % of the power above 2 Hz."
         )
-    flown = np.abs(there) / (2.0 * np.pi)
-    return Harmonics(measured, name, turning, tuple(made), total, words, _notches(measured.unit, flown, made))
+    turns = np.abs(there) / (2.0 * np.pi)
+    return Harmonics(measured, name, turning, tuple(lines), total, text, _notches(measured.unit, turns, lines))
 
 
 def _above(measured: Spectrum, number: int, turning: float, half: float, rms: float) -> float | None:
@@ -302,15 +302,15 @@ def _above(measured: Spectrum, number: int, turning: float, half: float, rms: fl
     return float(10.0 * np.log10(max(rms**2, tiny) / max(float(np.median(floor)) * inside, tiny)))
 
 
-def _notches(unit: str, flown: Array, harmonics: Sequence[Harmonic]) -> Notches | None:
+def _notches(unit: str, turns: Array, harmonics: Sequence[Harmonic]) -> Notches | None:
     """For what stands out in a gyro; an autopilot's notches filter gyros, and no other channel says what they need."""
     numbers = tuple(h.number for h in harmonics if h.above is not None and h.above >= _STANDS_OUT)
     if not numbers or unit != "deg/s":
         return None
-    lowest = round(_MARGIN * float(np.quantile(flown, 0.05)), 1)
+    lowest = round(_MARGIN * float(np.quantile(turns, 0.05)), 1)
     width = round(0.5 * lowest, 1)
     # s^2 + (w/Q) s + w^2 below the line lags by 1/(Q w) at low frequency; width over frequency, 1/Q, is kept.
-    delay = sum(width / lowest / (2.0 * np.pi * number * float(np.median(flown))) for number in numbers)
+    delay = sum(width / lowest / (2.0 * np.pi * number * float(np.median(turns))) for number in numbers)
     parameters = {"ENABLE": 1, "MODE": 2, "REF": 1, "FREQ": lowest, "BW": width}
     parameters["HMNCS"] = sum(1 << (number - 1) for number in numbers)
     return Notches(numbers, lowest, width, delay, {f"INS_HNTCH_{name}": value for name, value in parameters.items()})

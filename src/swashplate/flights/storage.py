@@ -42,7 +42,7 @@ class Parts(NamedTuple):
     segments: tuple[tuple[float, float], ...]
 
 
-def plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     """NumPy numbers in a history as JSON numbers."""
     if isinstance(value, np.generic):
         return value.item()
@@ -62,7 +62,7 @@ def _attributes(flight: Parts) -> dict[str, Any]:
         "segments": flight.segments,
     }
     return {"swashplate_schema": SCHEMA_VERSION} | {
-        name: json.dumps(value, default=plain) for name, value in texts.items()
+        name: json.dumps(value, default=json_value) for name, value in texts.items()
     }
 
 
@@ -167,15 +167,15 @@ def _stream(name: str, group: hdf5.Group, place: Path) -> xr.Dataset:
             channel=f"{name}/time",
             hint="Copy it again.",
         )
-    made = {}
+    columns = {}
     for variable, column in group.variables.items():
-        labels, own = dict(column.attributes), variable
+        labels, channel = dict(column.attributes), variable
         if _NAME in labels:
-            own = documents.parse_logged(str(labels.pop(_NAME)), str, where=place, at=variable, error=FlightError)
-        if own in made:
-            raise FlightError("is there twice.", where=place, channel=f"{name}/{own}", hint="Save it again.")
-        made[own] = timed(column.values, labels)
-    return over_time(made.pop("time"), made, group.attributes)
+            channel = documents.parse_logged(str(labels.pop(_NAME)), str, where=place, at=variable, error=FlightError)
+        if channel in columns:
+            raise FlightError("is there twice.", where=place, channel=f"{name}/{channel}", hint="Save it again.")
+        columns[channel] = timed(column.values, labels)
+    return over_time(columns.pop("time"), columns, group.attributes)
 
 
 def _attribute(attributes: Mapping[str, str], name: str, schema: type[Schema], place: Path) -> Schema:

@@ -44,7 +44,7 @@ def from_arrays(
         FlightError: times that do not increase, or arrays of another length.
         UnitError: a unit that is not known, or of another kind than the channel's.
     """
-    given, inside, own = dict(units or {}), {}, {}
+    given, inside, labels = dict(units or {}), {}, {}
     strangers = sorted(set(given) - set(channels))
     if strangers:
         raise FlightError("has a unit but no values.", channel=", ".join(strangers), hint="Check the spelling.")
@@ -55,8 +55,8 @@ def from_arrays(
         else:
             inside[name] = np.asarray(values, dtype=np.float64)
         if not known:
-            own[name] = given.get(name, "")
-    return rebased(Flight({"arrays": stream(time, inside, own)}, Provenance(source=source, reader="arrays")))
+            labels[name] = given.get(name, "")
+    return rebased(Flight({"arrays": stream(time, inside, labels)}, Provenance(source=source, reader="arrays")))
 
 
 def from_dataframe(frame: pd.DataFrame, *, units: Mapping[str, str] | None = None, source: str = "") -> Flight:

@@ -57,13 +57,13 @@ class StreamSummary:
     def notes(self) -> list[str]:
         """What a user must know of it, in words."""
         slow, fast = self.rates
-        told = []
+        notes = []
         if fast > _GAP * slow:
             rates = f"recorded at {slow:.3g} Hz and at {fast:.3g} Hz by turns"
-            told.append(f"{self.name}: {rates}; take a piece of one rate for a fit")
+            notes.append(f"{self.name}: {rates}; take a piece of one rate for a fit")
         if self.pause:
-            told.append(f"{self.name}: written in some modes only; it pauses for up to {self.pause:.3g} s in others")
-        return told
+            notes.append(f"{self.name}: written in some modes only; it pauses for up to {self.pause:.3g} s in others")
+        return notes
 
 
 def jittering(streams: Iterable[StreamSummary]) -> list[str]:

@@ -81,8 +81,8 @@ _SPELLINGS = {
 def _entry(unit: str) -> tuple[str, float] | None:
     spelled = unit.strip()
     entry = _UNITS.get(spelled) or _UNITS.get(_SPELLINGS.get(spelled, _SPELLINGS.get(spelled.lower(), "")))
-    if entry is None and spelled.startswith("-") and (plain := _entry(spelled[1:])) is not None:
-        entry = (plain[0], -plain[1])  # a sensor or servo that counts the other way
+    if entry is None and spelled.startswith("-") and (unsigned := _entry(spelled[1:])) is not None:
+        entry = (unsigned[0], -unsigned[1])  # a sensor or servo that counts the other way
     return entry
 
 

@@ -38,10 +38,10 @@ def log(
 )
 def test_ardupilot_names_its_firmware_and_its_frame(vehicle: str, words: str | None, main: int, rotors: int) -> None:
     told = aircraft_kind(log(vehicle))
-    assert (told and told.words) == words
+    assert (told and told.noun) == words
     if told is not None:
         assert (told.main_rotors, told.rotors) == (main, rotors)
-        assert told.told in vehicle
+        assert told.source in vehicle
     assert aircraft_kind(log(vehicle, reader="delimited")) is None  # a name that a user gave says nothing
 
 
@@ -49,14 +49,14 @@ def test_parameters_say_it_where_names_do_not() -> None:
     for number, words in ((1.0, "a multirotor with 4 rotors"), (6.0, "a helicopter"), (9.0, "a coaxial helicopter")):
         told = aircraft_kind(log("ArduCopter V4.5.7", FRAME_CLASS=number))
         assert told is not None
-        assert (told.words, told.told) == (words, f"FRAME_CLASS {number:g}")
+        assert (told.noun, told.source) == (words, f"FRAME_CLASS {number:g}")
     for number, words in ((1.0, "a rover"), (2.0, "a boat")):
         told = aircraft_kind(log("ArduRover V4.5.7", FRAME_CLASS=number))
         assert told is not None
-        assert told.words == words
+        assert told.noun == words
     told = aircraft_kind(log("ArduPlane V4.5.7", Q_ENABLE=1.0))
     assert told is not None
-    assert told.words == "a plane that takes off vertically"
+    assert told.noun == "a plane that takes off vertically"
     for parameters, words in (
         ({"MAV_TYPE": 1.0}, "a plane"),
         ({"MAV_TYPE": 4.0}, "a helicopter"),
@@ -65,7 +65,7 @@ def test_parameters_say_it_where_names_do_not() -> None:
     ):
         told = aircraft_kind(log("PX4", reader="ulog", **parameters))
         assert told is not None
-        assert told.words == words
+        assert told.noun == words
     assert aircraft_kind(log("PX4", reader="ulog")) is None
     assert aircraft_kind(log("a table", reader="delimited", MAV_TYPE=1.0)) is None
 
@@ -80,7 +80,7 @@ def test_firmwares_of_blackbox_logs_and_motors() -> None:
         ("INAV 7.1.2", ("motor_1",), None),
     ):
         told = aircraft_kind(log(vehicle, reader="blackbox", channels=channels))
-        assert (told and told.words) == words
+        assert (told and told.noun) == words
     for channels, words in (
         (four, "a multirotor with 4 rotors"),
         (("motor_lower", "motor_upper"), "a coaxial helicopter"),
@@ -88,4 +88,4 @@ def test_firmwares_of_blackbox_logs_and_motors() -> None:
         (("omega_rotor", "phi"), None),
     ):
         told = aircraft_kind(log("", reader="arrays", channels=channels))
-        assert (told and told.words) == words
+        assert (told and told.noun) == words

@@ -52,7 +52,7 @@ def test_an_autopilots_command_without_sweep_stick_or_set_point_is_its_answer(fl
     found = judged(flown["hover"])
     assert found.kind == "controller"
     assert not found.outside
-    assert "neither a sweep nor a stick nor a set-point" in found.words
+    assert "neither a sweep nor a stick nor a set-point" in found.why
 
 
 @pytest.mark.parametrize("rate", [10, 50])
@@ -72,7 +72,7 @@ def test_a_sweep_on_the_inputs_axis_is_one_and_on_another_axis_is_none(flown: di
     roll, pitch = (Event(2.0, "sweep", f"{axis} mixer, 0.2-8 Hz in 26 s", SWEEP) for axis in ("roll", "pitch"))
     found = judged(with_events(flown["hover"], roll))
     assert found.kind == "sweep"
-    assert "roll mixer" in found.words
+    assert "roll mixer" in found.why
     assert judged(with_events(flown["hover"], pitch)).kind == "controller"
     late = Event(99.0, "sweep", "roll mixer", {**SWEEP, "start": 99.0, "stop": 120.0, "seen": 120.0})
     assert judged(with_events(flown["hover"], late)).kind == "controller", "it is not in this record"
@@ -81,10 +81,10 @@ def test_a_sweep_on_the_inputs_axis_is_one_and_on_another_axis_is_none(flown: di
 def test_sticks_and_set_points_that_move_by_themselves_move_the_input(flown: dict[str, Flight]) -> None:
     stick = judged(flown["stick"])
     assert stick.kind == "sticks"
-    assert "stick_roll" in stick.words
+    assert "stick_roll" in stick.why
     steps = judged(with_channels(flown["steps"], stick_roll=None))
     assert steps.kind == "reference"
-    assert "'p_demand' moved by itself" in steps.words
+    assert "'p_demand' moved by itself" in steps.why
 
 
 def test_another_axis_stick_is_none_of_this_axis(flown: dict[str, Flight]) -> None:
@@ -129,8 +129,8 @@ def test_without_set_points_the_motion_decides(flown: dict[str, Flight]) -> None
     plain = with_channels(flown["hover"], p_demand=None, phi_demand=None, stick_roll=None)
     found = judged(plain)
     assert found.kind == "controller"
-    assert found.told.answer
-    assert "the motion that follows tells it no better" in found.words
+    assert found.shares.answer
+    assert "the motion that follows tells it no better" in found.why
     moved = judged(flown["open"], "command")
     assert moved.kind == "maneuver"
     assert judged(flown["open"], "command", swept=["command"]).kind == "sweep"

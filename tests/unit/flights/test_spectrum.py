@@ -61,7 +61,7 @@ def test_harmonics_are_told_with_their_strength() -> None:
     assert found.speed == pytest.approx(25.0)
     assert [h.number for h in found.harmonics] == [1, 2, 3]
     assert [h.rms for h in found.harmonics[:2]] == pytest.approx([0.5 / np.sqrt(2.0), 2.0 / np.sqrt(2.0)], rel=0.03)
-    assert "the strongest is 2 x at 50.00 Hz" in found.words
+    assert "the strongest is 2 x at 50.00 Hz" in found.summary
 
 
 def shaken_gyro(speed: float, *, tone: float, tilt: float = 0.0) -> Flight:
@@ -112,7 +112,7 @@ def test_an_accelerometer_says_nothing_about_notches_of_gyros() -> None:
 def test_a_rotor_that_the_rate_hides_is_said_to_be_hidden() -> None:
     found = sp.harmonics(flight(rate=40.0), "az")
     assert found.harmonics == ()
-    assert "log faster" in found.words
+    assert "log faster" in found.summary
 
 
 def test_without_a_turning_rotor_there_is_nothing_to_hold_against() -> None:

@@ -42,16 +42,16 @@ def test_a_loop_without_excitation_answers_and_one_with_it_does_not(
 ) -> None:
     alone, excited, _ = (asked(flown, *channels) for flown in flights)
     assert alone.answer
-    assert not alone.own
+    assert not alone.independent
     assert alone.past > 0.99
-    assert excited.own
+    assert excited.independent
     assert not excited.answer
 
 
 def test_a_textbook_maneuver_in_coloured_noise_is_no_answer(flights: list[Flown]) -> None:
     """The elevator rests before and after; slow noise of a fifth of the motion is in the log."""
     told = asked(flights[2], "p", "phi")
-    assert told.own
+    assert told.independent
     assert told.news < NO_NEWS
 
 
@@ -60,7 +60,7 @@ def test_backwards_in_time_cause_and_answer_change_places() -> None:
     (flown,) = fly([replace(OPEN, shape="multisine", gust=(0.01, 1.0, 0.0), sensor=(0.01, 0.0))])
     forwards, backwards = asked(flown, "p"), asked(flown, "p", backwards=True)
     assert forwards.follows
-    assert forwards.own
+    assert forwards.independent
     assert not backwards.follows
     assert (forwards.past, forwards.later) == (
         pytest.approx(backwards.later, abs=0.05),
@@ -73,7 +73,7 @@ def test_a_force_that_follows_at_once_counts_as_later() -> None:
     command = lfilter([1.0], [1.0, -0.9], random.standard_normal(3000))
     force = -9.0 * command + 0.1 * random.standard_normal(3000)
     as_force = told_by_motion(command, force[:, None], 0.04, at_once=[True])
-    assert as_force.own
+    assert as_force.independent
     assert as_force.follows
     assert told_by_motion(command, force[:, None], 0.04).answer, "without knowing that it is a force"
 
@@ -97,7 +97,7 @@ def test_nothing_is_said_where_nothing_can_be() -> None:
         told_by_motion(command[:1], motion[:1], 0.04),
     ):
         assert not told.known
-        assert not told.own
+        assert not told.independent
         assert not told.answer
         assert not told.follows
     assert np.isnan(share_of(command, np.zeros((400, 1)), 0.04))
@@ -109,7 +109,7 @@ def test_noise_of_its_own_explains_nothing_however_many_channels_are_asked() -> 
     told = told_by_motion(random.standard_normal(1000), random.standard_normal((1000, 9)), 0.04)
     assert abs(told.past) < 0.1
     assert abs(told.later) < 0.1
-    assert told.own
+    assert told.independent
 
 
 def test_the_share_of_causes_is_that_which_was_made() -> None:

@@ -149,7 +149,7 @@ class Inspect(FromLogs[Looked]):
         shown = [
             part
             for one, beside in zip(result, reviews, strict=True)
-            for part in (one, *([f"\n{beside.words}"] if beside.tells else []))
+            for part in (one, *([f"\n{beside.body_text}"] if beside.tells else []))
         ]
         return Looked(
             tuple(shown),

@@ -146,7 +146,7 @@ class Respond(FromConditioned["FrequencyResponse"]):
         from swashplate.flights.review.review import review
 
         beside = [review(flight, swept=()) for flight in self.read(self.logs) if not sweeps(flight)]
-        told = [f"\nWhat {each.source} tells without a sweep\n\n{each.words}" for each in beside if each.tells]
+        told = [f"\nWhat {each.source} tells without a sweep\n\n{each.body_text}" for each in beside if each.tells]
         return [*super().text(answer, width), *told]
 
 

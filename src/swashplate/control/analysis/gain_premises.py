@@ -69,10 +69,10 @@ def _wrong_way(fit: Fitted, responses: FrequencyResponse, rate: str, command: st
     sign = response_sign(responses, rate, command, expected=1, integrations=1, band=band)
     if sign.wrong:
         return (
-            f"a positive {command} turns {rate} negative ({sign.words}): one of the two counts the other way. See the "
+            f"a positive {command} turns {rate} negative ({sign.facts}): one of the two counts the other way. See the "
             "problems of the responses for the remedy."
         )
-    return "" if sign.told else f"the sign from {command} to {rate} is not known: {sign.words}. Fly a wider sweep."
+    return "" if sign.sense else f"the sign from {command} to {rate} is not known: {sign.facts}. Fly a wider sweep."
 
 
 def _not_followed(fit: Fitted, rate: str, command: str) -> str:

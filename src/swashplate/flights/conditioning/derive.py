@@ -76,7 +76,7 @@ def derive(flight: Flight, *, gravity: float | None = None) -> Flight:
     like = flight.channels[0]
     taken = next((one for one in (gravity, flight.gravity) if one is not None), GRAVITY)
     assumed = flight.gravity is None and taken == GRAVITY
-    made: list[str] = []
+    names: list[str] = []
     q = attitude_of(flight)
     out = with_euler(flight)
     derived: dict[str, Array] = {}
@@ -92,8 +92,8 @@ def derive(flight: Flight, *, gravity: float | None = None) -> Flight:
     for name, values in derived.items():
         if name not in flight:
             out = out.with_channel(name, values, like=like)
-            made.append(name)
-    return out.done("derive", gravity=taken, assumed=assumed, derived=made, points=_POINTS, degree=_DEGREE)
+            names.append(name)
+    return out.done("derive", gravity=taken, assumed=assumed, derived=names, points=_POINTS, degree=_DEGREE)
 
 
 def _padded(quaternion: Array, rate: float) -> Array:

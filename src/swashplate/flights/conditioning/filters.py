@@ -139,8 +139,8 @@ def lowpass(flight: Flight, *, cutoff: float, order: int = 4) -> Flight:
         # Components are filtered one by one; at the few degrees per filter time of a flight only their length suffers.
         unit = continuous(np.stack([smooth[n] for n in QUATERNION], axis=-1))
         smooth.update(zip(QUATERNION, unit.T, strict=True))
-    made = data.assign({n: timed(v, data[n].attrs) for n, v in smooth.items()})
-    return flight.with_streams({name: made}).done("lowpass", cutoff=cutoff, order=order, zero_phase=True)
+    smoothed = data.assign({n: timed(v, data[n].attrs) for n, v in smooth.items()})
+    return flight.with_streams({name: smoothed}).done("lowpass", cutoff=cutoff, order=order, zero_phase=True)
 
 
 def detrended(values: Array) -> Array:

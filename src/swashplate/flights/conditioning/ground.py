@@ -101,10 +101,10 @@ def _carried(
             grounded[start:stop] = True
     for start, stop in _runs(rest | grounded):
         grounded[start:stop] |= grounded[start:stop].any()
-    flown = _runs(~grounded)
-    if not flown:
+    airborne = _runs(~grounded)
+    if not airborne:
         return 0, motors.size - 1, []
-    first, last = max(flown, key=lambda run: run[1] - run[0])
+    first, last = max(airborne, key=lambda run: run[1] - run[0])
     last -= 1
     reasons = []
     high = np.arange(first, last + 1)
@@ -134,34 +134,34 @@ def flying_interval(flight: Flight, *, rule: GroundRule | None = None) -> Flying
         rule: thresholds.
     """
     rule = rule or GroundRule()
-    whole = FlyingInterval(flight.start, flight.stop)
+    all_of_it = FlyingInterval(flight.start, flight.stop)
     if not all(name in flight for name in POSITION) or not (
         all(name in flight for name in QUATERNION) or all(name in flight for name in ATTITUDE)
     ):
-        return replace(whole, reasons=("no position and attitude: ground and crash cannot be told, all is kept",))
+        return replace(all_of_it, reasons=("no position and attitude: ground and crash cannot be told, all is kept",))
     # Gaps do not matter for looking at it: bridge them all. 5 Hz keeps the flight and drops the tracking noise.
     wanted = (*POSITION, *(QUATERNION if QUATERNION[0] in flight else ATTITUDE), "motor_lower", "motor_upper")
     bare = {n: d[[c for c in wanted if c in d.data_vars]] for n, d in flight.streams.items()}
     bare = {n: d for n, d in bare.items() if len(d.data_vars)}
     try:
         uniform = resample(replace(flight, streams=bare, segments=()), rate=50.0, max_gap=np.inf, shortest_piece=0.0)
-        seen = derive(lowpass(uniform, cutoff=5.0))
+        motion = derive(lowpass(uniform, cutoff=5.0))
     except FlightError as error:
-        return replace(whole, reasons=(f"too short to judge, all is kept: {error.problem}",))
-    time, rate = seen.time("u"), 50.0
-    rates = seen.array(RATES)
-    force = seen.array(("ax", "ay", "az"))
-    speed = np.linalg.norm(seen.array(("u", "v", "w")), axis=1)
-    tilt = np.arccos(np.clip(np.cos(seen.values("phi")) * np.cos(seen.values("theta")), -1.0, 1.0))
-    acceleration = np.abs(np.linalg.norm(force, axis=1) - (seen.gravity or GRAVITY))
+        return replace(all_of_it, reasons=(f"too short to judge, all is kept: {error.problem}",))
+    time, rate = motion.time("u"), 50.0
+    rates = motion.array(RATES)
+    force = motion.array(("ax", "ay", "az"))
+    speed = np.linalg.norm(motion.array(("u", "v", "w")), axis=1)
+    tilt = np.arccos(np.clip(np.cos(motion.values("phi")) * np.cos(motion.values("theta")), -1.0, 1.0))
+    acceleration = np.abs(np.linalg.norm(force, axis=1) - (motion.gravity or GRAVITY))
     first, last = 0, time.size - 1
     reasons: list[str] = []
 
-    motors = [seen.values(name) for name in ("motor_lower", "motor_upper") if name in seen]
+    motors = [motion.values(name) for name in ("motor_lower", "motor_upper") if name in motion]
     if motors:
         rest = (speed < rule.rest_speed) & np.all(np.abs(rates) < rule.rest_rate, axis=1)
         first, last, reasons = _carried(
-            np.mean(motors, axis=0), rest, -seen.values("z"), time, rule, wait=round(rule.calm * rate)
+            np.mean(motors, axis=0), rest, -motion.values("z"), time, rule, wait=round(rule.calm * rate)
         )
 
     lost = (tilt > rule.crash_tilt) | (acceleration > rule.crash_acceleration)

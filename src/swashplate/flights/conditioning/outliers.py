@@ -204,9 +204,9 @@ def remove_outliers(flight: Flight, *, threshold: float = 6.0, longest: int = 5)
                 by_channel[channel] = int(here.sum())
             bad |= here
         removed[name] = int(bad.sum())
-        made = data.assign({q: timed(columns[q], data[q].attrs) for q in QUATERNION if q in columns})
-        kept = {str(n): timed(v.values[~bad], v.attrs) for n, v in made.variables.items()}
-        streams[name] = over_time(kept.pop("time"), kept, made.attrs)
+        cleaned = data.assign({q: timed(columns[q], data[q].attrs) for q in QUATERNION if q in columns})
+        kept = {str(n): timed(v.values[~bad], v.attrs) for n, v in cleaned.variables.items()}
+        streams[name] = over_time(kept.pop("time"), kept, cleaned.attrs)
     return flight.with_streams(streams).done(
         "remove_outliers", threshold=threshold, longest=longest, removed=removed, by_channel=by_channel
     )

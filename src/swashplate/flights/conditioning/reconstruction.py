@@ -131,9 +131,9 @@ class Reconstruction(Shown):
         rows = []
         for name, s in self.scales.items():
             b = self.biases.get(name)
-            told = [word for word, e in (("bias", b), ("scale", s)) if e is not None and e.significant]
+            errors = [word for word, e in (("bias", b), ("scale", s)) if e is not None and e.significant]
             both = [(f"{e.value:+.4g}", f"{e.sigma:.2g}") if e is not None else ("-", "-") for e in (b, s)]
-            rows.append([name, channel(name).unit, *both[0], *both[1], " and ".join(told)])
+            rows.append([name, channel(name).unit, *both[0], *both[1], " and ".join(errors)])
         lines = [text_table(_HEAD, rows, left=(0, 1, 6)), _LEFT_OUT] if rows else []
         return "\n".join([*lines, *self.notes])
 
@@ -266,7 +266,7 @@ def reconstruct(flight: Flight) -> Reconstruction:
     Args:
         flight: conditioned.
     """
-    made = _derived(flight)
+    derived = _derived(flight)
     notes: list[str] = []
     biases: dict[str, SensorErrorEstimate] = {}
     scales: dict[str, SensorErrorEstimate] = {}
@@ -275,7 +275,7 @@ def reconstruct(flight: Flight) -> Reconstruction:
         (RATES, "rates", has_attitude, rate_errors),
         (_FORCES, "accelerations", has_attitude and all(n in flight for n in POSITION), acceleration_errors),
     ):
-        measured = all(name in flight and name not in made for name in names)
+        measured = all(name in flight and name not in derived for name in names)
         if not measured:
             notes.append(f"{label}: not measured in this flight, so they have no bias or scale factor to find")
         elif not needs:

@@ -130,8 +130,8 @@ def _pieces(flight: Flight, max_gap: float) -> list[Interval]:
     for data in flight.streams.values():
         time = np.asarray(data["time"].values, dtype=np.float64)
         # A slow stream (a battery voltage at 10 Hz) has no gap between two of its own samples.
-        own = _OWN_STEPS * float(np.median(np.diff(time)))
-        here = unbroken(time, max_gap=max(max_gap, own))
+        native = _OWN_STEPS * float(np.median(np.diff(time)))
+        here = unbroken(time, max_gap=max(max_gap, native))
         pieces = here if pieces is None else common(pieces, here)
     intervals = pieces or []
     return common(intervals, list(flight.segments)) if flight.segments else intervals
@@ -258,8 +258,8 @@ def resample(
             if LOGGED_UNIT in values.attrs:
                 uniform[name].attrs[LOGGED_UNIT] = values.attrs[LOGGED_UNIT]
     dropped = [list(piece) for piece in pieces if piece not in kept]
-    made = replace(flight, streams={"uniform": uniform}, segments=tuple(segments))
-    return made.done(
+    resampled = replace(flight, streams={"uniform": uniform}, segments=tuple(segments))
+    return resampled.done(
         "resample",
         rate=rate,
         max_gap=max_gap,

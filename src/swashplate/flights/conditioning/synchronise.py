@@ -188,8 +188,8 @@ def merge(first: Flight, second: Flight, *, clock: Synchronisation) -> Flight:
     for name, data in second.streams.items():
         new = [str(c) for c in data.data_vars if str(c) not in first]
         if new:
-            moved = clock.to_first(np.asarray(data["time"].values))
-            kept = data[new].assign_coords(time=("time", moved, {"units": "s"}))
+            stamps = clock.to_first(np.asarray(data["time"].values))
+            kept = data[new].assign_coords(time=("time", stamps, {"units": "s"}))
             streams[f"second_{name}" if name in streams else name] = kept
             added += new
     return replace(first, streams=streams).done(

@@ -41,15 +41,15 @@ def uniform_records(
     Raises:
         FlightError: a channel that is missing, or flights whose channels contradict each other.
     """
-    given, made = names or {}, []
+    given, records = names or {}, []
     for raw in (flights,) if isinstance(flights, Flight) else flights:
         logged = {name: source for name, source in given.items() if source in raw}
         used = {given.get(name, name) for name in (*channels, *also)}
         # Whole: the streams that are left out below may be what shows a wrong unit; what is derived uses all of them.
         raw = checked(raw, used if all(given.get(name, name) in raw for name in channels) else None)
         flight = with_names(raw, logged)
-        whole, beside = all(name in flight for name in channels), {}
-        if whole:
+        complete, beside = all(name in flight for name in channels), {}
+        if complete:
             homes = {flight.stream_of(name) for name in (*channels, *also) if name in flight}
             beside = {name: _telling(data) for name, data in flight.streams.items() if name not in homes}
             flight = flight.with_streams({name: data for name, data in flight.streams.items() if name in homes})
@@ -59,15 +59,15 @@ def uniform_records(
             cutoff=cutoff,
             outliers=False,
             trim_ground=False,
-            derive=not whole,
+            derive=not complete,
             method="spline",
             check=None,
         )
         flight = with_names(flight, {name: source for name, source in given.items() if name not in logged})
         kept = {name: data.drop_vars(set(flight.channels), errors="ignore") for name, data in beside.items()}
         kept = {name: data for name, data in kept.items() if data.data_vars and data.sizes["time"] > 1}
-        made.append(flight.with_streams({**flight.streams, **kept}))
-    return tuple(made)
+        records.append(flight.with_streams({**flight.streams, **kept}))
+    return tuple(records)
 
 
 def is_uniform(flight: Flight, channels: Sequence[str]) -> bool:

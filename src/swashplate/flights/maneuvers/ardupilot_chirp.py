@@ -90,10 +90,10 @@ class Chirp:
         Raises:
             ManeuverError: naming the setting that ArduPilot does not take.
         """
-        made = Chirp(
+        chirp = Chirp(
             axis, magnitude, band[0], band[1], record, fade, min(fade, _RANGES["SID_T_FADE_OUT"][1]), 2 / band[0]
         )
-        for name, value in made.parameters().items():
+        for name, value in chirp.parameters().items():
             low, high = _RANGES.get(name, (-np.inf, np.inf))
             if not low <= value <= high:
                 raise ManeuverError(
@@ -101,13 +101,13 @@ class Chirp:
                     channel=name,
                     hint="Change the band or the length, or fly several sweeps.",
                 )
-        if made.dwell >= record:
+        if chirp.dwell >= record:
             raise ManeuverError(
-                f"ArduPilot dwells two periods at the start frequency: {made.dwell:.4g} s of {record:g} s.",
+                f"ArduPilot dwells two periods at the start frequency: {chirp.dwell:.4g} s of {record:g} s.",
                 channel="SID_T_REC",
                 hint="Give a longer record or a higher start frequency.",
             )
-        return made
+        return chirp
 
     def frequency(self, time: Array) -> Array:
         """Instantaneous frequency [Hz] at times [s] from the chirp's start."""

@@ -35,9 +35,9 @@ def ardupilot_script(lines: Lines, *, duration: float, limits: Mapping[str, floa
         scale = 57.29577951308232 if axis in TURNED else 1.0
         rows = ", ".join(f"{{{n}, {scale * a:.6g}, {p:.6g}}}" for n, a, p in lines.get(axis, ()))
         tables.append(f"  {axis} = {{{rows}}},")
-    told = title.replace("\\", " ").replace("'", " ").replace("\n", " ")
+    quoted = title.replace("\\", " ").replace("'", " ").replace("\n", " ")
     return _SCRIPT.format(
-        title=told,
+        title=quoted,
         tables="\n".join(tables),
         duration=repr(float(duration)),
         lead=repr(LEAD),

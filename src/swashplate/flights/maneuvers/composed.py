@@ -26,17 +26,17 @@ class ComposedMultisine(Maneuver):
         time = np.asarray(time, dtype=np.float64)
         inside = (time >= 0.0) & (time < self.duration)
         part = np.mod(time / self.duration, 1.0)
-        told = {}
+        signals = {}
         for axis in self.axes:
             total = np.zeros(time.shape)
             for number, amplitude, phase in self.lines[axis]:
                 total += amplitude * np.cos(2.0 * np.pi * number * part + phase)
-            told[axis] = np.where(inside, total, 0.0)
-        return told
+            signals[axis] = np.where(inside, total, 0.0)
+        return signals
 
     def scaled(self, share: float) -> ComposedMultisine:
         """The same, smaller."""
-        lines = {axis: tuple((n, share * a, p) for n, a, p in own) for axis, own in self.lines.items()}
+        lines = {axis: tuple((n, share * a, p) for n, a, p in of_axis) for axis, of_axis in self.lines.items()}
         return ComposedMultisine(self.kind, self.axes, self.duration, share * self.amplitude, self.band, lines)
 
 
@@ -50,9 +50,9 @@ def composed(
         duration: one period [s]. peak: largest deflection by axis.
     """
     lines, every = {}, []
-    for axis, own in powers.items():
-        top = max(own.values())
-        kept = {n: float(np.sqrt(2.0 * power)) for n, power in sorted(own.items()) if power > 1e-3 * top}
+    for axis, of_axis in powers.items():
+        top = max(of_axis.values())
+        kept = {n: float(np.sqrt(2.0 * power)) for n, power in sorted(of_axis.items()) if power > 1e-3 * top}
         phases, reached = least_peak(tuple(kept), tuple(kept.values()))
         share = peak[axis] / reached
         lines[axis] = tuple((n, a * share, p) for (n, a), p in zip(kept.items(), phases, strict=True))

@@ -140,9 +140,9 @@ def checks(
     ]
     periods = maneuver.duration * low
     if maneuver.kind == "sine":
-        whole = abs(periods - round(periods)) < 1e-6
+        integer = abs(periods - round(periods)) < 1e-6
         rules.append(
-            RuleCheck("length", f"{periods:.4g} periods", "a whole number, at least 5", whole and periods > 4.999)
+            RuleCheck("length", f"{periods:.4g} periods", "a whole number, at least 5", integer and periods > 4.999)
         )
         return rules
     if maneuver.kind == "sweep":
@@ -156,8 +156,8 @@ def checks(
             )
         )
         flights = int(np.ceil(5.0 / periods - 1e-9))
-        words = "1 record" if flights == 1 else f"{flights} records"
-        rules.append(RuleCheck("averaging", f"{words} for 5 windows at {low:g} Hz", "that many flown", flights == 1))
+        records = "1 record" if flights == 1 else f"{flights} records"
+        rules.append(RuleCheck("averaging", f"{records} for 5 windows at {low:g} Hz", "that many flown", flights == 1))
     else:
         rules += _multisine_checks(maneuver, rate)
     rules += _band_checks(low, full_until(maneuver, chirp=chirp), known)
@@ -175,8 +175,8 @@ def _band_checks(low: float, top: float, known: ExpectedResponse) -> list[RuleCh
         )
     if known.f180 is not None:
         limit = 2.0 * known.f180
-        words = f"at least {limit:.3g} Hz, twice that of -180 deg"
-        rules.append(RuleCheck("high end", f"full amplitude up to {top:.3g} Hz", words, top >= limit - 1e-9))
+        expected = f"at least {limit:.3g} Hz, twice that of -180 deg"
+        rules.append(RuleCheck("high end", f"full amplitude up to {top:.3g} Hz", expected, top >= limit - 1e-9))
     return rules
 
 
@@ -190,14 +190,14 @@ def _coherence_check(maneuver: Maneuver, rate: float, known: ExpectedResponse, c
     least = predicted_coherence(maneuver, rate=rate, noise=noise, gain=gain, chirp=chirp)
     ratio = known.coherence / (1.0 - known.coherence) * (1.0 - least) / least if least > 0.0 else np.inf
     needed = maneuver.amplitude * np.sqrt(ratio)
-    words = f"an amplitude of {needed:.3g} for {known.coherence:g}"
+    expected = f"an amplitude of {needed:.3g} for {known.coherence:g}"
     where = f"least coherence {least:.2f}, at {full_until(maneuver, chirp=chirp):.3g} Hz"
-    return RuleCheck("amplitude", f"{maneuver.amplitude:g}: {where}", words, least >= known.coherence)
+    return RuleCheck("amplitude", f"{maneuver.amplitude:g}: {where}", expected, least >= known.coherence)
 
 
 def _multisine_checks(maneuver: Maneuver, rate: float) -> list[RuleCheck]:
     low, high = maneuver.band or (0.0, 0.0)
-    count = min(own.size for own in dealt(low, high, maneuver.duration, axes=len(maneuver.axes)))
+    count = min(lines.size for lines in dealt(low, high, maneuver.duration, axes=len(maneuver.axes)))
     time = np.arange(round(maneuver.duration * rate)) / rate
     signals = np.stack(list(maneuver.signals(time).values()))
     periods = maneuver.duration * low
@@ -209,8 +209,8 @@ def _multisine_checks(maneuver: Maneuver, rate: float) -> list[RuleCheck]:
     rules.append(RuleCheck("peak factor", f"{peak:.2f}", "at most 1.2 (a sine has 1)", peak <= 1.2))
     if len(maneuver.axes) > 1:
         largest = float(np.max(np.abs(np.corrcoef(signals) - np.eye(len(signals)))))
-        words = "none" if largest < 1e-9 else f"{largest:.1g}"  # below that it is rounding
-        rules.append(RuleCheck("orthogonal axes", f"correlation: {words}", "at most 0.01", largest <= 0.01))
+        shown = "none" if largest < 1e-9 else f"{largest:.1g}"  # below that it is rounding
+        rules.append(RuleCheck("orthogonal axes", f"correlation: {shown}", "at most 0.01", largest <= 0.01))
     return rules
 
 
@@ -232,17 +232,17 @@ def excited_band(maneuver: Maneuver) -> tuple[float, float]:
 def _block_checks(maneuver: Maneuver, rate: float, known: ExpectedResponse) -> list[RuleCheck]:
     pieces = {"doublet": 2, "3211": 7}.get(maneuver.kind, 1)
     samples = maneuver.duration / pieces * rate
-    whole = abs(samples - round(samples)) < 1e-6 * samples
+    integer = abs(samples - round(samples)) < 1e-6 * samples
     rules = [
         RuleCheck(
-            "sample rate", f"{samples:.4g} samples a unit", "a whole number, at least 10", whole and samples > 9.99
+            "sample rate", f"{samples:.4g} samples a unit", "a whole number, at least 10", integer and samples > 9.99
         )
     ]
     low, high = excited_band(maneuver)
     if known.bandwidth is not None:
         inside = low <= known.bandwidth <= high
-        words = f"the mode at {known.bandwidth:g} Hz inside"
-        rules.append(RuleCheck("band", f"excites {low:.2g} to {high:.2g} Hz", words, inside))
+        expected = f"the mode at {known.bandwidth:g} Hz inside"
+        rules.append(RuleCheck("band", f"excites {low:.2g} to {high:.2g} Hz", expected, inside))
     else:
         rules.append(RuleCheck("band", f"excites {low:.2g} to {high:.2g} Hz", "the mode of interest inside", True))
     if known.noise is not None and known.gain is not None:

@@ -51,8 +51,8 @@ def _sum(harmonics: NDArray[np.int64], phases: Array, turns: Array, amplitudes: 
     part = np.mod(turns, 1.0)
     total = np.zeros(part.shape)
     for i in range(0, harmonics.size, _BLOCK):
-        own = harmonics[i : i + _BLOCK]
-        waves = np.cos(2.0 * np.pi * np.multiply.outer(part, own) + phases[i : i + _BLOCK])
+        block = harmonics[i : i + _BLOCK]
+        waves = np.cos(2.0 * np.pi * np.multiply.outer(part, block) + phases[i : i + _BLOCK])
         total += (waves if amplitudes is None else waves * amplitudes[i : i + _BLOCK]).sum(axis=-1)
     return total
 

@@ -106,12 +106,12 @@ def _multisine(maneuver: Maneuver, time: Array) -> list[Array]:
     """Orthogonal multisines of least peak; not faded: a whole period repeats without a jump."""
     low, high = _band(maneuver)
     harmonics = multisine.dealt(low, high, maneuver.duration, axes=len(maneuver.axes))
-    if min(own.size for own in harmonics) < 2:
+    if min(lines.size for lines in harmonics) < 2:
         raise ManeuverError(
-            f"has {sum(own.size for own in harmonics)} harmonics in {low:g}-{high:g} Hz for {len(maneuver.axes)} axes.",
+            f"has {sum(one.size for one in harmonics)} harmonics in {low:g}-{high:g} Hz for {len(maneuver.axes)} axes.",
             hint="Make it longer or the band wider.",
         )
-    return [multisine.wave(own, time, duration=maneuver.duration) for own in harmonics]
+    return [multisine.wave(lines, time, duration=maneuver.duration) for lines in harmonics]
 
 
 def _sine(maneuver: Maneuver, time: Array) -> list[Array]:

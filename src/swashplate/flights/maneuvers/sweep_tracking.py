@@ -137,19 +137,19 @@ def _by_law(time: Array, values: Array, at: Array, phase: Array) -> Course | Non
     kept = np.mean(np.abs(_envelope(signal, law, _BY_LAW)) ** 2)
     if kept < _STEADY * np.mean(np.abs(_envelope(signal, phase, _FINDING)) ** 2):
         return None
-    whole = basis(time, c) @ coefficients
-    step = np.diff(whole, prepend=2.0 * whole[0] - whole[1])
+    turns = basis(time, c) @ coefficients
+    step = np.diff(turns, prepend=2.0 * turns[0] - turns[1])
     rises = (step > 0.0) & (step < np.pi)  # a law carried far beyond its sweep rises beyond all that samples tell
     first, last = int(np.searchsorted(time, at[0])), int(np.searchsorted(time, at[-1]))
     begin = first - int(np.argmin(rises[first::-1])) + 1 if not rises[: first + 1].all() else 0
     end = last + int(np.argmin(rises[last:])) if not rises[last:].all() else time.size
     part = slice(begin, end)
-    strength = np.abs(_envelope(values[part], whole[part], _FINDING))
+    strength = np.abs(_envelope(values[part], turns[part], _FINDING))
     loud = strength > _FADED * float(np.median(strength[first - begin : last - begin]))
     begin, end = _run_around(loud, first - begin, last - begin) + np.array([begin, begin])
     inside = np.zeros(time.size, dtype=bool)
     inside[begin:end] = True
-    return Course(inside, whole[begin:end], lawful=True)
+    return Course(inside, turns[begin:end], lawful=True)
 
 
 def _level(envelope: Complex, phase: Array) -> Array:
@@ -178,7 +178,7 @@ def _envelope(values: Array, phase: Array, cycles: float) -> Complex:
     real, imaginary, weight = (
         gaussian_filter1d(each, cycles * _BINS, mode="constant") for each in (part.real, part.imag, np.diff(at))
     )
-    places, own = (at[:-1] + at[1:]) / 2.0, (edges[:-1] + edges[1:]) / 2.0
+    places, centres = (at[:-1] + at[1:]) / 2.0, (edges[:-1] + edges[1:]) / 2.0
     held = np.maximum(weight, 1e-12)
-    envelope = np.interp(own, places, real / held) + 1j * np.interp(own, places, imaginary / held)
+    envelope = np.interp(centres, places, real / held) + 1j * np.interp(centres, places, imaginary / held)
     return np.asarray(envelope, dtype=np.complex128)

@@ -68,19 +68,19 @@ class Sweep:
     complete: bool = True
 
     def __str__(self) -> str:
-        seen = "as the log says" if self.source == "log" else f"seen in {self.channel}"
+        by = "as the log says" if self.source == "log" else f"seen in {self.channel}"
         cut = "" if self.complete else ", not flown to its end"
-        return f"{self.axis}: {self.start:.2f} to {self.stop:.2f} s, {self.low:.3g} to {self.high:.3g} Hz ({seen}{cut})"
+        return f"{self.axis}: {self.start:.2f} to {self.stop:.2f} s, {self.low:.3g} to {self.high:.3g} Hz ({by}{cut})"
 
 
 def sweeps(flight: Flight) -> tuple[Sweep, ...]:
     """The sweeps in a flight, in order of time; those that the log tells of need not be seen in a signal."""
-    told = tuple(_told(flight))
-    seen = _seen(flight, [(sweep.start, sweep.stop) for sweep in told])
-    return tuple(sorted((*told, *seen), key=lambda sweep: sweep.start))
+    logged = tuple(_logged_sweeps(flight))
+    shown = _visible_sweeps(flight, [(sweep.start, sweep.stop) for sweep in logged])
+    return tuple(sorted((*logged, *shown), key=lambda sweep: sweep.start))
 
 
-def _told(flight: Flight) -> list[Sweep]:
+def _logged_sweeps(flight: Flight) -> list[Sweep]:
     swept = []
     for event in flight.provenance.events:
         if event.kind != "sweep":
@@ -119,8 +119,8 @@ def _axis(name: str) -> str:
     return _AXES.get(last, _AXES.get(first, name))
 
 
-def _seen(flight: Flight, told: Sequence[tuple[float, float]]) -> list[Sweep]:
-    """Sweeps in the signals beside the `told` ones; of several channels that show one, the command that moves most.
+def _visible_sweeps(flight: Flight, logged: Sequence[tuple[float, float]]) -> list[Sweep]:
+    """Sweeps in the signals beside the `logged` ones; of several channels that show one, the command that moves most.
 
     A set-point speaks where no command shows the sweep: a loop may hide it there.
     """
@@ -137,7 +137,7 @@ def _seen(flight: Flight, told: Sequence[tuple[float, float]]) -> list[Sweep]:
                 candidates.append((name.endswith(_SETPOINT), -amplitude, sweep))
     kept: list[Sweep] = []
     for *_, sweep in sorted(candidates, key=lambda item: item[:2]):
-        others = (*told, *((other.start, other.stop) for other in kept))
+        others = (*logged, *((other.start, other.stop) for other in kept))
         if not any(sweep.start < stop and start < sweep.stop for start, stop in others):
             kept.append(sweep)
     return kept
@@ -166,11 +166,7 @@ def all_rising(time: Array, values: Array) -> list[Ridge]:
     if ridge is None:
         return []
     before, after = time < ridge.start, time > ridge.stop
-    return [
-        *all_rising(time[before], values[before]),
-        ridge,
-        *all_rising(time[after], values[after]),
-    ]
+    return [*all_rising(time[before], values[before]), ridge, *all_rising(time[after], values[after])]
 
 
 def rising(time: Array, values: Array) -> Ridge | None:
@@ -222,10 +218,10 @@ def _as_sweep(
     first, rows = path
     frames = first + np.arange(rows.size)
     beyond, place = _beyond(share[rows, frames], rows, share)
-    own = np.flatnonzero(beyond[place] > _UNUSUAL)
-    if not own.size:
+    strong = np.flatnonzero(beyond[place] > _UNUSUAL)
+    if not strong.size:
         return None
-    rows, frames = rows[own[0] : own[-1] + 1], frames[own[0] : own[-1] + 1]
+    rows, frames = rows[strong[0] : strong[-1] + 1], frames[strong[0] : strong[-1] + 1]
     strength = amplitude[rows, frames]
     loud = np.flatnonzero(strength > _SEEN_WITHIN * np.median(strength))
     heard = slice(int(loud[0]), int(loud[-1]) + 1)

@@ -148,11 +148,11 @@ def read(source: Source, options: Options) -> Flight:
     log = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
     log, coarse = _stamped(log, source)
     log, end, said = _one_run(log)
-    told = story(log, end=end)
-    left = clocked.Remarks(list(log.notes), [*log.damage, *filter(None, (said,)), *told.damage])
-    if "Plane" in told.vehicle:  # its terms are angles of control surfaces, not commands to a mixer
+    logged = story(log, end=end)
+    left = clocked.Remarks(list(log.notes), [*log.damage, *filter(None, (said,)), *logged.damage])
+    if "Plane" in logged.vehicle:  # its terms are angles of control surfaces, not commands to a mixer
         log = Messages({n: t for n, t in log.tables.items() if n[:3] != "PID"}, log.notes, log.damage)
-    streams = _streams(log, told.events, left)
+    streams = _streams(log, logged.events, left)
     if not streams:
         raise FlightError(
             f"holds no flight: no known message has two samples ({sum(map(len, log.tables.values()))} messages of "
@@ -160,16 +160,16 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Copy the log again; check that ATT, RATE or IMU are in LOG_BITMASK.",
         )
-    left.notes += [*coarse, *_filters(told.parameters, streams), *_remarks(log, streams)]
+    left.notes += [*coarse, *_filters(logged.parameters, streams), *_remarks(log, streams)]
     provenance = source.provenance(
         NAME,
         VERSION,
-        vehicle=told.vehicle,
-        firmware=told.firmware,
+        vehicle=logged.vehicle,
+        firmware=logged.firmware,
         notes=tuple(left.notes),
         damage=tuple(left.damage),
-        parameters=told.parameters,
-        events=told.events,
+        parameters=logged.parameters,
+        events=logged.events,
     )
     return Flight(streams, provenance)
 
@@ -243,7 +243,7 @@ def _chosen(table: MessageTable, wanted: tuple[tuple[str, ...], int] | None) -> 
     return table.rows(table.number(field) == number)
 
 
-def _streams(log: Messages, events: tuple[Event, ...], told: clocked.Remarks) -> dict[str, xr.Dataset]:
+def _streams(log: Messages, events: tuple[Event, ...], remarks: clocked.Remarks) -> dict[str, xr.Dataset]:
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     target_unit = next(
@@ -265,10 +265,10 @@ def _streams(log: Messages, events: tuple[Event, ...], told: clocked.Remarks) ->
             columns[name] = (values, target_unit if channel == "sid_target" else unit)
         if message.total and columns:
             columns[message.total] = (np.sum([values for values, _ in columns.values()], axis=0), "1")
-        made = clocked.made_stream(message.stream, seconds(table), columns, told=told)
-        if made is not None:
-            streams[message.stream] = made
-            taken |= set(map(str, made.data_vars))
+        data = clocked.made_stream(message.stream, seconds(table), columns, remarks=remarks)
+        if data is not None:
+            streams[message.stream] = data
+            taken |= set(map(str, data.data_vars))
     return streams
 
 

@@ -199,14 +199,14 @@ def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
         start, stop = _on_the_clock(data, chirp, begins[i], last[i])
         details: dict[str, Any] = {**chirp.as_details(), "start": start, "stop": stop, "seen": min(stop, end)}
         details |= {"channel": MOVED[chirp.axis]} if chirp.axis in MOVED else {}
-        words = f"{chirp.axis_name}, {chirp.start_hz:g}-{chirp.stop_hz:g} Hz in {chirp.record:g} s"
-        events.append(Event(float(begins[i]), "sweep", words, details))
+        text = f"{chirp.axis_name}, {chirp.start_hz:g}-{chirp.stop_hz:g} Hz in {chirp.record:g} s"
+        events.append(Event(float(begins[i]), "sweep", text, details))
         reached = _reached(data, begins[i], last[i])
         if reached is not None and reached < START_DELAY + chirp.record - 0.1:
             details["seen"] = start + max(0.0, reached - START_DELAY)
             why = "the log is cut off" if last[i] == math.inf and end - details["seen"] < 1.0 else "it was stopped"
             damage.append(
-                f"the sweep at {start:.2f} s ({words}) ends after {max(0.0, reached - START_DELAY):.1f} s: {why}"
+                f"the sweep at {start:.2f} s ({text}) ends after {max(0.0, reached - START_DELAY):.1f} s: {why}"
             )
     return events, damage
 
@@ -215,32 +215,32 @@ def _between(data: MessageTable | None, start: float, stop: float) -> tuple[Arra
     """Stamps and the mode's own time [s] of the SIDD messages of one sweep."""
     if data is None:
         return np.zeros(0), np.zeros(0)
-    stamps, own = seconds(data), data.number("Time")
-    chosen = (stamps >= start) & (stamps < stop) & np.isfinite(own)
-    return stamps[chosen], own[chosen]
+    stamps, elapsed = seconds(data), data.number("Time")
+    chosen = (stamps >= start) & (stamps < stop) & np.isfinite(elapsed)
+    return stamps[chosen], elapsed[chosen]
 
 
 def _on_the_clock(data: MessageTable | None, chirp: Chirp, begin: float, until: float) -> tuple[float, float]:
     """Start and stop of the chirp on the log's clock: the mode's own time runs by loop counts, a little off it."""
-    stamps, own = _between(data, begin, until)
+    stamps, elapsed = _between(data, begin, until)
     start, stop = begin + START_DELAY, begin + START_DELAY + chirp.record
-    if own.size > 1 and np.all(np.diff(own) > 0.0) and own[0] <= START_DELAY <= own[-1]:
-        start = float(np.interp(START_DELAY, own, stamps))
+    if elapsed.size > 1 and np.all(np.diff(elapsed) > 0.0) and elapsed[0] <= START_DELAY <= elapsed[-1]:
+        start = float(np.interp(START_DELAY, elapsed, stamps))
         ends = START_DELAY + chirp.record
-        stop = float(np.interp(ends, own, stamps)) if own[-1] >= ends else start + chirp.record
+        stop = float(np.interp(ends, elapsed, stamps)) if elapsed[-1] >= ends else start + chirp.record
     return start, stop
 
 
 def _reached(data: MessageTable | None, begin: float, until: float) -> float | None:
     """How far the mode's own time came [s]; None where it is not logged."""
-    _, own = _between(data, begin, until)
-    return float(own.max()) if own.size else None
+    _, elapsed = _between(data, begin, until)
+    return float(elapsed.max()) if elapsed.size else None
 
 
 def _firmware(messages: Messages, texts: list[Event]) -> str:
     """The firmware's name and version as the log says it, in a message or in VER; "" where it does not."""
-    told = messages.get("VER")
-    said = [*(event.text for event in texts), *(told.text("FWS") if told is not None else ())]
+    version = messages.get("VER")
+    said = [*(event.text for event in texts), *(version.text("FWS") if version is not None else ())]
     return next(filter(is_firmware, said), "")
 
 

@@ -76,8 +76,8 @@ def _start(law: _Law, time: Array, hertz: Array) -> float | None:
     # A step of the field is 0.1 Hz: half of one is little where the frequency is high.
     sharp = hertz >= np.median(hertz)
     start = float(np.median(time[sharp] - law.since(hertz[sharp])))
-    own = law.start_hz * (law.stop_hz / law.start_hz) ** ((time - start) / law.seconds)
-    follows = np.abs(hertz - own) <= 0.1 + _OFF * own
+    lawful = law.start_hz * (law.stop_hz / law.start_hz) ** ((time - start) / law.seconds)
+    follows = np.abs(hertz - lawful) <= 0.1 + _OFF * lawful
     rises = law.since(hertz[-1:])[0] - law.since(hertz[:1])[0] > 0.0
     return start if rises and np.mean(follows) >= _FOLLOWS else None
 
@@ -86,9 +86,9 @@ def _event(header: Header, law: _Law, axis: int, start: float, last: float) -> E
     name, place, sign = _AXES[axis]
     magnitude = sign * header.number(f"chirp_amplitude_{name}", 1.0)
     chirp = Chirp(place, magnitude, law.start_hz, law.stop_hz, law.seconds, fade_in=0.0, fade_out=0.0, dwell=0.0)
-    words = f"{chirp.axis_name}, {chirp.start_hz:g}-{chirp.stop_hz:g} Hz in {chirp.record:g} s"
+    text = f"{chirp.axis_name}, {chirp.start_hz:g}-{chirp.stop_hz:g} Hz in {chirp.record:g} s"
     times = {"start": start, "stop": start + law.seconds, "seen": min(start + law.seconds, last)}
-    return Event(start, "sweep", words, {**chirp.as_details(), **times, "channel": f"mixer_{name}"})
+    return Event(start, "sweep", text, {**chirp.as_details(), **times, "channel": f"mixer_{name}"})
 
 
 NAME = "blackbox"
@@ -118,31 +118,31 @@ def read(source: Source, options: Options) -> Flight:
     main = main_frames(frames, header)
     fields = Fields(header, header.layouts["I"].names)
     columns = fields.columns(main.columns)
-    told = clocked.Remarks(list(note), [*_lost(frames), *main.damage])
+    remarks = clocked.Remarks(list(note), [*_lost(frames), *main.damage])
     streams: dict[str, xr.Dataset] = {}
-    made = clocked.made_stream("blackbox", main.time, columns, told=told)
-    if made is None:
+    data = clocked.made_stream("blackbox", main.time, columns, remarks=remarks)
+    if data is None:
         raise FlightError(
             f"holds no flight: {len(main.time)} main frames of {frames.intra.size} can be used, and two are needed.",
             where=source.name,
             hint="Copy the log again; a log of nothing but a header was never written to.",
         )
-    streams["blackbox"] = made
-    gps = _gps(frames, header, main, told)
+    streams["blackbox"] = data
+    gps = _gps(frames, header, main, remarks)
     if gps is not None:
         streams["gps"] = gps
     inputs = {
-        str(n): np.asarray(v.values, np.float64) for n, v in made.data_vars.items() if str(n).startswith("mixer_")
+        str(n): np.asarray(v.values, np.float64) for n, v in data.data_vars.items() if str(n).startswith("mixer_")
     }
-    told.notes += [*main.notes, *_unfinished(frames), *fields.remarks(columns), *checks.constant_notes(inputs)]
+    remarks.notes += [*main.notes, *_unfinished(frames), *fields.remarks(columns), *checks.constant_notes(inputs)]
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=" ".join(filter(None, (header.values.get("Craft name", ""), fields.firmware))),
         firmware=fields.called,
-        notes=tuple(told.notes),
-        damage=tuple(told.damage),
-        parameters=_parameters(header, own=fields.rotorflight),
+        notes=tuple(remarks.notes),
+        damage=tuple(remarks.damage),
+        parameters=_parameters(header, gains=fields.rotorflight),
         events=_events(frames, header, main),
     )
     if note:
@@ -187,17 +187,17 @@ def _lost(frames: FoundFrames) -> list[str]:
     ]
 
 
-def _parameters(header: Header, *, own: bool) -> dict[str, float]:
+def _parameters(header: Header, *, gains: bool) -> dict[str, float]:
     """Numbers of the header by name; of a row of numbers `rollPID_0`, `rollPID_1`, ..."""
     parameters = {}
     for name, text in header.values.items():
-        plain = re.sub(r"\W+", "_", name).strip("_")
+        key = re.sub(r"\W+", "_", name).strip("_")
         parts = text.split(",")
         for i, part in enumerate(parts[:32]):
             value = as_number(part.strip(), np.nan)
-            if plain and np.isfinite(value):
-                parameters[plain if len(parts) == 1 else f"{plain}_{i}"] = value
-    return parameters | (_own_gains(parameters) if own else {})
+            if key and np.isfinite(value):
+                parameters[key if len(parts) == 1 else f"{key}_{i}"] = value
+    return parameters | (_own_gains(parameters) if gains else {})
 
 
 def _own_gains(numbers: Mapping[str, float]) -> dict[str, float]:
@@ -224,13 +224,13 @@ def _when(after: int, main: Main) -> float:
 
 def _events(frames: FoundFrames, header: Header, main: Main) -> tuple[Event, ...]:
     events = chirps(header, main.columns, main.time)
-    for told in frames.events:
-        time = _when(told.after, main)
-        if told.kind == 14:  # a pause lies behind it
-            time = _when(told.after + 1, main)
-        numbers = {f"number_{i}": value for i, value in enumerate(told.numbers)}
-        shown = " ".join(f"{value:g}" for value in told.numbers)
-        events.append(Event(time, _KINDS.get(told.kind, "message"), f"{told.text} {shown}".strip(), numbers))
+    for frame in frames.events:
+        time = _when(frame.after, main)
+        if frame.kind == 14:  # a pause lies behind it
+            time = _when(frame.after + 1, main)
+        numbers = {f"number_{i}": value for i, value in enumerate(frame.numbers)}
+        shown = " ".join(f"{value:g}" for value in frame.numbers)
+        events.append(Event(time, _KINDS.get(frame.kind, "message"), f"{frame.text} {shown}".strip(), numbers))
     if "S" in frames.others:
         written, after = frames.others["S"]
         for row, name in zip(written, header.layouts["S"].names, strict=True):
@@ -241,7 +241,7 @@ def _events(frames: FoundFrames, header: Header, main: Main) -> tuple[Event, ...
     return tuple(sorted(events, key=lambda event: event.time))
 
 
-def _gps(frames: FoundFrames, header: Header, main: Main, told: clocked.Remarks) -> xr.Dataset | None:
+def _gps(frames: FoundFrames, header: Header, main: Main, remarks: clocked.Remarks) -> xr.Dataset | None:
     """GPS frames: places count from the home before them, times from the main frame before them."""
     if "G" not in frames.others or not main.clock.size:
         return None
@@ -259,7 +259,7 @@ def _gps(frames: FoundFrames, header: Header, main: Main, told: clocked.Remarks)
             values = values + _home(frames, header, name, after)
         channel, unit, factor = gps_place(name)
         columns[channel] = (values * factor, unit)
-    return clocked.made_stream("gps", time, _unlike(columns), told=told)
+    return clocked.made_stream("gps", time, _unlike(columns), remarks=remarks)
 
 
 def _unlike(columns: Mapping[str, tuple[Array, str]]) -> dict[str, tuple[Array, str]]:

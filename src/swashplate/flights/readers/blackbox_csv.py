@@ -52,41 +52,41 @@ def read(source: Source, options: Options) -> Flight:
             columns.pop(name, None)
             columns[channel] = (numbers[name], unit)
     inside = {channel: clocked.converted(values, unit) for channel, (values, unit) in columns.items()}
-    told = table.told
+    remarks = table.remarks
     streams = streams_of(
         Stamps(numbers["time"] / 1e6),
         {channel: values for channel, (values, _) in inside.items()},
         {channel: unit for channel, (_, unit) in inside.items() if not is_known(channel)},
         where=source.name,
         bad_stamps=options.bad_stamps,
-        told=told,
+        remarks=remarks,
     )
-    told.notes += fields.remarks(columns)
+    remarks.notes += fields.remarks(columns)
     if "blackbox_high_resolution" not in header.values:
-        told.notes.append(
+        remarks.notes.append(
             "the table does not say whether blackbox_high_resolution was on: rates are read as if it was not"
         )
     inputs = {channel: values for channel, (values, _) in inside.items() if channel.startswith("mixer_")}
-    told.notes += checks.constant_notes(inputs)
+    remarks.notes += checks.constant_notes(inputs)
     provenance = source.provenance(
-        NAME, VERSION, vehicle=fields.firmware, notes=tuple(told.notes), damage=tuple(told.damage)
+        NAME, VERSION, vehicle=fields.firmware, notes=tuple(remarks.notes), damage=tuple(remarks.damage)
     )
     return Flight(streams, provenance)
 
 
 def _fields(table: DelimitedTable) -> tuple[dict[str, Array], dict[str, str]]:
     """Numbers by field, and the unit that stands behind its name; fields of words ("IDLE") are passed over."""
-    numbers, units, words = dict[str, Array](), dict[str, str](), list[str]()
+    numbers, units, texts = dict[str, Array](), dict[str, str](), list[str]()
     for index, cell in enumerate(table.header):
         name, _, behind = cell.partition(" (")
         unit = behind.removesuffix(")")
         if name != "time" and not tables.is_number(table.first(index)):
-            words.append(name)
+            texts.append(name)
         elif name:
             numbers[name] = table.numbers(index, name=name)
             units |= {name: unit} if unit else {}
-    if words:
-        table.told.notes.append(f"{', '.join(filter(None, words))}: no numbers: not read")
+    if texts:
+        table.remarks.notes.append(f"{', '.join(filter(None, texts))}: no numbers: not read")
     return numbers, units
 
 

@@ -91,7 +91,7 @@ class Fields:
         if matched is None:
             if name == "vbatLatest":
                 return self._voltage()
-            return _Place(*_SINGLE[name]) if name in _SINGLE else self._plain(name)
+            return _Place(*_SINGLE[name]) if name in _SINGLE else self._as_logged(name)
         family, index = matched[1], int(matched[2])
         if index < 3 and family in _THREE:
             return self._axis(family, index)
@@ -114,7 +114,7 @@ class Fields:
                 return _Place(f"motor_{one}", "1", 1.0 / (high - low), low)
         if family == "eRPM" and self.header.number("motor_poles") >= 2.0:
             return _Place(f"omega_motor_{one}", "rpm", 200.0 / self.header.number("motor_poles"))
-        return self._plain(name)
+        return self._as_logged(name)
 
     def _axis(self, family: str, index: int) -> _Place:
         channel, sign = _THREE[family][index], _SIGNS[index]
@@ -129,7 +129,7 @@ class Fields:
             return _Place(channel, "deg/s", sign * self.fine)
         if family in ("accADC", "accSmooth"):
             per_g = self.header.number("acc_1G")
-            return _Place(channel, "g", sign / per_g) if per_g > 0.0 else self._plain(f"{family}[{index}]")
+            return _Place(channel, "g", sign / per_g) if per_g > 0.0 else self._as_logged(f"{family}[{index}]")
         if family == "mixer" and index == 2 and "motor[1]" in self.names:
             # "Yaw is now tail motor throttle", says Rotorflight's mixer: no sign is left
             return _Place("tail_throttle", "1", 1e-3)
@@ -141,48 +141,48 @@ class Fields:
             return _Place("voltage", "V", 0.01)
         if version is not None and int(version[1]) == 3:
             return _Place("voltage", "V", 0.1)
-        return self._plain("vbatLatest")  # counts of a converter
+        return self._as_logged("vbatLatest")  # counts of a converter
 
-    def _plain(self, name: str) -> _Place:
+    def _as_logged(self, name: str) -> _Place:
         """A field that is kept as logged, under its own name; one that the schema gives a unit to is not its own."""
-        own = _own_name(name)
-        return _Place(f"{own}_raw" if is_known(own) else own)
+        name_of_it = _own_name(name)
+        return _Place(f"{name_of_it}_raw" if is_known(name_of_it) else name_of_it)
 
     def _sums(
         self, values: Mapping[str, NDArray[Any]], columns: Mapping[str, tuple[Array, str]]
     ) -> dict[str, tuple[Array, str]]:
         """Betaflight logs no commands to its mixer: they are the sums of the terms of its PID controller."""
-        made = {}
+        sums = {}
         for i, axis in enumerate(_AXES):
             terms = [values[f"axis{term}[{i}]"] for term in _TERMS if f"axis{term}[{i}]" in values]
             if f"mixer_{axis}" in columns or self.rotorflight or f"axisP[{i}]" not in values:
                 continue
             total = np.sum(np.asarray(terms, dtype=np.float64), axis=0)
-            made[f"mixer_{axis}"] = (np.asarray(_SIGNS[i] * 1e-3 * total + 0.0), "1")
-        if made:
+            sums[f"mixer_{axis}"] = (np.asarray(_SIGNS[i] * 1e-3 * total + 0.0), "1")
+        if sums:
             self.notes.append("mixer_roll, mixer_pitch and mixer_yaw are sums of the PID terms, before their limits")
-        return made
+        return sums
 
     def remarks(self, columns: Mapping[str, tuple[Array, str]]) -> tuple[str, ...]:
         """What a user must know about the channels."""
-        told = list(self.notes)
+        texts = list(self.notes)
         if not self.rotorflight and "betaflight" not in self.firmware.lower():
             whose = f"the firmware is {self.firmware[:40]!r}" if self.firmware else "the header names no firmware"
-            told.append(f"{whose}: signs and units are taken as Betaflight's")
+            texts.append(f"{whose}: signs and units are taken as Betaflight's")
         if "p" in columns and self.fine == 1.0:
-            told.append("gyros and set-points are whole degrees per second (noise of 0.29 deg/s from rounding alone)")
+            texts.append("gyros and set-points are whole degrees per second (noise of 0.29 deg/s from rounding alone)")
         if self.rotorflight and "mixer_collective" in columns:
-            told.append("mixer_collective is Rotorflight's, -1 to 1")
+            texts.append("mixer_collective is Rotorflight's, -1 to 1")
         if "tail_throttle" in columns:
-            told.append("the tail is driven by a motor: mixer[2] is its throttle (tail_throttle), not a yaw command")
+            texts.append("the tail is driven by a motor: mixer[2] is its throttle (tail_throttle), not a yaw command")
         for name in ("gyro_lpf1_static_hz", "gyro_lpf2_static_hz", "gyro_lowpass_hz", "gyro_lowpass2_hz"):
             corner = self.header.number(name)
             if corner > 0.0:
-                told.append(
+                texts.append(
                     f"p q r have passed {name}, {corner:g} Hz: at least {1e3 / (2.0 * math.pi * corner):.1f} ms of any "
                     "delay found with them is the filter's"
                 )
-        return tuple(told)
+        return tuple(texts)
 
 
 def gps_place(name: str) -> tuple[str, str, float]:

@@ -123,7 +123,7 @@ class _Walk:
         taken: dict[str, list[int]] = {letter: [] for letter in self.letters}
         intra, inter = taken["I"], taken["P"]
         orders_i, orders_p = self.orders["I"], self.orders["P"]
-        at, main, whole = self.at, self.main, self.whole
+        at, main, complete = self.at, self.main, self.whole
         while at < stop:
             letter = content[at]
             end = ends[at - base] if letter != 69 else -1
@@ -137,7 +137,7 @@ class _Walk:
                     self.found.places += 1
                     self.searching = True
                     self.broken.append(main)
-                    whole = False
+                    complete = False
                 match = self.beginnings.search(content, at + 1)
                 after = match.start() if match else size
                 if after == size and end < 0:
@@ -148,12 +148,12 @@ class _Walk:
                 continue
             self.searching = False
             if letter == 73:  # I
-                whole = True
+                complete = True
                 intra.append(at)
                 orders_i.append(main)
                 main += 1
             elif letter == 80:  # P
-                if whole:
+                if complete:
                     inter.append(at)
                     orders_p.append(main)
                     main += 1
@@ -163,7 +163,7 @@ class _Walk:
                 taken[chr(letter)].append(at)
                 self.orders[chr(letter)].append(main)
             at = end
-        self.at, self.main, self.whole = at, main, whole
+        self.at, self.main, self.whole = at, main, complete
         return taken
 
     def _event(self, at: int) -> int:

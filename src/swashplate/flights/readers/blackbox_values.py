@@ -171,19 +171,19 @@ def _complete(frames: FoundFrames, header: Header, damage: list[str], notes: lis
     if starts.size < 2:
         return keep
     lengths = np.diff(starts)
-    resumed = [told.after for told in frames.events if told.kind == _RESUMES]
-    plain = ~np.isin(starts[1:], frames.broken) & ~np.isin(starts[1:], np.asarray(resumed, dtype=np.int64))
-    if not plain.any():
+    resumed = [event.after for event in frames.events if event.kind == _RESUMES]
+    unbroken = ~np.isin(starts[1:], frames.broken) & ~np.isin(starts[1:], np.asarray(resumed, dtype=np.int64))
+    if not unbroken.any():
         return keep
-    sizes, counts = np.unique(lengths[plain], return_counts=True)
+    sizes, counts = np.unique(lengths[unbroken], return_counts=True)
     usual = int(sizes[np.argmax(counts)])
     intra, top, bottom = header.intervals
     said = 1 + sum((offset + top - 1) % bottom < top for offset in range(1, intra))
-    if usual != said and 2 * counts.max() <= plain.sum():
+    if usual != said and 2 * counts.max() <= unbroken.sum():
         usual = said
     elif usual != said:
         notes.append(f"the header promises {said} main frames from I frame to I frame; there are {usual}")
-    short = np.flatnonzero(plain & (lengths != usual))
+    short = np.flatnonzero(unbroken & (lengths != usual))
     dropped = 0
     for i in short.tolist():
         keep[starts[i] + 1 : starts[i + 1]] = False
@@ -198,7 +198,7 @@ def _complete(frames: FoundFrames, header: Header, damage: list[str], notes: lis
 
 def _clock(frames: FoundFrames, ticks: Whole, keep: NDArray[np.bool_], damage: list[str]) -> Array:
     """Microseconds that do not turn over; frames whose clock leaps or stands still leave `keep`."""
-    resumed = {told.after for told in frames.events if told.kind == _RESUMES}
+    resumed = {event.after for event in frames.events if event.kind == _RESUMES}
     chosen = np.flatnonzero(keep)
     if not chosen.size:
         return np.zeros(ticks.size)
@@ -240,24 +240,24 @@ def _joined(ticks: Whole, runs: Whole) -> NDArray[np.bool_]:
         last = seed
         run = seed + direction
         while 0 <= run < edges.size:
-            early, late = (last, run) if direction > 0 else (run, last)
-            cut, skip = _seam(ticks[edges[early] : ends[early]], ticks[edges[late] : ends[late]])
+            early, later = (last, run) if direction > 0 else (run, last)
+            cut, skip = _seam(ticks[edges[early] : ends[early]], ticks[edges[later] : ends[later]])
             if skip >= 0:
                 best[edges[run] : ends[run]] = True
-                best[ends[early] - cut : edges[late] + skip] = False
+                best[ends[early] - cut : edges[later] + skip] = False
                 last = run
             run += direction
     return best
 
 
-def _seam(early: Whole, late: Whole) -> tuple[int, int]:
+def _seam(early: Whole, later: Whole) -> tuple[int, int]:
     """How many frames to leave out at the end of one run and the beginning of the next so that the clock goes on.
 
     Wild frames, or some that stand in the log twice. The second is -1 where nothing helps.
     """
     seams = [(0, -1)]
     for cut in range(min(_WILD, early.size)):
-        after = (late - early[-1 - cut]) % TURN
+        after = (later - early[-1 - cut]) % TURN
         goes_on = (after > 0) & (after <= _LEAP)
         if goes_on.any():
             seams.append((cut, int(np.argmax(goes_on))))

@@ -57,7 +57,7 @@ def quaternion_notes(quaternion: Array, *, channel: str, where: str) -> tuple[st
 
 def beyond_limits(flight: Flight) -> tuple[str, ...]:
     """What is told of each channel with numbers that nothing of its kind can have (`Channel.largest`)."""
-    told = []
+    texts = []
     for name in flight.channels:
         known = channel(name)
         values = np.abs(flight.values(name))
@@ -65,13 +65,13 @@ def beyond_limits(flight: Flight) -> tuple[str, ...]:
             wrong = values > known.largest
         if count := int(np.sum(wrong)):
             shown, unit = known.shown_factor, known.shown_unit.replace("1", "")
-            told.append(
+            texts.append(
                 f"{name}: {count} of {values.size} samples ({100.0 * count / values.size:.3g} %) are impossible: found "
                 f"up to {shown * np.nanmax(values):.3g} {unit}".rstrip()
                 + f", expected {shown * known.largest:.3g} {unit}".rstrip()
                 + f" at most ({known.description}). Check the unit it was read with, and the log's header"
             )
-    return tuple(told)
+    return tuple(texts)
 
 
 def constant_notes(channels: Mapping[str, Array]) -> tuple[str, ...]:
@@ -130,13 +130,13 @@ class Faults:
         heads = [
             ": ".join(part for part in (e.where if e.where != place else "", e.channel) if part) for e in self.errors
         ]
-        told = [
+        faults = [
             f"({i}) {f'{head}: ' if head else ''}{e.problem}"
             for i, (head, e) in enumerate(zip(heads, self.errors, strict=True), 1)
         ]
-        more = [f"and {len(told) - _MOST} more."] if len(told) > _MOST else []
+        more = [f"and {len(faults) - _MOST} more."] if len(faults) > _MOST else []
         raise kind(
-            " ".join([f"has {len(told)} faults:", *told[:_MOST], *more, *also]),
+            " ".join([f"has {len(faults)} faults:", *faults[:_MOST], *more, *also]),
             where=place,
             hint=" ".join(dict.fromkeys(error.hint for error in self.errors if error.hint)) or None,
         )

@@ -128,7 +128,7 @@ def usable(
     *,
     where: str,
     bad_stamps: str,
-    told: Remarks,
+    remarks: Remarks,
     channel: str = "time",
     tick: float = 1e-6,
     turns: Sequence[float] = (),
@@ -141,7 +141,7 @@ def usable(
         time: stamps [s], shape (n,).
         columns: the samples' numbers, of shape (n,) or (n, k).
         bad_stamps: "error" (a stamp that repeats or goes back is an error that names the sample) or "drop".
-        told: takes what was left out.
+        remarks: takes what was left out.
         tick: of the file's counter [s], beside micro- and milliseconds.
         turns: other times [s] at which the clock begins anew.
 
@@ -158,26 +158,26 @@ def usable(
     checks.finite(time, channel=channel, where=where)
     time, turned = unturned(time, (*turns, *dict.fromkeys(TURN * each for each in (1e-6, 1e-3, tick))))
     if turned:
-        told.notes.append(f"the clock's counter turned over {_times(turned)}: it was counted on")
+        remarks.notes.append(f"the clock's counter turned over {_times(turned)}: it was counted on")
     twice = copies(time, columns)
     if twice.any():
-        told.notes.append(f"{share(int(twice.sum()), time.size)} are copies of the one before them: left out")
+        remarks.notes.append(f"{share(int(twice.sum()), time.size)} are copies of the one before them: left out")
     place = np.flatnonzero(~twice)
     (first, last), anew = longest_run([(place, time[place])])
     keep = ~twice & (np.arange(time.size) >= first) & (np.arange(time.size) < last)
     keep[keep] = longest_increasing(time[keep])
     lost = ~keep & ~twice
     if lost.any():
-        some, (bad, words) = share(int(lost.sum()), time.size), _first_bad(time, twice)
+        some, (bad, what) = share(int(lost.sum()), time.size), _first_bad(time, twice)
         said = anew or f"{some} are lost because their time repeats or goes backwards, first at sample {bad}"
         if bad_stamps == "error":
             raise FlightError(
-                f"{words}; {some} can not be used{': the clock starts anew there' * bool(anew)}.",
+                f"{what}; {some} can not be used{': the clock starts anew there' * bool(anew)}.",
                 where=where,
                 channel=channel,
                 hint="Repair the log, or leave these samples out: --drop-bad-stamps (in Python bad_stamps='drop').",
             )
-        told.damage.append(said)
+        remarks.damage.append(said)
     if keep.sum() < 2:
         raise FlightError("less than two samples have increasing times.", where=where, channel=channel)
     return time[keep], keep
@@ -246,7 +246,7 @@ def converted(values: Array, unit: str) -> tuple[Array, str]:
 
 
 def made_stream(
-    name: str, time: Array, columns: Mapping[str, tuple[Array, str]], *, told: Remarks
+    name: str, time: Array, columns: Mapping[str, tuple[Array, str]], *, remarks: Remarks
 ) -> xr.Dataset | None:
     """A stream from what a log holds; None where fewer than two samples can be used.
 
@@ -254,7 +254,7 @@ def made_stream(
         name: of the stream, for what is told.
         time: stamps [s], shape (n,), in any state.
         columns: values and their unit in the log, by channel.
-        told: takes a line for what was left out.
+        remarks: takes a line for what was left out.
     """
     channels = {
         channel_name: converted(np.asarray(v, dtype=np.float64), unit) for channel_name, (v, unit) in columns.items()
@@ -269,15 +269,17 @@ def made_stream(
         good &= np.isfinite(values)
     if not good.all():
         lost = share(int(good.size - good.sum()), good.size)
-        told.damage.append(f"{name}: {lost} are lost because a number is missing or not finite")
+        remarks.damage.append(f"{name}: {lost} are lost because a number is missing or not finite")
     twice = copies(_rows(time, good), (_rows(values, good) for values, _ in channels.values()))
     if twice.any():
-        told.notes.append(f"{name}: {share(int(twice.sum()), good.size)} are copies of the one before them: left out")
+        remarks.notes.append(
+            f"{name}: {share(int(twice.sum()), good.size)} are copies of the one before them: left out"
+        )
     good[good] = ~twice
     rising = longest_increasing(_rows(time, good))
     if not rising.all():
         lost = share(int(rising.size - rising.sum()), rising.size)
-        told.damage.append(f"{name}: {lost} are lost because their time repeats or goes backwards")
+        remarks.damage.append(f"{name}: {lost} are lost because their time repeats or goes backwards")
     good[good] = rising
     if good.sum() < 2:
         return None

@@ -128,13 +128,13 @@ def read(variables: Mapping[str, Any], source: Source, options: Options) -> Flig
             checks.finite(values, channel=f"Data.{name}", where=source.name)
     faults.refuse()
     fields = _in_inside_units(fields, source, options)
-    told = clocked.Remarks()
+    remarks = clocked.Remarks()
     time, keep = clocked.usable(
         fields["time"][:, 0],
         fields.values(),
         where=source.name,
         bad_stamps=options.bad_stamps,
-        told=told,
+        remarks=remarks,
         channel="Data.time",
     )
     fields = {name: values[keep] for name, values in fields.items()}
@@ -154,8 +154,8 @@ def read(variables: Mapping[str, Any], source: Source, options: Options) -> Flig
     by_name = dict(zip(_INPUTS, fields["inputs"].T, strict=True))
     inputs = {name: by_name[name] for name in ("motor_lower", "motor_upper", "servo_roll", "servo_pitch")}
 
-    notes = (*_NOTES, *quaternion_notes, *told.notes, *checks.constant_notes(inputs))
+    notes = (*_NOTES, *quaternion_notes, *remarks.notes, *checks.constant_notes(inputs))
     return Flight(
         streams={"motion": stream(time, motion | logged, logged_units), "inputs": stream(time, inputs)},
-        provenance=source.provenance(NAME, VERSION, vehicle="coax", notes=notes, damage=tuple(told.damage)),
+        provenance=source.provenance(NAME, VERSION, vehicle="coax", notes=notes, damage=tuple(remarks.damage)),
     )

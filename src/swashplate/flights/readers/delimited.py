@@ -53,5 +53,5 @@ def read(source: Source, options: Options) -> Flight:
     table = read_table(source.text or "", where=source.name, mapping=options.mapping)
     if table.preface:
         count = len(table.preface)
-        table.told.notes.append(f"{count} line{'s' * (count != 1)} before the header: not read")
+        table.remarks.notes.append(f"{count} line{'s' * (count != 1)} before the header: not read")
     return flight_of(table, source, options, reader=NAME, version=VERSION)

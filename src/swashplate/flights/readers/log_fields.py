@@ -150,10 +150,10 @@ class _Binary(LogFields):
 
 def _state(path: Path) -> tuple[int, int]:
     try:
-        told = path.stat()
+        state = path.stat()
     except OSError:
         return (0, 0)
-    return told.st_size, told.st_mtime_ns
+    return state.st_size, state.st_mtime_ns
 
 
 def _column(content: NDArray[np.uint8], kind: MessageKind, at: NDArray[np.int64], field: str) -> Array:
@@ -174,9 +174,9 @@ def _stamped(
     content: NDArray[np.uint8], kind: MessageKind, at: NDArray[np.int64], clock: tuple[NDArray[np.int64], Array]
 ) -> Array | None:
     """Times [s]: the messages' own, or of the last message TIME before each (PX4 of old)."""
-    own = next((name for name in _STAMPS if name in kind.factors), None)
-    if own is not None:
-        return _column(content, kind, at, own) * _STAMPS[own]
+    stamp = next((name for name in _STAMPS if name in kind.factors), None)
+    if stamp is not None:
+        return _column(content, kind, at, stamp) * _STAMPS[stamp]
     place, time = clock
     if not place.size:
         return None
@@ -198,8 +198,8 @@ def _instances(
 ) -> Sequence[tuple[int | None, NDArray[np.int64]]]:
     """Which messages are of which sensor or core, where the log tells several apart."""
     every = np.arange(at.size)
-    told = [field for field, (unit, _) in units.items() if unit == _INSTANCE]
-    names = told or [field for field in _INSTANCES if field in kind.factors][:1]
+    instances = [field for field, (unit, _) in units.items() if unit == _INSTANCE]
+    names = instances or [field for field in _INSTANCES if field in kind.factors][:1]
     if not names:
         return [(None, every)]
     number = _column(content, kind, at, names[0])
@@ -216,7 +216,7 @@ def _units(content: bytes, kinds: Mapping[str, MessageKind]) -> dict[str, dict[s
     tables = {name: dataflash.gathered(content, kinds[name]) for name in ("FMTU", "UNIT", "MULT") if name in kinds}
     label = _letters(tables.get("UNIT"), "Label")
     factor = _letters(tables.get("MULT"), "Mult")
-    told: dict[str, dict[str, tuple[str, float]]] = {}
+    by_message: dict[str, dict[str, tuple[str, float]]] = {}
     numbered = {kind.number: kind for kind in kinds.values()}
     table = tables["FMTU"]
     for number, units, factors in zip(
@@ -229,8 +229,8 @@ def _units(content: bytes, kinds: Mapping[str, MessageKind]) -> dict[str, dict[s
         for field, unit, scale in zip(kind.factors, units, factors, strict=False):
             times = 1.0 if kind.letters.get(field, "") in _FACTORED else _number(factor.get(scale, "1"))
             row[field] = (label.get(unit, "") if unit != "#" else _INSTANCE, times)
-        told[kind.name] = row
-    return told
+        by_message[kind.name] = row
+    return by_message
 
 
 def _letters(table: MessageTable | None, column: str) -> dict[str, str]:
@@ -273,15 +273,15 @@ def _topics(content: bytes, where: str) -> dict[str, Columns]:
     """Every topic of a ULog file."""
     log = ulog.decoded(content, where)
     several = {data.name for data in log.data_list if data.multi_id}
-    made: dict[str, Columns] = {}
+    topics: dict[str, Columns] = {}
     for data in log.data_list:
         if "timestamp" not in data.data:
             continue
         time = np.asarray(data.data["timestamp"], dtype=np.float64) * 1e-6
         name = f"{data.name}[{data.multi_id}]" if data.name in several else data.name
-        made[name] = (
+        topics[name] = (
             np.arange(time.size, dtype=np.int64),
             time,
             {n: v for n, v in data.data.items() if n != "timestamp"},
         )
-    return made
+    return topics

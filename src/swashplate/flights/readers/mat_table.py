@@ -35,7 +35,7 @@ class MatTable:
     """Arrays of one length as a table's columns.
 
     Attributes:
-        where, header, lines, told, aliases: as in `ColumnTable`.
+        where, header, lines, remarks, aliases: as in `ColumnTable`.
         columns: numbers by column, shape (n,) each.
     """
 
@@ -44,7 +44,7 @@ class MatTable:
     columns: Sequence[Array]
     aliases: Mapping[str, int]
     units: Sequence[str] = ()
-    told: Remarks = field(default_factory=Remarks)
+    remarks: Remarks = field(default_factory=Remarks)
 
     def __len__(self) -> int:
         return len(self.columns[0]) if self.columns else 0
@@ -102,7 +102,7 @@ def table_of(source: Source, options: Options) -> MatTable:
 
 
 def _table(variables: Mapping[str, Any], source: Source, options: Options) -> MatTable:
-    told = Remarks()
+    remarks = Remarks()
     arrays: dict[str, Array] = {}
     strange: list[str] = []
     for path, value in _flat(variables):
@@ -125,10 +125,10 @@ def _table(variables: Mapping[str, Any], source: Source, options: Options) -> Ma
     lost = [path for path in arrays if not any(c == path or c.startswith(f"{path}(") for c in columns)]
     for what, why in ((lost, f"not {n} numbers long"), (strange, "no array of numbers")):
         if what:
-            told.notes.append(f"{', '.join(what)}: {why}: not read")
+            remarks.notes.append(f"{', '.join(what)}: {why}: not read")
     header = [names.get(path, path) for path in columns]
     aliases = {path: index for index, path in enumerate(columns)}
-    return MatTable(source.name, header, list(columns.values()), aliases, told=told)
+    return MatTable(source.name, header, list(columns.values()), aliases, remarks=remarks)
 
 
 def _flat(value: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

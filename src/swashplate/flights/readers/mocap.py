@@ -61,7 +61,7 @@ def flight(
     world_axes: str,
     body_axes: str,
     notes: tuple[str, ...],
-    told: clocked.Remarks,
+    remarks: clocked.Remarks,
 ) -> Flight:
     """A tracked body as a flight with the stream "motion": x y z [m, NED] and qw qx qy qz (FRD to NED).
 
@@ -70,12 +70,12 @@ def flight(
     where = source.name
     world = frames.axes(options.world_axes or world_axes, where=where)
     body = frames.axes(options.body_axes or body_axes, where=where)
-    seen = np.asarray(np.isfinite(track.position).all(axis=1))
+    tracked = np.asarray(np.isfinite(track.position).all(axis=1))
     if track.quaternion is not None:
-        seen &= np.isfinite(track.quaternion).all(axis=1)
-    if seen.sum() < 2:
+        tracked &= np.isfinite(track.quaternion).all(axis=1)
+    if tracked.sum() < 2:
         raise FlightError(
-            f"'{track.name}' is seen in {int(seen.sum())} of {len(seen)} samples; a flight needs at least two.",
+            f"'{track.name}' is seen in {int(tracked.sum())} of {len(tracked)} samples; a flight needs at least two.",
             where=where,
             hint="Choose another body, or export a longer record.",
         )
@@ -84,12 +84,12 @@ def flight(
         (track.position, *(() if track.quaternion is None else (track.quaternion,))),
         where=where,
         bad_stamps=options.bad_stamps,
-        told=told,
+        remarks=remarks,
     )
-    kept = keep & seen
-    lost = int(len(seen) - seen.sum())
+    kept = keep & tracked
+    lost = int(len(tracked) - tracked.sum())
     if lost:
-        told.damage.append(f"{clocked.share(lost, len(seen))} are lost: '{track.name}' was not seen (occlusion)")
+        remarks.damage.append(f"{clocked.share(lost, len(tracked))} are lost: '{track.name}' was not seen (occlusion)")
     position = units.to_inside(
         track.position[kept], track.length_unit, expected="m", channel=f"position of '{track.name}'", where=where
     )
@@ -106,9 +106,9 @@ def flight(
         *notes,
         f"logged world axes point {options.world_axes or world_axes}; 'north' is only the room's first axis",
         "x y z is the tracked point, not the centre of gravity; there are no inputs in this file",
-        *told.notes,
+        *remarks.notes,
     )
     return Flight(
-        streams={"motion": stream(time[seen[keep]], channels)},
-        provenance=source.provenance(reader, version, vehicle=track.name, notes=notes, damage=tuple(told.damage)),
+        streams={"motion": stream(time[tracked[keep]], channels)},
+        provenance=source.provenance(reader, version, vehicle=track.name, notes=notes, damage=tuple(remarks.damage)),
     )

@@ -72,10 +72,10 @@ def read(source: Source, options: Options) -> Flight:
     """
     if options.units:
         raise UnitError("units are known for this file and cannot be given.", where=source.name, channel="units")
-    told = clocked.Remarks()
-    columns = _columns(source, told)
+    remarks = clocked.Remarks()
+    columns = _columns(source, remarks)
     time, keep = clocked.usable(
-        columns["t"], columns.values(), where=source.name, bad_stamps=options.bad_stamps, told=told, channel="t"
+        columns["t"], columns.values(), where=source.name, bad_stamps=options.bad_stamps, remarks=remarks, channel="t"
     )
     columns = {name: values[keep] for name, values in columns.items()}
     _plausible(columns, source)
@@ -106,13 +106,13 @@ def read(source: Source, options: Options) -> Flight:
             NAME,
             VERSION,
             vehicle=VEHICLE,
-            notes=(*notes, *told.notes, *checks.constant_notes(motors)),
-            damage=tuple(told.damage),
+            notes=(*notes, *remarks.notes, *checks.constant_notes(motors)),
+            damage=tuple(remarks.damage),
         ),
     )
 
 
-def _columns(source: Source, told: clocked.Remarks) -> dict[str, Array]:
+def _columns(source: Source, remarks: clocked.Remarks) -> dict[str, Array]:
     """The columns that are used, as numbers, every one finite."""
     rows = [row for row in tables.rows_of(source.text or "", where=source.name, delimiter=",") if any(row)]
     head = rows[0] if rows else []
@@ -126,7 +126,7 @@ def _columns(source: Source, told: clocked.Remarks) -> dict[str, Array]:
         )
     wide = len(head)
     data, lines = even_rows(
-        rows[1:], range(2, len(rows) + 1), low=wide, high=wide, where=source.name, told=told, again=[head]
+        rows[1:], range(2, len(rows) + 1), low=wide, high=wide, where=source.name, remarks=remarks, again=[head]
     )
     columns, faults = dict[str, Array](), Faults(source.name)
     for name in _COLUMNS:

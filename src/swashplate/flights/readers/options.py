@@ -115,8 +115,8 @@ def with_units(flight: Flight, given: Mapping[str, str], *, where: str) -> Fligh
                 changed = (data[name] * float(factor)).assign_attrs({**data[name].attrs, LOGGED_UNIT: unit})
                 streams[stream] = data.assign({name: changed})
         notes.append(f"{name}: taken in {unit}, which was given, and not in {before}, as the log has it")
-    told = replace(flight.provenance, notes=(*flight.provenance.notes, *notes))
-    return replace(flight.with_streams(streams), provenance=told)
+    noted = replace(flight.provenance, notes=(*flight.provenance.notes, *notes))
+    return replace(flight.with_streams(streams), provenance=noted)
 
 
 def unit_to_give(flight: Flight, name: str, *, sign: str, looks_like: str = "") -> str:
@@ -128,13 +128,13 @@ def unit_to_give(flight: Flight, name: str, *, sign: str, looks_like: str = "") 
         looks_like: the unit that its numbers are in; "" where its own is right.
     """
     inside = channel(name).unit
-    own = flight[name].attrs
-    logged = str(own.get(LOGGED_UNIT, "")) or inside or str(own.get("units", "")) or "1"
-    turned, plain = logged.startswith("-"), logged.removeprefix("-")
-    if looks_like and plain != inside:
+    attributes = flight[name].attrs
+    logged = str(attributes.get(LOGGED_UNIT, "")) or inside or str(attributes.get("units", "")) or "1"
+    turned, unsigned = logged.startswith("-"), logged.removeprefix("-")
+    if looks_like and unsigned != inside:
         return f"It was read as {logged}; check its unit."
     signed = "-" if turned != bool(sign) else ""
-    return f"Give --unit {name}={signed}{looks_like or plain}."
+    return f"Give --unit {name}={signed}{looks_like or unsigned}."
 
 
 _WINDOW = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d*)?)-(?P<stop>\d+(?:\.\d*)?)")

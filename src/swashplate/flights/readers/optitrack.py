@@ -95,10 +95,10 @@ def read(source: Source, options: Options) -> Flight:
     names = list(bodies)
     name = names[mocap.choose(names, options.body, where=where)]
     columns = bodies[name]
-    told = clocked.Remarks()
+    remarks = clocked.Remarks()
     under = range(axes_row + 2, len(rows) + 1)
     # Blank cells at a row's end may be left out: the body was not seen. More cells than heads are another layout.
-    data, lines = even_rows(rows[axes_row + 1 :], under, low=2, high=len(rows[axes_row]), where=where, told=told)
+    data, lines = even_rows(rows[axes_row + 1 :], under, low=2, high=len(rows[axes_row]), where=where, remarks=remarks)
 
     def read_columns(quantity: str, letters: str) -> Array:
         missing = [axis for axis in letters if (quantity, axis) not in columns]
@@ -140,5 +140,5 @@ def read(source: Source, options: Options) -> Flight:
         world_axes=WORLD_AXES,
         body_axes=BODY_AXES,
         notes=notes,
-        told=told,
+        remarks=remarks,
     )

@@ -73,7 +73,7 @@ def read(source: Source, options: Options) -> Flight:
     log = dataflash.messages(source.content)
     clock = log.get("TIME") or MessageTable({}, np.zeros(0, np.int64))
     (first, last), said = clocked.longest_run([(clock.place, clock.number("StartTime") / 1e6)])
-    told = clocked.Remarks(list(log.notes), [*log.damage, *filter(None, (said,))])
+    remarks = clocked.Remarks(list(log.notes), [*log.damage, *filter(None, (said,))])
     clock = clock.rows((clock.place >= first) & (clock.place < last))
     streams: dict[str, xr.Dataset] = {}
     for name, (stream_name, fields) in _MESSAGES.items():
@@ -83,22 +83,22 @@ def read(source: Source, options: Options) -> Flight:
         table = table.rows((table.place > clock.place[0]) & (table.place < last))
         present = {field: place for field, place in fields.items() if field in table.columns}
         columns = {channel: (table.number(field), unit) for field, (channel, unit) in present.items()}
-        made = clocked.made_stream(stream_name, _stamps(table, clock), columns, told=told)
-        if made is not None:
-            streams[stream_name] = made
+        data = clocked.made_stream(stream_name, _stamps(table, clock), columns, remarks=remarks)
+        if data is not None:
+            streams[stream_name] = data
     if not streams:
         raise FlightError(
             f"holds no flight: no known message has two samples after a TIME message ({len(clock)} of these).",
             where=source.name,
             hint="Copy the log again.",
         )
-    told.notes += _remarks(log, streams)
+    remarks.notes += _remarks(log, streams)
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=_firmware(log),
-        notes=tuple(told.notes),
-        damage=tuple(told.damage),
+        notes=tuple(remarks.notes),
+        damage=tuple(remarks.damage),
         parameters=_parameters(log),
         events=_states(log, clock),
     )

@@ -116,18 +116,18 @@ def read(
         bad_stamps=bad_stamps,
         log=number if log is None else log,
     )
-    flight = _with_limits(_whole(datasets.locate(file), options))
+    flight = _with_limits(_entire(datasets.locate(file), options))
     return flight if window is None else cut(flight, *window, where=file)
 
 
 def _with_limits(flight: Flight) -> Flight:
     """The flight, with what lies beyond the schema's limits among the damage (once: a saved flight may say it)."""
     origin = flight.provenance
-    told = tuple(text for text in checks.beyond_limits(flight) if text not in origin.damage)
-    return replace(flight, provenance=replace(origin, damage=(*origin.damage, *told))) if told else flight
+    beyond = tuple(text for text in checks.beyond_limits(flight) if text not in origin.damage)
+    return replace(flight, provenance=replace(origin, damage=(*origin.damage, *beyond))) if beyond else flight
 
 
-def _whole(path: str | os.PathLike[str], options: Options) -> Flight:
+def _entire(path: str | os.PathLike[str], options: Options) -> Flight:
     """One log of a file from its first sample to its last."""
     source = open_source(path)
     no_log.refuse(source)

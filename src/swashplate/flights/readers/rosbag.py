@@ -65,28 +65,30 @@ def read(source: Source, options: Options) -> Flight:
     body = frames.axes(options.body_axes or _BODY, where=source.name)
     world = frames.axes(options.world_axes or _WORLD, where=source.name)
     topics, counts, begin, damage = _received(source)
-    told = clocked.Remarks(damage=damage)
+    remarks = clocked.Remarks(damage=damage)
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
-    for topic, received in _one_run(topics, told).items():
+    for topic, received in _one_run(topics, remarks).items():
         name = re.sub(r"\W+", "_", topic.strip("/")) or "topic"
         columns = _columns(received.numbers, name, body=body, world=world)
         named = {c if c not in taken else f"{c}_{name}": value for c, value in columns.items()}
-        made = clocked.made_stream(name, received.time, named, told=told)
-        if made is not None and name not in streams:
-            streams[name] = made
-            taken |= set(map(str, made.data_vars))
+        data = clocked.made_stream(name, received.time, named, remarks=remarks)
+        if data is not None and name not in streams:
+            streams[name] = data
+            taken |= set(map(str, data.data_vars))
     if not streams:
         listed = ", ".join(f"{topic} ({kind})" for topic, kind in counts) or "none"
         raise FlightError(
             f"holds no flight: no topic of a known type has two messages; its topics are {listed}"
-            f"{''.join(f'; {words}' for words in damage)}.",
+            f"{''.join(f'; {text}' for text in damage)}.",
             where=source.name,
             hint="Record poses, odometry, inertial sensors, sticks or servo commands.",
         )
     by_topic = {f"{topic} [{kind}]": n for (topic, kind), n in counts.items()}
-    told.notes += clocked.unread(by_topic, [f"{topic} [{kind}]" for topic, kind in counts if kind in TYPES])
-    said = source.provenance(NAME, VERSION, notes=tuple(told.notes), damage=tuple(told.damage), epoch=begin * 1e-9)
+    remarks.notes += clocked.unread(by_topic, [f"{topic} [{kind}]" for topic, kind in counts if kind in TYPES])
+    said = source.provenance(
+        NAME, VERSION, notes=tuple(remarks.notes), damage=tuple(remarks.damage), epoch=begin * 1e-9
+    )
     return Flight(streams, said)
 
 
@@ -103,12 +105,12 @@ class _Topic:
         return _Topic(self.place[keep], self.time[keep], numbers)
 
 
-def _one_run(topics: dict[str, _Topic], told: clocked.Remarks) -> dict[str, _Topic]:
+def _one_run(topics: dict[str, _Topic], remarks: clocked.Remarks) -> dict[str, _Topic]:
     """The topics in the longest run between clock resets; nodes may have clocks of their own."""
     (first, last), said = clocked.longest_run([(topic.place, topic.time) for topic in topics.values()])
     if not said:
         return topics
-    told.damage.append(said)
+    remarks.damage.append(said)
     cut = {name: topic.cut((topic.place >= first) & (topic.place < last)) for name, topic in topics.items()}
     return {name: topic for name, topic in cut.items() if topic.place.size}
 
@@ -132,37 +134,37 @@ def _received(
     counts: dict[tuple[str, str], int] = {}
     begin, damage = 0, list[str]()
     with scratch_folder() if source.path.is_dir() else nullcontext() as scratch:
-        for told, content in foreign.frames("rosbag", source.path, size=source.size, scratch=scratch, every=every):
-            if "topic" in told:
-                table = np.frombuffer(content).reshape(-1, 2 + len(told["names"]))
-                numbers = {name: table[:, 2 + k].copy() for k, name in enumerate(told["names"])}
-                topics[told["topic"]] = _Topic(table[:, 0].astype(np.int64), table[:, 1].copy(), numbers)
-            elif told:
-                counts = {(topic, kind): n for topic, kind, n in told["counts"]}
-                begin, damage = told["begin"], told["damage"]
+        for head, content in foreign.frames("rosbag", source.path, size=source.size, scratch=scratch, every=every):
+            if "topic" in head:
+                table = np.frombuffer(content).reshape(-1, 2 + len(head["names"]))
+                numbers = {name: table[:, 2 + k].copy() for k, name in enumerate(head["names"])}
+                topics[head["topic"]] = _Topic(table[:, 0].astype(np.int64), table[:, 1].copy(), numbers)
+            elif head:
+                counts = {(topic, kind): n for topic, kind, n in head["counts"]}
+                begin, damage = head["begin"], head["damage"]
     return topics, counts, begin, damage
 
 
 def _columns(numbers: Mapping[str, Array], topic: str, *, body: Array, world: Array) -> dict[str, tuple[Array, str]]:
     """Channels with their units in FRD and NED from a topic's numbers, NaN where a message lacks one."""
     raw = dict(numbers)
-    made: dict[str, tuple[Array, str]] = {}
+    columns: dict[str, tuple[Array, str]] = {}
     for prefix, channels, unit, turn in _vectors(body, world):
         parts = [raw.pop(f"{prefix}{axis}", None) for axis in "xyz"]
         if all(part is not None for part in parts):
             turned = frames.to_local(np.stack([p for p in parts if p is not None], axis=-1), turn)
-            made |= {channel: (values, unit) for channel, values in zip(channels, turned.T, strict=True)}
+            columns |= {channel: (values, unit) for channel, values in zip(channels, turned.T, strict=True)}
     if all(name in raw for name in QUATERNION):
         q = np.stack([raw.pop(name) for name in QUATERNION], axis=-1)
         if np.any(q != 0.0):
             attitude = frames.attitude(q, world=world, body=body)
-            made |= {name: (values, "1") for name, values in zip(QUATERNION, attitude.T, strict=True)}
+            columns |= {name: (values, "1") for name, values in zip(QUATERNION, attitude.T, strict=True)}
     for name, values in raw.items():
         family = name.partition("_")[0]
         channel = name.replace("value", topic, 1) if family == "value" else name
         if family not in ("rcin", "rcout") or np.any(values > 0.0):
-            made[channel] = (values, _UNITS.get(family, ""))
-    return made
+            columns[channel] = (values, _UNITS.get(family, ""))
+    return columns
 
 
 def _vectors(body: Array, world: Array) -> Iterator[tuple[str, tuple[str, str, str], str, Array]]:

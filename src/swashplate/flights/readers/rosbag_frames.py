@@ -41,8 +41,8 @@ def frames(path: Path, *, disk: int = 0, every: bool = False) -> Iterator[Frame]
     for topic, received in rows.items():
         names = list(dict.fromkeys(name for row in received for name in row))
         table = np.array([[row.get(name, np.nan) for name in names] for row in received])
-        whole = np.hstack([np.array(stamps[topic]), table.reshape(len(received), len(names))])
-        yield {"topic": topic, "names": names, "bytes": whole.nbytes}, whole.tobytes()
+        stamped = np.hstack([np.array(stamps[topic]), table.reshape(len(received), len(names))])
+        yield {"topic": topic, "names": names, "bytes": stamped.nbytes}, stamped.tobytes()
     yield {"counts": [[*key, n] for key, n in counts.items()], "begin": begin, "damage": damage}, b""
     yield {}, b""
 
@@ -107,19 +107,19 @@ def _collected(path: Path, *, every: bool) -> Collected:
                 if limit_met(error):
                     raise
                 read_so_far = sum(map(len, rows.values()))
-                damage.append(f"the bag is damaged after {read_so_far} messages: {_words(error)}")
+                damage.append(f"the bag is damaged after {read_so_far} messages: {_sentence(error)}")
     except Exception as error:
         if limit_met(error):
             raise
         if not rows:
             raise FlightError(
-                f"does not open as a ROS bag: {_words(error)}.",
+                f"does not open as a ROS bag: {_sentence(error)}.",
                 hint="It was perhaps not closed: mend it with `rosbag reindex` (ros2 bag reindex), or copy it again.",
             ) from error
     return stamps, rows, counts, begin, damage
 
 
-def _words(error: Exception) -> str:
+def _sentence(error: Exception) -> str:
     return (str(error) or type(error).__name__).strip().rstrip(".")
 
 

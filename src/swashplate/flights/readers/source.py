@@ -65,14 +65,14 @@ class Source:
             control = sum(byte < 32 and byte not in b"\t\n\r\f" for byte in self.content[:4096])
             return None if control else self.content.decode("latin-1")
 
-    def provenance(self, reader: str, version: str, **found: Any) -> Provenance:
-        """The file's name and hash, the reader's, and what it `found` (vehicle, notes, damage, parameters, events)."""
+    def provenance(self, reader: str, version: str, **facts: Any) -> Provenance:
+        """The file's name and hash, the reader's, and further `facts` (vehicle, notes, damage, parameters, events)."""
         return Provenance(
             source=self.path.name,
             sha256=self.sha256,
             reader=reader,
             reader_version=version,
-            **found,
+            **facts,
         )
 
 

@@ -66,7 +66,7 @@ def from_header(table: ColumnTable, faults: Faults) -> dict[str, Column]:
     for index, (name, unit) in enumerate(named_columns(table)):
         if not name:
             if any(table.texts(index)):
-                table.told.notes.append(f"column {index + 1} has no name: not read")
+                table.remarks.notes.append(f"column {index + 1} has no name: not read")
         elif name in columns:
             faults.add(
                 FlightError(

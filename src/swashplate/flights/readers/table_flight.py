@@ -55,7 +55,7 @@ def flight_of(table: ColumnTable, source: Source, options: Options, *, reader: s
     Raises:
         FlightError, UnitError: naming the file, every channel or line that is wrong, what was found and what to do.
     """
-    faults, told = Faults(source.name), table.told
+    faults, remarks = Faults(source.name), table.remarks
     chosen = _chosen(table, options, faults)
     given = _given_units(options, chosen)
     units = {name: given.get(name, place.unit or _USUAL.get(name)) for name, place in chosen.channels.items()}
@@ -63,21 +63,23 @@ def flight_of(table: ColumnTable, source: Source, options: Options, *, reader: s
     table_columns.check_units(units, table.where, faults)
     channels, labels = _numbers(table, chosen.channels, units, faults, mapped=bool(options.mapping))
     stamps = _stamps(table, chosen, given, options, faults)
-    faults.refuse(beside=told.notes)
+    faults.refuse(beside=remarks.notes)
     if not channels or stamps is None:
         raise FlightError("there is no channel beside time.", where=source.name, hint="Export the channels too.")
     streams: dict[str, xr.Dataset] = {}
     with faults.gathered():
-        streams = streams_of(stamps, channels, labels, where=source.name, bad_stamps=options.bad_stamps, told=told)
-    faults.refuse(beside=[*told.notes, *told.damage])
+        streams = streams_of(
+            stamps, channels, labels, where=source.name, bad_stamps=options.bad_stamps, remarks=remarks
+        )
+    faults.refuse(beside=[*remarks.notes, *remarks.damage])
     for data in streams.values():
         for name in map(str, data.data_vars):
             if units[name] and units[name] != data[name].attrs.get("units"):
                 data[name].attrs[LOGGED_UNIT] = units[name]
-    told.notes += table_columns.near_misses(list(channels))
-    told.notes += checks.constant_notes({n: v[np.isfinite(v)] for n, v in channels.items()})
+    remarks.notes += table_columns.near_misses(list(channels))
+    remarks.notes += checks.constant_notes({n: v[np.isfinite(v)] for n, v in channels.items()})
     provenance = source.provenance(
-        reader, version, notes=tuple(told.notes), damage=tuple(told.damage), epoch=stamps.zero
+        reader, version, notes=tuple(remarks.notes), damage=tuple(remarks.damage), epoch=stamps.zero
     )
     return Flight(streams, provenance)
 
@@ -85,12 +87,12 @@ def flight_of(table: ColumnTable, source: Source, options: Options, *, reader: s
 # ---- which columns, in which units -----------------------------------------------------------------------------------
 def _chosen(table: ColumnTable, options: Options, faults: Faults) -> _Chosen:
     """What the header or the mapping names; a mapping that says nothing of time leaves it to the header."""
-    own = table_columns.from_header(table, Faults(table.where) if options.mapping else faults)
-    name = table_time.time_name(own) or ""
-    time = own.get(name)
+    named = table_columns.from_header(table, Faults(table.where) if options.mapping else faults)
+    name = table_time.time_name(named) or ""
+    time = named.get(name)
     if time is not None:
         unit = time.unit if time.unit is not None else table_time.named_unit(name)
-        time = replace(time, unit=unit, date=table_time.date_beside(name, own))
+        time = replace(time, unit=unit, date=table_time.date_beside(name, named))
     if options.mapping:
         mapped = table_columns.from_mapping(options, table, faults)
         if "time" in options.mapping["channels"]:
@@ -98,7 +100,7 @@ def _chosen(table: ColumnTable, options: Options, faults: Faults) -> _Chosen:
             return _Chosen(mapped, asked, "time", lost=asked is None)
         return _Chosen(mapped, time if options.mapping.get("rate") is None else None, "time")
     left = {time.index, time.date} if time is not None else set[int | None]()
-    return _Chosen({n: column for n, column in own.items() if column.index not in left}, time, name)
+    return _Chosen({n: column for n, column in named.items() if column.index not in left}, time, name)
 
 
 def _given_units(options: Options, chosen: _Chosen) -> dict[str, str]:
@@ -179,7 +181,7 @@ def _numbers(
     for names, what in ((text, "no numbers"), (blank, "nothing")):
         if names:
             hold = "holds" if len(names) == 1 else "hold"
-            table.told.notes.append(f"{', '.join(names)} {hold} {what}: not read")
+            table.remarks.notes.append(f"{', '.join(names)} {hold} {what}: not read")
     return channels, {name: label for name, label in labels.items() if not is_known(name)}
 
 
@@ -191,35 +193,35 @@ def streams_of(
     *,
     where: str,
     bad_stamps: str,
-    told: Remarks,
+    remarks: Remarks,
 ) -> dict[str, xr.Dataset]:
     """The streams of a table's channels: "log", and "log_2", ... for those with other blanks.
 
     Args:
         channels: values inside by channel, NaN where a cell is blank, shape (n,).
         labels: units of channels that the schema does not know.
-        told: takes what was left out.
+        remarks: takes what was left out.
     """
     timed = np.isfinite(stamps.time)
     if not timed.all():
-        told.damage.append(f"{share(int((~timed).sum()), timed.size, 'rows')} are lost: their time is blank")
+        remarks.damage.append(f"{share(int((~timed).sum()), timed.size, 'rows')} are lost: their time is blank")
     time, keep = clocked.usable(
         stamps.time[timed],
         [values[timed] for values in channels.values()],
         where=where,
         bad_stamps=bad_stamps,
-        told=told,
+        remarks=remarks,
         tick=stamps.tick,
         turns=stamps.turns,
     )
     values = {name: column[timed][keep] for name, column in channels.items()}
     streams: dict[str, xr.Dataset] = {}
-    for names, there in _together(values, told):
+    for names, there in _together(values, remarks):
         if there.sum() < 2:
-            told.notes.append(f"{', '.join(names)}: less than two numbers: not read")
+            remarks.notes.append(f"{', '.join(names)}: less than two numbers: not read")
             continue
         if streams or there.sum() < (1.0 - _FEW) * there.size:
-            _tell_blanks(names, time, there, told)
+            _tell_blanks(names, time, there, remarks)
         chosen = {name: values[name][there] for name in names}
         called = "log" if not streams else f"log_{len(streams) + 1}"
         streams[called] = stream(time[there], chosen, {n: labels[n] for n in names if n in labels})
@@ -230,36 +232,36 @@ def streams_of(
     return streams
 
 
-def _together(values: Mapping[str, Array], told: Remarks) -> list[tuple[list[str], clocked.Mask]]:
+def _together(values: Mapping[str, Array], remarks: Remarks) -> list[tuple[list[str], clocked.Mask]]:
     """Channels that go into one stream, and the rows in which they have numbers, the fullest first."""
     finite = {name: np.isfinite(column) for name, column in values.items()}
     n = next(iter(finite.values())).size
-    joint, whole = np.ones(n, dtype=np.bool_), set[str]()
+    joint, in_first = np.ones(n, dtype=np.bool_), set[str]()
     for name in sorted(finite, key=lambda name: -int(finite[name].sum())):
         both = joint & finite[name]
         if n - both.sum() <= _FEW * n:
             joint = both
-            whole.add(name)
+            in_first.add(name)
     if lost := int(n - joint.sum()):
         missing = ", ".join(
-            f"{name} ({n - finite[name].sum()})" for name in values if name in whole and not finite[name].all()
+            f"{name} ({n - finite[name].sum()})" for name in values if name in in_first and not finite[name].all()
         )
-        told.damage.append(f"{share(lost, n, 'rows')} are lost: a number is missing in {missing}")
+        remarks.damage.append(f"{share(lost, n, 'rows')} are lost: a number is missing in {missing}")
     groups: dict[bytes, list[str]] = {}
     for name in values:
-        if name not in whole:
+        if name not in in_first:
             groups.setdefault(np.packbits(finite[name]).tobytes(), []).append(name)
     apart = [(names, finite[names[0]]) for names in groups.values()]
-    first = [([name for name in values if name in whole], joint)] if whole else []
+    first = [([name for name in values if name in in_first], joint)] if in_first else []
     return [*first, *sorted(apart, key=lambda group: -int(group[1].sum()))]
 
 
-def _tell_blanks(names: list[str], time: Array, there: clocked.Mask, told: Remarks) -> None:
+def _tell_blanks(names: list[str], time: Array, there: clocked.Mask, remarks: Remarks) -> None:
     """What many blank cells mean: a rate of its own, or samples that are missing."""
     count = int((~there).sum())
     step, usual = float(np.median(np.diff(time[there]))), float(np.median(np.diff(time)))
     cells = f"{', '.join(names)}: {share(count, time.size, 'cells')} are blank"
     if step > _SLOWER * usual:
-        told.notes.append(f"{cells}: a stream of its own, at {1.0 / step:.4g} Hz")
+        remarks.notes.append(f"{cells}: a stream of its own, at {1.0 / step:.4g} Hz")
     else:
-        told.damage.append(f"{cells}: these samples are lost")
+        remarks.damage.append(f"{cells}: these samples are lost")

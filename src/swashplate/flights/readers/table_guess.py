@@ -116,12 +116,12 @@ _WHOLE = {
 _ENDS = frozenset((*_RATES, *_ANGLES, *_COMMANDS))
 
 
-def _words(name: str) -> list[str]:
+def _name_parts(name: str) -> list[str]:
     """A column's name as small words: "RollRate" and "roll_rate" are roll, rate; "gyroADC[0]" is gyro, adc, 0."""
-    plain = name.translate(str.maketrans("äöüÄÖÜéèêñ", "aouAOUeeen"))
-    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
+    ascii_name = name.translate(str.maketrans("äöüÄÖÜéèêñ", "aouAOUeeen"))
+    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", ascii_name)
     parted = re.sub(r"(?<=[A-Za-z])(?=\d)", " ", parted)
-    words = []
+    parts = []
     for word in re.findall(r"[a-z]+|\d+", parted.lower()):
         begin = next(
             (
@@ -132,8 +132,8 @@ def _words(name: str) -> list[str]:
             ),
             "",
         )
-        words += [begin, word[len(begin) :]] if begin else [word]  # "rollrate", "nickwinkel"
-    return words
+        parts += [begin, word[len(begin) :]] if begin else [word]  # "rollrate", "nickwinkel"
+    return parts
 
 
 def _of_unit(unit: str) -> str:
@@ -149,41 +149,41 @@ def _known(name: str, kind: str) -> tuple[str, str]:
     small = name.strip().lower()
     if is_known(small):
         return small, "its name"
-    words = _words(name)
-    joined = "".join(word for word in words if not word.isdigit())
-    for part in (joined, *reversed(words)):
+    parts = _name_parts(name)
+    joined = "".join(word for word in parts if not word.isdigit())
+    for part in (joined, *reversed(parts)):
         if part in _WHOLE and not (part == "rpm" and kind not in ("", "rate")):
             return _WHOLE[part], "its name"
     quaternion = re.fullmatch(r"(?:.*[^a-z])?q(?:uat(?:ernion)?)?[ _.]*([wxyz])", small)
     if quaternion:
         return f"q{quaternion[1]}", "its name"
-    axis = next((axis for axis, names in _AXES.items() for word in words if word in names), "")
+    axis = next((axis for axis, names in _AXES.items() for word in parts if word in names), "")
     said = next(
         (
             what
             for what, names in (("rate", _RATES), ("command", _COMMANDS), ("angle", _ANGLES))
-            for word in words
+            for word in parts
             if word in names and (len(word) > 2 or axis)
         ),
         "",
     )
-    if words[-1:] and words[-1] in ("p", "q", "r") and kind in ("", "rate") and said == "rate":
-        return words[-1], "its name"
-    moved = "command" if any(word in _SURFACES for word in words) else ""
-    what = kind if kind in _BY_AXIS else said or moved
+    if parts[-1:] and parts[-1] in ("p", "q", "r") and kind in ("", "rate") and said == "rate":
+        return parts[-1], "its name"
+    surface = "command" if any(word in _SURFACES for word in parts) else ""
+    what = kind if kind in _BY_AXIS else said or surface
     if axis and not what:
         what = "command" if axis == "collective" else "angle"
     if axis and (name_of := _BY_AXIS.get(what, {}).get(axis)):
         return name_of, "its name" + (" and unit" if kind else "")
-    return _by_letter(words, kind)
+    return _by_letter(parts, kind)
 
 
-def _by_letter(words: Sequence[str], kind: str) -> tuple[str, str]:
+def _by_letter(parts: Sequence[str], kind: str) -> tuple[str, str]:
     """The part of a vector: "gyro x", "ang vel z", "xyz[1]" with a rate's unit."""
-    if not words:
+    if not parts:
         return "", ""
-    last, before = words[-1], words[:-1]
-    if len(words) == 1 and len(last) == 2 and last[1] in "xyz":  # wx, ay, vz, tx
+    last, before = parts[-1], parts[:-1]
+    if len(parts) == 1 and len(last) == 2 and last[1] in "xyz":  # wx, ay, vz, tx
         before, last = [last[0]], last[1]
     joined = "".join(before)
     for what, names in (("rate", (*_RATES, "angvel")), ("force", _FORCES), ("speed", _SPEEDS), ("place", _PLACES)):
@@ -241,32 +241,32 @@ def _scaled(guess: Guess, values: Array, unit: str, family: float) -> Guess:
 def guesses(table: ColumnTable) -> list[Guess]:
     """A guess for each column of a table; a channel is given to the first column that may be it."""
     named = table_columns.named_columns(table) if table.header else [("", None)] * table.width
-    made, taken, numbers = [], set[str](), dict[int, Array]()
+    listed, taken, numbers = [], set[str](), dict[int, Array]()
     clock = _time(table, [name for name, _ in named])
     for index, (name, said) in enumerate(named[:_MANY]):
         unit = said or ""
         if index == clock:
-            made.append(_stamped(table, Guess(index, name, "time", unit or table_time.named_unit(name) or "")))
+            listed.append(_stamped(table, Guess(index, name, "time", unit or table_time.named_unit(name) or "")))
             continue
         try:
             numbers[index] = table.numbers(index, name=name or str(index + 1))
         except SwashError:
-            made.append(Guess(index, name, unit=unit, why="no numbers"))
+            listed.append(Guess(index, name, unit=unit, why="no numbers"))
             continue
         known, why = _known(name, _of_unit(unit)) if name else ("", "")
         other = bool(unit) and units.is_known(unit) and known and units.inside_unit(unit) != channel(known).unit
         if not known or known in taken or other:
-            made.append(Guess(index, name, unit=unit))
+            listed.append(Guess(index, name, unit=unit))
             continue
         taken.add(known)
-        made.append(Guess(index, name, known, unit if units.is_known(unit) else "", why=why))
+        listed.append(Guess(index, name, known, unit if units.is_known(unit) else "", why=why))
     sizes: dict[str, float] = {}
-    for guess in made:
+    for guess in listed:
         if guess.channel not in ("", "time") and not guess.unit:
             family = channel(guess.channel).unit
             sizes[family] = max(sizes.get(family, 0.0), _size(numbers[guess.index]))
     done = []
-    for guess in made:
+    for guess in listed:
         if guess.channel not in ("", "time"):
             family = sizes.get(channel(guess.channel).unit, 0.0)
             unit = guess.unit or _unit_by_size(guess.channel, family)

@@ -48,7 +48,7 @@ class ColumnTable(Protocol):
         """What the file calls each row, for messages."""
 
     @property
-    def told(self) -> Remarks:
+    def remarks(self) -> Remarks:
         """What was left out."""
 
     @property
@@ -73,7 +73,7 @@ class DelimitedTable:
     """A table of text, with rows that fit its header.
 
     Attributes:
-        where, header, units, lines, told: as in `ColumnTable`.
+        where, header, units, lines, remarks: as in `ColumnTable`.
         rows: cells of the data.
         preface: the rows before the header.
     """
@@ -84,7 +84,7 @@ class DelimitedTable:
     rows: Rows
     lines: Sequence[int]
     preface: Rows = ()
-    told: Remarks = field(default_factory=Remarks)
+    remarks: Remarks = field(default_factory=Remarks)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -133,7 +133,7 @@ def read_table(text: str, *, where: str, mapping: Mapping[str, Any]) -> Delimite
     if delimiter is not None and not (isinstance(delimiter, str) and len(delimiter) == 1):
         raise FlightError(f"delimiter = {delimiter!r} in the mapping is not one character.", where=where)
     headed = mapping.get("header", True) is not False
-    told = Remarks()
+    remarks = Remarks()
     quick = tables.NumberRows.of(text, delimiter=delimiter)
     if quick is not None:
         top = tables.rows_of("\n".join(quick.head), where=where, delimiter=quick.mark)
@@ -144,7 +144,9 @@ def read_table(text: str, *, where: str, mapping: Mapping[str, Any]) -> Delimite
             and (head.cells or not headed)
             and (not head.cells or len(_trimmed(head.cells)) <= width <= len(head.cells))
         ):
-            return _told(head, top, quick, range(len(top) + 1, len(top) + 1 + len(quick)), where, told, quick.commas)
+            return _table_with(
+                head, top, quick, range(len(top) + 1, len(top) + 1 + len(quick)), where, remarks, quick.commas
+            )
     rows = tables.rows_of(text, where=where, delimiter=delimiter)
     head = _head(rows, headed=headed)
     if head.names < 0 and head.data == len(rows):
@@ -162,20 +164,20 @@ def read_table(text: str, *, where: str, mapping: Mapping[str, Any]) -> Delimite
         low = high = max(map(len, data[:1]), default=0)
     again = [list(head.cells), *([rows[head.units]] if head.units >= 0 else [])]
     kept, lines = even_rows(
-        data, range(head.data + 1, len(rows) + 1), low=low, high=high, again=again, where=where, told=told
+        data, range(head.data + 1, len(rows) + 1), low=low, high=high, again=again, where=where, remarks=remarks
     )
-    return _told(head, rows[: head.data], kept, lines, where, told, commas)
+    return _table_with(head, rows[: head.data], kept, lines, where, remarks, commas)
 
 
-def _told(
-    head: _Head, top: Rows, rows: Rows, lines: Sequence[int], where: str, told: Remarks, commas: bool
+def _table_with(
+    head: _Head, top: Rows, rows: Rows, lines: Sequence[int], where: str, remarks: Remarks, commas: bool
 ) -> DelimitedTable:
-    own = (head.names, head.units)
-    preface = [row for i, row in enumerate(top) if any(row) and not _is_comment(row) and i not in own]
+    of_head = (head.names, head.units)
+    preface = [row for i, row in enumerate(top) if any(row) and not _is_comment(row) and i not in of_head]
     if commas:
-        told.notes.append("decimals are written with commas")
+        remarks.notes.append("decimals are written with commas")
     given = top[head.units] if head.units >= 0 else ()
-    return DelimitedTable(where, head.cells, given, rows, lines, preface, told)
+    return DelimitedTable(where, head.cells, given, rows, lines, preface, remarks)
 
 
 def _is_comment(row: Sequence[str]) -> bool:
@@ -254,7 +256,7 @@ def even_rows(
     low: int,
     high: int,
     where: str,
-    told: Remarks,
+    remarks: Remarks,
     again: Sequence[Sequence[str]] = (),
 ) -> tuple[Rows, Sequence[int]]:
     """The rows that fit the header, and their lines.
@@ -263,7 +265,7 @@ def even_rows(
         rows, lines: the data with their line numbers.
         low, high: fewest and most cells of a row; blank cells at its end do not count.
         again: the header's own rows: where they stand again in the middle, nothing is lost.
-        told: takes what was left out.
+        remarks: takes what was left out.
 
     Raises:
         FlightError: where the first rows do not fit.
@@ -298,20 +300,20 @@ def even_rows(
         )
     if torn:
         first = torn[0]
-        told.damage.append(
+        remarks.damage.append(
             f"{share(len(torn), len(data), 'rows')} are lost: they are torn (line {lines[first]} has "
             f"{_cells(cells[first])}, the header {wanted})"
         )
     if end < len(data):
         i = data[end]
         why = f"{_cells(cells[i])}, the header {wanted}" if not fits(i) else "other names"
-        told.damage.append(
+        remarks.damage.append(
             f"{share(len(data) - end, len(data), 'rows')} are lost: line {lines[i]} has {why}, so the columns have "
             "changed there, and only the rows before it were read"
         )
     if repeats:
         many = "1 line" if len(repeats) == 1 else f"{len(repeats)} lines, the first"
-        told.notes.append(f"the header stands again in {many} ({lines[min(repeats)]}): passed over")
+        remarks.notes.append(f"the header stands again in {many} ({lines[min(repeats)]}): passed over")
     return kept, kept_lines
 
 

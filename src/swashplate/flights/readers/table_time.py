@@ -61,8 +61,8 @@ def time_name(names: Iterable[str]) -> str | None:
     every = list(names)
     others = [name for name in every if name.lower() == "time"]
     asked = [*_PLAIN[:1], *(others if len(others) == 1 else ()), *_PLAIN[1:]]
-    if (plain := next((name for name in asked if name in every), None)) is not None:
-        return plain
+    if (exact := next((name for name in asked if name in every), None)) is not None:
+        return exact
     like = [name for name in every if name.lower() in _OTHERS]
     return like[0] if len(like) == 1 and not others else None
 
@@ -149,8 +149,8 @@ def _counted(table: ColumnTable, place: Column, unit: str | None) -> Stamps:
             channel="time",
             hint="For example: time [s since 2026-03-05T14:20:00Z].",
         )
-    plain = since["unit"] if since else _unit_of(raw[~blank], unit, table)
-    tick = float(units.to_inside(1.0, plain, expected="s", channel="time", where=table.where))
+    counted_in = since["unit"] if since else _unit_of(raw[~blank], unit, table)
+    tick = float(units.to_inside(1.0, counted_in, expected="s", channel="time", where=table.where))
     with np.errstate(over="ignore"):  # what overflows is refused below, by name
         rough = (raw * place.factor + place.offset) * tick
     checks.finite(rough[~blank], channel="time", where=table.where)
@@ -184,7 +184,7 @@ def _unit_of(raw: Array, unit: str | None, table: ColumnTable) -> str:
             hint="Write it behind the name, as 'time [s]', or give what it is, as --unit time=s (in Python "
             "units={'time': 's'}).",
         )
-    table.told.notes.append(
+    table.remarks.notes.append(
         f"time has no unit: taken in {likely[0]}, in which the samples come at {rates[likely[0]]:.4g} Hz; in any other "
         f"it were below {_RATES[0]:g} Hz or above {_RATES[1] / 1e3:g} kHz. If that is wrong, give --unit time=UNIT"
     )

@@ -96,13 +96,13 @@ _TOLD = ("HEARTBEAT", "STATUSTEXT", "PARAM_VALUE")
 
 def recognises(source: Source) -> bool:
     """Whether some frames follow each other, each behind a time that goes on."""
-    end, before, seen = 0, 0, 0
-    while seen < _CHAIN and (frame := frame_at(source.content, end)) is not None:
+    end, before, count = 0, 0, 0
+    while count < _CHAIN and (frame := frame_at(source.content, end)) is not None:
         stamp, end = frame[0], frame[1]
-        if seen and abs(stamp - before) > _JUMP:
+        if count and abs(stamp - before) > _JUMP:
             return False
-        before, seen = stamp, seen + 1
-    return seen == _CHAIN or (seen > 0 and end == len(source.content))
+        before, count = stamp, count + 1
+    return count == _CHAIN or (count > 0 and end == len(source.content))
 
 
 def read(source: Source, options: Options) -> Flight:
@@ -113,7 +113,7 @@ def read(source: Source, options: Options) -> Flight:
         MissingLibraryError: where pymavlink is not installed.
     """
     refuse_mapping(options, "a telemetry log", where=source.name)
-    tables, told, late = message_tables(source)
+    tables, remarks, delays = message_tables(source)
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     for name, (stream_name, fields) in _MESSAGES.items():
@@ -125,10 +125,10 @@ def read(source: Source, options: Options) -> Flight:
             for field, (channel, unit, factor) in fields.items()
             if field in table.columns and channel not in taken and not _dead(channel, table.columns[field])
         }
-        made = clocked.made_stream(stream_name, table.time, columns, told=told)
-        if made is not None:
-            streams[stream_name] = made
-            taken |= set(map(str, made.data_vars))
+        data = clocked.made_stream(stream_name, table.time, columns, remarks=remarks)
+        if data is not None:
+            streams[stream_name] = data
+            taken |= set(map(str, data.data_vars))
     if not streams:
         raise FlightError(
             f"holds no flight: no known message has two samples ({', '.join(sorted(tables)) or 'none'} found).",
@@ -140,10 +140,10 @@ def read(source: Source, options: Options) -> Flight:
     if kind is not None:
         parameters["MAV_TYPE"] = float(kind)
     rate = _rate(streams)
-    told.notes += [
+    remarks.notes += [
         f"telemetry, {rate:.3g} samples a second of the fastest message: good to look at, too slow for a fit. The "
         "autopilot's own log has the rates",
-        *late,
+        *delays,
         *clocked.unread({n: len(t.place) for n, t in tables.items()}, (*_TOLD, *_MESSAGES)),
     ]
     events = (*_modes(tables.get("HEARTBEAT"), firmware), *_texts(tables.get("STATUSTEXT")))
@@ -152,8 +152,8 @@ def read(source: Source, options: Options) -> Flight:
         VERSION,
         vehicle=firmware,
         firmware=firmware,
-        notes=tuple(told.notes),
-        damage=tuple(told.damage),
+        notes=tuple(remarks.notes),
+        damage=tuple(remarks.damage),
         parameters=parameters,
         events=tuple(sorted(events, key=lambda event: event.time)),
     )
@@ -207,16 +207,16 @@ def _vehicle(tables: Mapping[str, TelemetryTable]) -> tuple[int | None, str]:
 
 def _parameters(table: TelemetryTable | None) -> dict[str, float]:
     """As they were first told; PX4 sends the bytes of whole numbers, which are left out."""
-    told: dict[str, float] = {}
+    parameters: dict[str, float] = {}
     if table is None:
-        return told
+        return parameters
     columns = table.columns
     rows = zip(columns["param_id"].tolist(), columns["param_value"].tolist(), strict=True)
     for name, value in rows:
         text = _text(name)
         if re.fullmatch(r"\w+", text) and math.isfinite(value) and not 0.0 < abs(value) < 1e-37:
-            told.setdefault(text, float(value))
-    return told
+            parameters.setdefault(text, float(value))
+    return parameters
 
 
 def _modes(table: TelemetryTable | None, firmware: str) -> Iterator[Event]:

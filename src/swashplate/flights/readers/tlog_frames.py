@@ -114,7 +114,7 @@ def _sound(content: NDArray[np.uint8], frames: _Frames, chosen: NDArray[np.int64
 def message_tables(source: Source) -> tuple[dict[str, TelemetryTable], clocked.Remarks, list[str]]:
     """Messages of the vehicle in the longest run of its clock, what is lost, and how late they came, in words."""
     dialect = library("pymavlink.dialects.v20.ardupilotmega", what="a telemetry log (.tlog)", where=source.path)
-    content, frames, told = np.frombuffer(source.content, np.uint8), _frames(source.content), clocked.Remarks()
+    content, frames, remarks = np.frombuffer(source.content, np.uint8), _frames(source.content), clocked.Remarks()
     raw: dict[int, dict[str, tuple[NDArray[np.int64], dict[str, NDArray[Any]], Mapping[str, str]]]] = {}
     broken = 0
     for kind in np.unique(frames.kind).tolist():
@@ -126,17 +126,17 @@ def message_tables(source: Source) -> tuple[dict[str, TelemetryTable], clocked.R
         broken += int(chosen.size - sound.sum())
         chosen = chosen[sound]
         for sender in np.unique(frames.sender[chosen]).tolist():
-            own = chosen[frames.sender[chosen] == sender]
-            columns = _columns(content, frames, own, message)
-            raw.setdefault(sender, {})[message.msgname] = (own, columns, dict(message.fieldunits_by_name))
+            of_sender = chosen[frames.sender[chosen] == sender]
+            columns = _columns(content, frames, of_sender, message)
+            raw.setdefault(sender, {})[message.msgname] = (of_sender, columns, dict(message.fieldunits_by_name))
     if frames.lost:
-        told.damage.append(f"{clocked.share(frames.lost, len(source.content), 'bytes')} belong to no frame")
+        remarks.damage.append(f"{clocked.share(frames.lost, len(source.content), 'bytes')} belong to no frame")
     if broken:
-        told.damage.append(f"{clocked.share(broken, frames.kind.size, 'frames')} have a wrong checksum and are lost")
-    sender = _flown(raw)
+        remarks.damage.append(f"{clocked.share(broken, frames.kind.size, 'frames')} have a wrong checksum and are lost")
+    sender = _flying_system(raw)
     if sender is None:
-        return {}, told, []
-    return _timed(raw[sender], frames, told)
+        return {}, remarks, []
+    return _timed(raw[sender], frames, remarks)
 
 
 def _columns(
@@ -151,12 +151,12 @@ def _columns(
         for name, (count, letter) in zip(message.ordered_fieldnames, letters, strict=True)
     ]
     form = np.dtype([(f[0], _NUMPY.get(f[1], f[1]), *f[2:]) for f in fields])
-    whole = np.zeros((chosen.size, form.itemsize), dtype=np.uint8)
+    padded = np.zeros((chosen.size, form.itemsize), dtype=np.uint8)
     length, header = np.minimum(frames.length[chosen], form.itemsize), frames.header[chosen]
     for size in np.unique(length).tolist():
         alike = length == size
-        whole[alike, :size] = content[header[alike][:, None] + np.arange(size)]
-    table = whole.view(form)[:, 0] if chosen.size else np.zeros(0, form)
+        padded[alike, :size] = content[header[alike][:, None] + np.arange(size)]
+    table = padded.view(form)[:, 0] if chosen.size else np.zeros(0, form)
     return {name: table[name] for name in form.names or ()}
 
 
@@ -164,7 +164,7 @@ _NUMPY = {"<b": "i1", "<B": "u1", "<h": "<i2", "<H": "<u2", "<i": "<i4", "<I": "
           "<f": "<f4", "<d": "<f8"}  # fmt: skip
 
 
-def _flown(raw: Mapping[int, Mapping[str, Any]]) -> int | None:
+def _flying_system(raw: Mapping[int, Mapping[str, Any]]) -> int | None:
     """The sender that is a vehicle's autopilot and says most; of no heartbeat the one that says most."""
 
     def said(sender: int) -> int:
@@ -182,37 +182,37 @@ def _flown(raw: Mapping[int, Mapping[str, Any]]) -> int | None:
 def _timed(
     raw: Mapping[str, tuple[NDArray[np.int64], dict[str, NDArray[Any]], Mapping[str, str]]],
     frames: _Frames,
-    told: clocked.Remarks,
+    remarks: clocked.Remarks,
 ) -> tuple[dict[str, TelemetryTable], clocked.Remarks, list[str]]:
     """The messages of the longest run, on the autopilot's clock, and in words how late they came."""
-    own = {name: columns["time_boot_ms"] / 1e3 for name, (_, columns, _) in raw.items() if "time_boot_ms" in columns}
+    timed = {name: columns["time_boot_ms"] / 1e3 for name, (_, columns, _) in raw.items() if "time_boot_ms" in columns}
     received = {name: frames.stamp[at] / 1e6 for name, (at, *_) in raw.items()}
-    stamped = own or received
+    stamped = timed or received
     place = np.concatenate([frames.place[raw[name][0]] for name in stamped])
     boot, came = (np.concatenate([times[name] for name in stamped]) for times in (stamped, received))
     order = np.argsort(place)
     place, boot, came = place[order], boot[order], came[order]
     (first, last), lost = clocked.longest_run([(place, boot)])
-    told.damage += [lost] if lost else []
+    remarks.damage += [lost] if lost else []
     inside = (place >= first) & (place < last)
     boot, came = boot[inside], came[inside]
     if not boot.size:
-        return {}, told, []
-    offset = float(np.quantile(came - boot, 0.01)) if own else float(came.min())
-    zero = 0.0 if own else offset
+        return {}, remarks, []
+    offset = float(np.quantile(came - boot, 0.01)) if timed else float(came.min())
+    zero = 0.0 if timed else offset
     tables = {}
     for name, (at, columns, units) in raw.items():
         kept = (frames.place[at] >= first) & (frames.place[at] < last)
         time = received[name] - offset
-        if name in own:
-            time = own[name] - zero
+        if name in timed:
+            time = timed[name] - zero
         elif "time_usec" in columns:  # since the start, or since 1970: only the first is this clock
             micro = columns["time_usec"] / 1e6
             good = np.abs(micro - time) < 60.0
-            time = micro if own and good.all() else time
+            time = micro if timed and good.all() else time
         tables[name] = TelemetryTable(
             frames.place[at][kept], time[kept], {k: v[kept] for k, v in columns.items()}, units
         )
-    late = np.quantile(came - boot - offset, 0.95) if own else 0.0
-    words = f"what has no time of its own is stamped where it came in: up to {1e3 * late:.0f} ms later (95 %)"
-    return {name: t for name, t in tables.items() if t.place.size}, told, [words] if own else []
+    delay = np.quantile(came - boot - offset, 0.95) if timed else 0.0
+    note = f"what has no time of its own is stamped where it came in: up to {1e3 * delay:.0f} ms later (95 %)"
+    return {name: t for name, t in tables.items() if t.place.size}, remarks, [note] if timed else []

@@ -111,17 +111,17 @@ def read(source: Source, options: Options) -> Flight:
         FlightError: where pyulog is not installed, nothing in the log can be used, or a mapping is given.
     """
     refuse_mapping(options, "a ULog file", where=source.name)
-    whole = whole_messages(source.content)
-    log = decoded(whole.content, source.name)
-    told = clocked.Remarks()
+    complete = whole_messages(source.content)
+    log = decoded(complete.content, source.name)
+    remarks = clocked.Remarks()
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     first = {data.name: data.data for data in reversed(log.data_list) if data.multi_id == 0}
     for topic in _TOPICS:
-        made = _stream(topic, first.get(topic.name), taken, told)
-        if made is not None:
-            streams[topic.stream] = made
-            taken |= set(map(str, made.data_vars))
+        dataset = _stream(topic, first.get(topic.name), taken, remarks)
+        if dataset is not None:
+            streams[topic.stream] = dataset
+            taken |= set(map(str, dataset.data_vars))
     if not streams:
         raise FlightError(
             f"holds no flight: none of its {len(log.data_list)} topics is known and has two samples.",
@@ -129,19 +129,19 @@ def read(source: Source, options: Options) -> Flight:
             hint="Copy the log again; check the logging profile (SDLOG_PROFILE).",
         )
     commands = {name: np.asarray(d[name].values) for d in streams.values() for name in _MIXER if name in d}
-    told.notes += checks.constant_notes(commands)
+    remarks.notes += checks.constant_notes(commands)
     counts = {
         f"{d.name}/{d.multi_id}" if d.multi_id else d.name: len(d.data.get("timestamp", ())) for d in log.data_list
     }
-    told.notes += clocked.unread(counts, [topic.name for topic in _TOPICS])
+    remarks.notes += clocked.unread(counts, [topic.name for topic in _TOPICS])
     info = log.msg_info_dict
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=" ".join(str(info[key]) for key in ("sys_name", "ver_hw", "ver_sw") if key in info),
         firmware=str(info.get("sys_name", "")),
-        notes=tuple(told.notes),
-        damage=(*_damage(whole, log), *told.damage),
+        notes=tuple(remarks.notes),
+        damage=(*_damage(complete, log), *remarks.damage),
         parameters={str(k): float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)},
         events=_events(log, first),
     )
@@ -166,7 +166,7 @@ def decoded(content: bytes, where: str) -> Any:
 
 
 def _stream(
-    topic: _Topic, data: Mapping[str, NDArray[Any]] | None, taken: set[str], told: clocked.Remarks
+    topic: _Topic, data: Mapping[str, NDArray[Any]] | None, taken: set[str], remarks: clocked.Remarks
 ) -> xr.Dataset | None:
     if data is None or "timestamp" not in data:
         return None
@@ -181,16 +181,16 @@ def _stream(
                 values = factor * np.asarray(data[field], dtype=np.float64)
             if unit != "us" or np.any(values > 0.0):  # outputs that nothing is connected to
                 columns[channel] = (values, unit)
-    return clocked.made_stream(topic.stream, time, columns, told=told)
+    return clocked.made_stream(topic.stream, time, columns, remarks=remarks)
 
 
-def _damage(whole: Whole, log: Any) -> list[str]:
+def _damage(complete: Whole, log: Any) -> list[str]:
     damage = []
-    if whole.lost:
-        damage.append(f"{whole.lost} bytes in the middle belong to no message: they were skipped")
+    if complete.lost:
+        damage.append(f"{complete.lost} bytes in the middle belong to no message: they were skipped")
     elif log.file_corruption:
         damage.append("some messages do not fit their descriptions: pyulog skipped them")
-    if whole.unfinished:
+    if complete.unfinished:
         damage.append("the log is cut off: its last message is unfinished")
     lost = sum(float(dropout.duration) for dropout in log.dropouts) / 1e3
     if log.dropouts:
@@ -208,14 +208,14 @@ def _events(log: Any, first: Mapping[str, Mapping[str, NDArray[Any]]]) -> tuple[
         seconds = float(dropout.duration) / 1e3
         events.append(Event(float(dropout.timestamp) / 1e6, "dropout", f"{seconds:.3f} s lost", {"seconds": seconds}))
     status = first.get("vehicle_status", {})
-    for field, words in (("arming_state", ("disarmed", "armed")), ("nav_state", None)):
+    for field, states in (("arming_state", ("disarmed", "armed")), ("nav_state", None)):
         if field not in status or "timestamp" not in status:
             continue
         values = np.asarray(status[field], dtype=np.int64)
         changes = np.flatnonzero(np.diff(values, prepend=-1))
         for i in changes.tolist():
             number = int(values[i])
-            kind = "mode" if words is None else words[number == _ARMED]
-            text = f"navigation state {number}" if words is None else kind
+            kind = "mode" if states is None else states[number == _ARMED]
+            text = f"navigation state {number}" if states is None else kind
             events.append(Event(float(status["timestamp"][i]) / 1e6, kind, text, {"number": number}))
     return tuple(sorted(events, key=lambda event: event.time))

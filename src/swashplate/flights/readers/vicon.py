@@ -125,15 +125,17 @@ def read(source: Source, options: Options) -> Flight:
         raise FlightError(f"the block '{title}' ends in its header.", where=where, hint="Export it again.")
     rate = _rate(rows[start + 1], source)
     names, columns, unit_row = rows[start + 2 : start + _DATA_AFTER]
-    told = clocked.Remarks()
+    remarks = clocked.Remarks()
     under = range(start + _DATA_AFTER + 1, end + 1)
     # Blank cells at a row's end may be left out: the body was not seen. More cells than heads are another layout.
-    data, lines = even_rows(rows[start + _DATA_AFTER : end], under, low=1, high=len(columns), where=where, told=told)
+    data, lines = even_rows(
+        rows[start + _DATA_AFTER : end], under, low=1, high=len(columns), where=where, remarks=remarks
+    )
     poses = title in _POSES
     bodies = _bodies(names, columns, first="RX" if poses else "X")
     labels = [label for label, _, _ in bodies]
-    plain = [_ANGLE_LABEL.sub("", label).strip() for label in labels]
-    label, left, right = bodies[mocap.choose(plain, options.body, where=where)]
+    bare = [_ANGLE_LABEL.sub("", label).strip() for label in labels]
+    label, left, right = bodies[mocap.choose(bare, options.body, where=where)]
 
     wanted = {name.upper(): i for i, name in reversed(list(enumerate(columns[left:right], left)))}
     place = ("TX", "TY", "TZ") if poses else ("X", "Y", "Z")
@@ -175,5 +177,5 @@ def read(source: Source, options: Options) -> Flight:
         world_axes=WORLD_AXES,
         body_axes=BODY_AXES,
         notes=notes,
-        told=told,
+        remarks=remarks,
     )

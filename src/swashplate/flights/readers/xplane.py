@@ -29,7 +29,7 @@ _CHANNELS = {
 
 def recognises(source: Source) -> bool:
     """Text whose first line with bars names one of X-Plane's clocks."""
-    return source.text is not None and any(clock in map(_plain, _cells(source.text[:8192])) for clock in _CLOCKS)
+    return source.text is not None and any(clock in map(_lowered, _cells(source.text[:8192])) for clock in _CLOCKS)
 
 
 def read(source: Source, options: Options) -> Flight:
@@ -49,25 +49,25 @@ def _cells(text: str) -> Sequence[str]:
     return [cell.strip() for cell in line.strip().strip("|").split("|")]
 
 
-def _plain(cell: str) -> str:
+def _lowered(cell: str) -> str:
     return ",".join(part.strip("_ ") for part in cell.lower().split(","))
 
 
 def _named(cells: Sequence[str]) -> list[str]:
     """Names as a table has them: each once, with the unit where it is known."""
-    clock = next(name for name in _CLOCKS if name in map(_plain, cells))
-    made: list[str] = []
+    clock = next(name for name in _CLOCKS if name in map(_lowered, cells))
+    titles: list[str] = []
     for cell in cells:
-        plain, (name, _, unit) = _plain(cell), cell.partition(",")
-        if plain == clock:
+        lowered, (name, _, unit) = _lowered(cell), cell.partition(",")
+        if lowered == clock:
             title = "time [s]"
-        elif plain in _CHANNELS:
-            title = _CHANNELS[plain]
+        elif lowered in _CHANNELS:
+            title = _CHANNELS[lowered]
         else:
             said = unit.strip("_ ")
             title = re.sub(r"_+", "_", f"{name.strip('_ ')} [{said}]" if units.is_known(said) else cell.strip("_ "))
-        beside = sum(other.partition(" [")[0] == title.partition(" [")[0] for other in made)
-        made.append(title.replace(" [", f"_{beside + 1} [") if beside and "[" in title else title)
+        beside = sum(other.partition(" [")[0] == title.partition(" [")[0] for other in titles)
+        titles.append(title.replace(" [", f"_{beside + 1} [") if beside and "[" in title else title)
         if beside and "[" not in title:
-            made[-1] = f"{title}_{beside + 1}"
-    return [title.replace(",", " ") for title in made]
+            titles[-1] = f"{title}_{beside + 1}"
+    return [title.replace(",", " ") for title in titles]

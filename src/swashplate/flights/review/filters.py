@@ -132,12 +132,12 @@ def _harmonic(name: str, k: Mapping[str, float], flight: Flight) -> tuple[list[F
         why = f"{name} follows the {_NOTCH_MODES.get(mode, f'mode {mode}')}, which the log does not tell: shown at its "
         why += f"lowest frequency, {base:g} Hz"
     numbers = [n + 1 for n in range(16) if int(k.get(f"{name}_HMNCS", 3.0)) >> n & 1]
-    made = [
+    notches = [
         Filter(f"{name} ({n} x)" if n > 1 else name, _GYRO, "notch", n * f, width=n * f * ratio, left=left)
         for f in sources
         for n in numbers
     ]
-    return made, why
+    return notches, why
 
 
 def _low_pass(name: str, k: Mapping[str, float], kind: str, place: str) -> Filter | None:

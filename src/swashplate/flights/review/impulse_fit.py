@@ -38,7 +38,7 @@ class Excerpt:
 class _Sums:
     """Products over windows: of the target at all lags with itself and the motion, and of the instruments with both."""
 
-    own: Array
+    square: Array
     cross: Array
     power: float
     count: int
@@ -83,13 +83,13 @@ class ImpulseFit:
         return [self._sums([self.windows[i] for i in group]) for group in groups]
 
     @property
-    def told(self) -> float:
+    def explained_target(self) -> float:
         """Share of the target's power that the instruments explain; 0 where there are none."""
-        sums = self.whole
+        sums = self.total
         if not sums.instruments.any():
             return 0.0
         x = sums.to_target[:, self.before]
-        return float(x @ np.linalg.solve(_ridged(sums.instruments), x)) / float(sums.own[self.before, self.before])
+        return float(x @ np.linalg.solve(_ridged(sums.instruments), x)) / float(sums.square[self.before, self.before])
 
     def early(self) -> tuple[float, float]:
         """How much of the step stands before its target, by more than the log's own steps blur, and its error."""
@@ -99,24 +99,24 @@ class ImpulseFit:
     def steps(self) -> list[Array]:
         """Step responses: of all windows, then without each part. `explained` is known behind it."""
         impulses = self._solved(self.before)
-        sums, h = self.whole, impulses[0]
-        own, cross = sums.own[self.before :, self.before :], sums.cross[self.before :]
-        self.explained = float(2.0 * h @ cross - h @ own @ h) / sums.power
+        sums, h = self.total, impulses[0]
+        square, cross = sums.square[self.before :, self.before :], sums.cross[self.before :]
+        self.explained = float(2.0 * h @ cross - h @ square @ h) / sums.power
         return [np.cumsum(h) - 0.5 * h for h in impulses]  # a sample stands for half a step around it
 
     def _sums(self, windows: Sequence[Excerpt]) -> _Sums:
         lags = self.before + self.after + 1
         square, row = np.zeros((lags, lags)), np.zeros(lags)
-        made = _Sums(square, row, 0.0, 0, square, square, row)
+        sums = _Sums(square, row, 0.0, 0, square, square, row)
         for window in windows:
             x, y = _lagged(window.target, lags), window.motion
             z = x[:, :0] if window.instrument is None else _lagged(window.instrument, lags)
             others = (z.T @ z, z.T @ x, z.T @ y) if z.size else (square, square, row)
-            made += _Sums(x.T @ x, x.T @ y, float(y @ y), y.size, *others)
-        return made
+            sums += _Sums(x.T @ x, x.T @ y, float(y @ y), y.size, *others)
+        return sums
 
     @cached_property
-    def whole(self) -> _Sums:
+    def total(self) -> _Sums:
         """Sums of all windows."""
         total = self.parts[0]
         for part in self.parts[1:]:
@@ -125,10 +125,10 @@ class ImpulseFit:
 
     def _solved(self, first: int) -> list[Array]:
         """Impulse responses from a lag on: of all windows, then without each part."""
-        whole = self.whole
+        total = self.total
         decay, scale, noise = self.prior
         kernel = scale * _kernel(self._lag(first), decay, self.rate)
-        rows = [self._equations(whole, first), *(self._equations(whole - part, first) for part in self.parts)]
+        rows = [self._equations(total, first), *(self._equations(total - part, first) for part in self.parts)]
         return [_mean(gram, cross, kernel, noise) for gram, cross in rows]
 
     def _lag(self, first: int) -> Array:
@@ -138,7 +138,7 @@ class ImpulseFit:
     def _equations(self, sums: _Sums, first: int) -> tuple[Array, Array]:
         """Normal equations of the lags from one on."""
         if not self.instruments:
-            return sums.own[first:, first:], sums.cross[first:]
+            return sums.square[first:, first:], sums.cross[first:]
         x = sums.to_target[:, first:]
         projected = np.linalg.solve(_ridged(sums.instruments), np.column_stack([x, sums.to_motion]))
         gram = x.T @ projected[:, :-1]
@@ -147,7 +147,7 @@ class ImpulseFit:
     @cached_property
     def prior(self) -> tuple[float, float, float]:
         """Decay [s] and scale of the prior, and the noise's variance, under which the record is most likely."""
-        sums, first, lag = self.whole, self.before, self._lag(self.before)
+        sums, first, lag = self.total, self.before, self._lag(self.before)
         gram, cross = self._equations(sums, first)
         axes = {}
         for decay in _DECAYS:
@@ -160,7 +160,7 @@ class ImpulseFit:
             choices = [(d, s) for d in _DECAYS for s in _SCALES]
             decay, scale = max(choices, key=partial(_likely, axes, noise))
             h = _mean(gram, cross, scale * _kernel(lag, decay, self.rate), noise)
-            rest = sums.power - 2.0 * float(h @ sums.cross[first:]) + float(h @ sums.own[first:, first:] @ h)
+            rest = sums.power - 2.0 * float(h @ sums.cross[first:]) + float(h @ sums.square[first:, first:] @ h)
             noise = max(rest, 1e-6 * sums.power) / sums.count
         return decay, scale, noise
 
@@ -180,9 +180,9 @@ def _likely(axes: Mapping[float, tuple[Array, Array]], noise: float, choice: tup
     Args:
         axes: by decay, eigenvalues of the normal equations and correlations in their axes, shape (n,).
     """
-    (values, told), scale = axes[choice[0]], choice[1]
+    (values, projected), scale = axes[choice[0]], choice[1]
     wide = 1.0 + scale / noise * np.maximum(values, 0.0)
-    return float(0.5 * scale / noise**2 * np.sum(told**2 / wide) - 0.5 * np.sum(np.log(wide)))
+    return float(0.5 * scale / noise**2 * np.sum(projected**2 / wide) - 0.5 * np.sum(np.log(wide)))
 
 
 def _mean(gram: Array, cross: Array, kernel: Array, noise: float) -> Array:
@@ -194,9 +194,9 @@ def _mean(gram: Array, cross: Array, kernel: Array, noise: float) -> Array:
 
 def _kernel(lag: Array, decay: float, rate: float) -> Array:
     """Covariance of an impulse response that decays away from its target; before and after it independently."""
-    late = np.exp(-np.maximum(np.abs(lag)[:, None], np.abs(lag)[None, :]) / decay)
+    decayed = np.exp(-np.maximum(np.abs(lag)[:, None], np.abs(lag)[None, :]) / decay)
     same = (lag[:, None] < 0.0) == (lag[None, :] < 0.0)
-    return np.asarray(np.where(same, late, 0.0) / (rate * decay) ** 2)
+    return np.asarray(np.where(same, decayed, 0.0) / (rate * decay) ** 2)
 
 
 def jackknife(rows: Array) -> Array:

@@ -44,11 +44,11 @@ class NextSweep:
     why: str
 
     def __str__(self) -> str:
-        told = ", ".join(f"{name} {value:g}" for name, value in self.parameters.items())
+        settings = ", ".join(f"{name} {value:g}" for name, value in self.parameters.items())
         ends = ((np.degrees(self.rate), "deg/s"), (np.degrees(self.angle), "deg"))
         limits = [f"{value:.0f} {unit}" for value, unit in ends if np.isfinite(value)]
         end = f"; switch it off beyond {' or '.join(limits)}" if limits else ""
-        return f"{self.axis}: {told} ({self.why}){end}"
+        return f"{self.axis}: {settings} ({self.why}){end}"
 
 
 def next_sweeps(
@@ -63,16 +63,16 @@ def next_sweeps(
     kind = aircraft_kind(flight)
     reader = flight.provenance.reader
     if reader == "ardupilot" and kind is not None and not (kind.main_rotors or kind.multirotor):
-        return (), f"System ID mode is Copter's: {kind.words} has no sweep of its own"
+        return (), f"System ID mode is Copter's: {kind.noun} has no sweep of its own"
     if reader == "ardupilot":
-        made = tuple(each for axis in AXES if (each := _ardupilot(flight, axis, bandwidths, swept)) is not None)
-        return made, _beside(flight) if made else "the log has no commands to the mixer (RATE): no size can be said"
+        sweeps = tuple(each for axis in AXES if (each := _ardupilot(flight, axis, bandwidths, swept)) is not None)
+        return sweeps, _beside(flight) if sweeps else "the log has no commands to the mixer (RATE): no size can be said"
     version = re.search(r"Betaflight (\d+)\.(\d+)", flight.provenance.vehicle)
     if reader in ("blackbox", "blackbox csv") and version is not None:
         if (int(version[1]), int(version[2])) < _BETAFLIGHT:
             return (), "Betaflight has a chirp from 2025.12 on; before, move one stick after the other, slow to fast"
-        made = tuple(each for axis in AXES if (each := _betaflight(flight, axis)) is not None)
-        return made, "set debug_mode = CHIRP, log gyro and set-point, switch the mode CHIRP on once for each axis"
+        sweeps = tuple(each for axis in AXES if (each := _betaflight(flight, axis)) is not None)
+        return sweeps, "set debug_mode = CHIRP, log gyro and set-point, switch the mode CHIRP on once for each axis"
     return (), (
         "this autopilot has no sweep of its own that is known here: move one stick after the other as a sine, from a "
         "slow one (4 s) to as fast as you can, or let `swash maneuver` make a script or a file"
@@ -85,10 +85,10 @@ def _ardupilot(
     if axis.command not in flight:
         return None
     time, values = flight.time(axis.command), flight.values(axis.command)
-    flown = np.zeros(time.shape, dtype=np.bool_)
+    swept_part = np.zeros(time.shape, dtype=np.bool_)
     for start, stop in without(armed(flight), swept):
-        flown |= (time >= start) & (time <= stop)
-    values = values[flown & np.isfinite(values)]
+        swept_part |= (time >= start) & (time <= stop)
+    values = values[swept_part & np.isfinite(values)]
     if values.size < 100 or not np.ptp(values) > 0.0:
         return None
     spread, most = float(np.std(values)), float(np.quantile(np.abs(values), 0.99))

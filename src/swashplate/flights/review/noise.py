@@ -59,10 +59,10 @@ class AnotherNotch:
     parameters: tuple[tuple[str, float], ...] = ()
 
     def __str__(self) -> str:
-        told = ", ".join(f"{name} {value:g}" for name, value in self.parameters)
+        settings = ", ".join(f"{name} {value:g}" for name, value in self.parameters)
         return (
             f"one more notch at {self.frequency:.3g} Hz would take the noise from {self.before:.3g} to {self.after:.3g}"
-            f" deg/s and cost {1e3 * self.delay:.2f} ms{f': {told}' if told else ''}"
+            f" deg/s and cost {1e3 * self.delay:.2f} ms{f': {settings}' if settings else ''}"
         )
 
 
@@ -94,10 +94,10 @@ class GyroNoise:
         peaks = "; ".join(
             f"{p.frequency:.3g} Hz {p.rms:.2g} deg/s{f' ({p.source})' if p.source else ''}" for p in self.peaks
         )
-        told = f"{self.channel}: {self.rms_after:.3g} deg/s rms above {NOISE:g} Hz"
+        text = f"{self.channel}: {self.rms_after:.3g} deg/s rms above {NOISE:g} Hz"
         if np.isfinite(self.rms_before):
-            told += f", {self.rms_before:.3g} before the filters ({how})"
-        return told + (f"; stands out: {peaks}" if peaks else "; nothing stands out")
+            text += f", {self.rms_before:.3g} before the filters ({how})"
+        return text + (f"; stands out: {peaks}" if peaks else "; nothing stands out")
 
 
 def gyro_noise(flight: Flight, chosen: tuple[Filter, ...]) -> tuple[tuple[GyroNoise, ...], str]:
@@ -119,10 +119,10 @@ def _density(flight: Flight, name: str) -> tuple[Array, Array] | None:
     steps = np.diff(time)
     rate = 1.0 / float(np.median(steps))
     edges = [0, *(np.flatnonzero(steps > max(10.0 / rate, 0.2)) + 1).tolist(), time.size]
-    whole = [(time[a], time[b - 1]) for a, b in pairwise(edges) if b - a > 1]
+    runs = [(time[a], time[b - 1]) for a, b in pairwise(edges) if b - a > 1]
     size, total, count = round(_WINDOW * rate), None, 0
     lines = np.zeros(0)
-    for start, stop in common(whole, armed(flight)):
+    for start, stop in common(runs, armed(flight)):
         grid = start + np.arange(int((stop - start) * rate)) / rate
         if grid.size < size:
             continue
@@ -134,10 +134,10 @@ def _density(flight: Flight, name: str) -> tuple[Array, Array] | None:
 
 
 def _of(flight: Flight, name: str, chosen: tuple[Filter, ...]) -> GyroNoise | None:
-    made = _density(flight, name)
-    if made is None or made[0][-1] <= NOISE:
+    density = _density(flight, name)
+    if density is None or density[0][-1] <= NOISE:
         return None
-    frequency, after = made
+    frequency, after = density
     gain = gyro_response(chosen, frequency)
     raw = f"{name}{_UNFILTERED.get(flight.provenance.reader, '?')}"
     measured = _density(flight, raw) if raw in flight else None
@@ -206,12 +206,12 @@ def _named(flight: Flight, notch: Filter) -> tuple[tuple[str, float], ...]:
         return tuple((f"{free[0]}_{end}", float(value)) for end, value in values.items()) if free else ()
     if reader == "ulog":
         free = [n for n in (0, 1) if not k.get(f"IMU_GYRO_NF{n}_FRQ", 0.0) > 0.0]
-        told = (("FRQ", notch.frequency), ("BW", round(notch.width, 1)))
-        return tuple((f"IMU_GYRO_NF{free[0]}_{end}", float(value)) for end, value in told) if free else ()
+        settings = (("FRQ", notch.frequency), ("BW", round(notch.width, 1)))
+        return tuple((f"IMU_GYRO_NF{free[0]}_{end}", float(value)) for end, value in settings) if free else ()
     if reader == "blackbox":
         names = ("gyro_notch_hz_0", "gyro_notch_hz_1")
         free = [n for n, name in enumerate(names, 1) if not k.get(name, 0.0) > 0.0]
         corner = notch.frequency * (np.sqrt(1.0 + 0.25 * _WIDTH**2) - 0.5 * _WIDTH)
-        told = (("hz", notch.frequency), ("cutoff", float(round(corner))))
-        return tuple((f"gyro_notch{free[0]}_{end}", value) for end, value in told) if free else ()
+        settings = (("hz", notch.frequency), ("cutoff", float(round(corner))))
+        return tuple((f"gyro_notch{free[0]}_{end}", value) for end, value in settings) if free else ()
     return ()

@@ -98,7 +98,7 @@ class FlightReview(Shown):
         return bool(self.incidents) or any(loop.octaves or loop.step is not None for loop in self.loops)
 
     @property
-    def words(self) -> str:
+    def body_text(self) -> str:
         """All of it in lines, without a title."""
         parts = [
             "\n".join([f"{heading}:{'' if texts else ' none'}", *(f"  - {text}" for text in texts)])
@@ -107,26 +107,26 @@ class FlightReview(Shown):
         return "\n\n".join(parts)
 
     def __str__(self) -> str:
-        return f"{self.source or '(unnamed)'}: {self.vehicle or 'an aircraft'}\n\n{self.words}"
+        return f"{self.source or '(unnamed)'}: {self.vehicle or 'an aircraft'}\n\n{self.body_text}"
 
     def to_document(self) -> dict[str, object]:
         """The same as plain JSON types; NaN becomes None."""
-        return {key: _plain(value) for key, value in asdict(self).items()} | {
+        return {key: _json_value(value) for key, value in asdict(self).items()} | {
             "filters": [{**dict(asdict(each)), "delay": each.delay} for each in self.filters]
         }
 
 
 def _plain_dict(entries: dict[str, object]) -> dict[str, object]:
-    return {key: _plain(value) for key, value in entries.items()}
+    return {key: _json_value(value) for key, value in entries.items()}
 
 
-def _plain(value: object) -> object:
+def _json_value(value: object) -> object:
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return _json_value(value.tolist())
     if isinstance(value, dict):
         return _plain_dict(value)
     if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
+        return [_json_value(each) for each in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
@@ -148,7 +148,7 @@ def review(flight: Flight, *, swept: Sequence[Sweep] | None = None) -> FlightRev
     kind = aircraft_kind(flight)
     return FlightReview(
         flight.provenance.source,
-        kind.words if kind is not None else flight.provenance.vehicle,
+        kind.noun if kind is not None else flight.provenance.vehicle,
         loops,
         chosen,
         untold,

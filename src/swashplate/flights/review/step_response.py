@@ -116,7 +116,7 @@ def step_response(pieces: Sequence[Stretch], *, usable: float, reference: str = 
         )
     before, after = round(BEFORE * rate), round(AFTER * rate)
     fit = ImpulseFit(windows, before, after, rate)
-    if reference and fit.told >= _STAGE:
+    if reference and fit.explained_target >= _STAGE:
         fit = fit.by_instruments()
     early, its_error = fit.early()
     if abs(early) > max(_EARLY, 2.0 * its_error):

@@ -59,18 +59,18 @@ def tracking(pieces: Sequence[Stretch]) -> tuple[tuple[Octave, ...], float]:
         count += windows
     if count < _LEAST:
         return (), 0.0
-    own, other, cross, error = sums / count
+    targets, other, cross, error = sums / count
     step = float(frequency[1])
     octaves = []
     low = _LOWEST
     while 2.0 * low <= 0.45 * rate:
         inside = (frequency >= low) & (frequency < 2.0 * low)
-        power = np.sum(own[inside].real), np.sum(other[inside].real)
+        power = np.sum(targets[inside].real), np.sum(other[inside].real)
         response = np.sum(cross[inside]) / max(power[0], np.finfo(np.float64).tiny)
         # Phase turns within an octave: coherence is averaged line by line, by the target's power.
-        lines = np.abs(cross[inside]) ** 2 / np.maximum(own[inside].real * other[inside].real, 1e-300)
-        weight = own[inside].real / max(power[0], 1e-300)
-        target, motion, off = (float(np.sqrt(max(step * np.sum(e[inside].real), 0.0))) for e in (own, other, error))
+        lines = np.abs(cross[inside]) ** 2 / np.maximum(targets[inside].real * other[inside].real, 1e-300)
+        weight = targets[inside].real / max(power[0], 1e-300)
+        target, motion, off = (float(np.sqrt(max(step * np.sum(e[inside].real), 0.0))) for e in (targets, other, error))
         coherence, gain, phase = float(np.sum(weight * lines)), float(abs(response)), float(np.angle(response))
         octaves.append(Octave(low, 2.0 * low, target, motion, off, coherence, gain, phase))
         low *= 2.0

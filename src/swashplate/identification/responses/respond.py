@@ -290,7 +290,7 @@ def respond(
             **({"beside": list(refs.beside)} if refs and refs.beside else {}),
             "averages": [m.averages for m in matrices],
             **({"channels": renamed} if renamed else {}),
-            "excitation": {name: {"kind": one.kind, "words": one.words} for name, one in excitation.items()},
+            "excitation": {name: {"kind": one.kind, "words": one.why} for name, one in excitation.items()},
             **autopilot_facts(flights),
             "hashes": hashes(flights),
             "means": means(flights, (*inputs, *outputs)),

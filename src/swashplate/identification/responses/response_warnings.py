@@ -58,7 +58,7 @@ def dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str
 def answers(inputs: Mapping[str, Excitation]) -> list[str]:
     """Inputs that are a controller's answer."""
     return [
-        f"{one.record}: input '{name}' is {one.words} Its responses are minus the controller's inverse, not the "
+        f"{one.record}: input '{name}' is {one.why} Its responses are minus the controller's inverse, not the "
         f"aircraft's, however coherent. {FLY}"
         for name, one in inputs.items()
         if one.kind == CONTROLLER
@@ -67,7 +67,7 @@ def answers(inputs: Mapping[str, Excitation]) -> list[str]:
 
 def unsure(inputs: Mapping[str, Excitation]) -> list[str]:
     """Inputs of which nobody knows whether they are a controller's answer."""
-    return [f"{one.record}: input '{name}': {one.words}" for name, one in inputs.items() if one.kind == UNKNOWN]
+    return [f"{one.record}: input '{name}': {one.why}" for name, one in inputs.items() if one.kind == UNKNOWN]
 
 
 def damaged(logs: Sequence[DataSource]) -> list[str]:

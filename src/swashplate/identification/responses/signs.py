@@ -13,8 +13,8 @@ from swashplate.flights.motion_signs import (
     LINES,
     LOWEST,
     ResponseSign,
+    base_motion,
     expected_sense,
-    plain,
     sign_of,
 )
 from swashplate.flights.readers.options import unit_to_give
@@ -57,7 +57,7 @@ def response_sign(
 def response_signs(pairs: FrequencyResponse) -> tuple[ResponseSign, ...]:
     """The signs of all responses whose names promise one."""
     return tuple(
-        response_sign(pairs, output, input, expected=sense, integrations=INTEGRATIONS[plain(output)])
+        response_sign(pairs, output, input, expected=sense, integrations=INTEGRATIONS[base_motion(output)])
         for output in pairs.outputs
         for input in pairs.inputs
         if (sense := expected_sense(output, input))

@@ -64,7 +64,7 @@ class VehicleKind:
             biases=question.biases,
         )
         driven = excitations(flights, model.input_names, outputs=outputs)
-        answers = tuple(f"{one.input}: {one.words}" for one in of_inputs(driven).values() if one.kind == CONTROLLER)
+        answers = tuple(f"{one.input}: {one.why}" for one in of_inputs(driven).values() if one.kind == CONTROLLER)
         sources = ", ".join(piece.name for piece in likelihood.records)
         return RecordProblem(
             likelihood,

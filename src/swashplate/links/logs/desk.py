@@ -118,7 +118,7 @@ class Desk:
         """Every log as the page lists it, and what may be dropped."""
         with self._lock:
             logs = list(self._logs.values())
-        examples = [{"file": e.file, "title": e.title, "words": e.words} for e in example_logs.EXAMPLES]
+        examples = [{"file": e.file, "title": e.title, "words": e.summary} for e in example_logs.EXAMPLES]
         listed = [log.to_document() for log in logs]
         return {"logs": listed, "largest": LARGEST, "piece": PIECE, "examples": examples}
 

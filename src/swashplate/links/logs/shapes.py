@@ -61,15 +61,15 @@ def shape_of(flight: Flight) -> tuple[dict[str, Any], str]:
     kind = aircraft_kind(flight)
     if kind is None:
         return _packaged(HELICOPTER, "The log does not say what flew")
-    words = f"The log is of {kind.words} ({kind.told})"
+    words = f"The log is of {kind.noun} ({kind.source})"
     if kind.main_rotors:
         return _packaged(USUAL if kind.coaxial else HELICOPTER, words)
     if kind.rotors in BY_ROTORS:
         return _packaged(BY_ROTORS[kind.rotors], words)
     if kind.multirotor:
         return plain(kind.rotors or 4), f"{words}: a plain one is drawn."
-    if kind.words in _FORMS:
-        return {**plain(0), "parts": _FORMS[kind.words]}, f"{words}: a plain one is drawn."
+    if kind.noun in _FORMS:
+        return {**plain(0), "parts": _FORMS[kind.noun]}, f"{words}: a plain one is drawn."
     return plain(0), f"{words}: no shape of its kind is known here, a plain body shows how it stood."
 
 

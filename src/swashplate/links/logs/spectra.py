@@ -36,7 +36,7 @@ def spectra(opened: Opened, channel: str, start: float, stop: float) -> dict[str
         rotor = {
             "channel": shaken.rotor,
             "speed": shaken.speed,
-            "words": shaken.words,
+            "words": shaken.summary,
             "harmonics": [vars(harmonic) for harmonic in shaken.harmonics],
             "notches": {
                 "words": shaken.about_notches,

@@ -130,7 +130,7 @@ def section_of_harmonics(harmonics: Harmonics) -> Section:
     ]
     spec: dict[str, Any] = {**drawn.spec, "data": [*marks, *drawn.spec["data"]]}
     keys = (Key(harmonics.spectrum.channel, BLUE), Key(f"multiples of {harmonics.rotor}", VERMILION, "dot"))
-    caption = f"{drawn.caption} {harmonics.words}"
+    caption = f"{drawn.caption} {harmonics.summary}"
     figure = Figure("harmonics", spec, caption, drawn.alt, keys=keys)
     return Section("harmonics", f"Rotor vibration in {harmonics.spectrum.channel}", (figure, Text(str(harmonics))))
 

@@ -16,7 +16,7 @@ STEADY = np.arange(2000) / RATE
 
 def _usable(time, *columns, bad_stamps="drop", **more):
     told = Remarks()
-    kept, mask = usable(time, columns, where="log.csv", bad_stamps=bad_stamps, told=told, **more)
+    kept, mask = usable(time, columns, where="log.csv", bad_stamps=bad_stamps, remarks=told, **more)
     return kept, mask, told
 
 
@@ -122,7 +122,7 @@ def test_streams_of_containers_follow_the_same_rule():
     told = Remarks()
     values = np.arange(4000.0)
     values[7] = np.nan
-    made = made_stream("imu", np.repeat(STEADY, 2), {"p": (values, "rad/s")}, told=told)
+    made = made_stream("imu", np.repeat(STEADY, 2), {"p": (values, "rad/s")}, remarks=told)
     assert made is not None
     assert told.notes == []
     assert told.damage == [
@@ -130,7 +130,7 @@ def test_streams_of_containers_follow_the_same_rule():
         "imu: 1999 of 3999 samples (50 %) are lost because their time repeats or goes backwards",
     ]
     told = Remarks()
-    made_stream("imu", np.repeat(STEADY, 2), {"p": (np.repeat(STEADY, 2), "rad/s")}, told=told)
+    made_stream("imu", np.repeat(STEADY, 2), {"p": (np.repeat(STEADY, 2), "rad/s")}, remarks=told)
     assert told.damage == []
     assert "copies" in told.notes[0]
 

@@ -47,7 +47,7 @@ def test_the_header_is_found(top, odd) -> None:
     assert len(table) == 50
     assert _columns(table)[1] == list(range(50))
     assert np.isnan(_columns(table)[2][-1]) == odd
-    assert table.told.damage == []
+    assert table.remarks.damage == []
 
 
 def test_what_stands_before_the_header_is_kept() -> None:
@@ -64,8 +64,8 @@ def test_decimal_commas_are_told_from_commas_that_separate(mark: str) -> None:
     rows = [row.replace(",", mark).replace(".", ",") for row in ROWS]
     table = _table([HEAD.replace(" [s]", "").replace(",", mark), *rows])
     assert _columns(table)[0] == pytest.approx(np.arange(50) / 100)
-    assert table.told.notes == ["decimals are written with commas"]
-    assert not _table([HEAD, *ROWS]).told.notes
+    assert table.remarks.notes == ["decimals are written with commas"]
+    assert not _table([HEAD, *ROWS]).remarks.notes
 
 
 def test_without_names_the_first_line_is_refused_unless_the_mapping_says_so() -> None:
@@ -87,7 +87,7 @@ def _shorter(row: str) -> str:
 def test_from_where_the_columns_change_nothing_is_read(change, cells: int) -> None:
     table = _table([HEAD, *ROWS[:30], *map(change, ROWS[30:])])
     assert len(table) == 30
-    assert table.told.damage == [
+    assert table.remarks.damage == [
         f"20 of 50 rows (40 %) are lost: line 32 has {cells} cells, the header 3, so the columns have changed there, "
         "and only the rows before it were read"
     ]
@@ -100,7 +100,7 @@ def test_a_torn_line_costs_itself(change, place: int) -> None:
     rows = [*ROWS[:place], change(ROWS[place]), *ROWS[place + 1 :]]
     table = _table([HEAD, *rows])
     assert len(table) == 49
-    assert f"1 of 50 rows (2 %) are lost: they are torn (line {place + 2} has" in table.told.damage[0]
+    assert f"1 of 50 rows (2 %) are lost: they are torn (line {place + 2} has" in table.remarks.damage[0]
     assert table.lines[place - 1] == place + 1
     if place < 49:
         assert table.lines[place] == place + 3
@@ -110,7 +110,7 @@ def test_columns_that_change_back_are_not_trusted_again() -> None:
     """One sensor more, then another one less: the header's width again, and other columns."""
     table = _table([HEAD, *ROWS[:20], *map(_longer, ROWS[20:30]), *ROWS[30:]])
     assert len(table) == 20
-    assert "30 of 50 rows (60 %) are lost" in table.told.damage[0]
+    assert "30 of 50 rows (60 %) are lost" in table.remarks.damage[0]
 
 
 @pytest.mark.parametrize("change", [_longer, _shorter])
@@ -122,20 +122,20 @@ def test_a_header_that_fits_no_row_is_refused(change) -> None:
 def test_the_same_header_again_loses_nothing_and_another_one_ends_the_table() -> None:
     table = _table([HEAD, *ROWS[:30], HEAD, *ROWS[30:]])
     assert len(table) == 50
-    assert table.told.damage == []
-    assert table.told.notes == ["the header stands again in 1 line (32): passed over"]
+    assert table.remarks.damage == []
+    assert table.remarks.notes == ["the header stands again in 1 line (32): passed over"]
     assert table.lines[29:31] == [31, 33]
     table = _table([HEAD, *ROWS[:30], "time [s],q,p", *ROWS[30:]])
     assert len(table) == 30
-    assert "line 32 has other names" in table.told.damage[0]
+    assert "line 32 has other names" in table.remarks.damage[0]
 
 
 def test_separators_at_the_end_of_lines_are_no_cells() -> None:
     assert len(_table([HEAD + ",", *[row + "," for row in ROWS]])) == 50
     assert len(_table([HEAD, *[row + ",," for row in ROWS]])) == 50
-    assert _table([HEAD + ",", *[row + "," for row in ROWS]]).told.damage == []
+    assert _table([HEAD + ",", *[row + "," for row in ROWS]]).remarks.damage == []
 
 
 def test_good_tables_lose_nothing() -> None:
     for top in LAYOUTS.values():
-        assert _table([*top, *ROWS]).told.damage == []
+        assert _table([*top, *ROWS]).remarks.damage == []

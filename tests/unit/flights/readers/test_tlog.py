@@ -55,7 +55,7 @@ def test_every_vehicle_has_its_own_modes_and_is_told_what_it_is(
     assert [event.text for event in flight.provenance.events if event.kind == "mode"] == named
     told = aircraft_kind(flight)
     assert told is not None
-    assert told.words == what
+    assert told.noun == what
     assert [event.kind for event in flight.provenance.events if "arm" in event.kind] == ["armed"]
 
 

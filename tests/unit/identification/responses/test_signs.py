@@ -81,22 +81,22 @@ def test_a_narrow_band_does_not_tell() -> None:
         assert sign_of(narrow, sense * first_order(narrow, delay=0.06), integrations=1)[0] == 0
     pairs = as_responses(narrow, first_order(narrow))
     sign = response_sign(pairs, "p", "mixer_roll", expected=1, integrations=1)
-    assert (sign.told, sign.wrong) == (0, False)
-    assert "too narrow to tell" in sign.words
+    assert (sign.sense, sign.wrong) == (0, False)
+    assert "too narrow to tell" in sign.facts
     holding = controllers_answer(OMEGA, 0.135, 0.09, 0.0036) / (1.0 + 6.0 / (1j * OMEGA))  # it holds the attitude too
     answer = as_responses(OMEGA, holding)
-    assert "neither sign follows" in response_sign(answer, "p", "mixer_roll", expected=1, integrations=1).words
+    assert "neither sign follows" in response_sign(answer, "p", "mixer_roll", expected=1, integrations=1).facts
     turned = response_sign(as_responses(OMEGA, -first_order(OMEGA)), "p", "mixer_roll", expected=1, integrations=1)
     assert turned.wrong
     within, kept = map(
         float,
         re.findall(
-            r"([\d.]+) rad off an aircraft's response with the sign turned, ([\d.]+) rad as it is", turned.words
+            r"([\d.]+) rad off an aircraft's response with the sign turned, ([\d.]+) rad as it is", turned.facts
         )[0],
     )
     assert within < 0.1 < kept
     low = as_responses(OMEGA / 40.0, first_order(OMEGA / 40.0))
-    assert "no coherent band above 0.3 Hz" in response_sign(low, "p", "mixer_roll", expected=1, integrations=1).words
+    assert "no coherent band above 0.3 Hz" in response_sign(low, "p", "mixer_roll", expected=1, integrations=1).facts
 
 
 def test_only_what_names_promise_is_judged() -> None:
