@@ -62,7 +62,7 @@ class Flown:
         late = (HELD + LOGGED) / RATE_OF_LOOPS + later
 
         def truth(axis: str, output: str, omega: Array) -> np.ndarray:
-            return mixer_response(self.model, self.moves[axis], output, omega, late=late, gravity=9.80665)
+            return mixer_response(self.model, self.moves[axis], output, omega, delay=late, gravity=9.80665)
 
         told: Truth = truth
         chirps = {axis: self.chirps[axis] for axis in axes}

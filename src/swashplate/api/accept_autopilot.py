@@ -154,7 +154,7 @@ def accept_helicopter(asked: Accept, vehicle: Vehicle, say: Say) -> Acceptance:
         moved = {axis: denser * each for axis, each in mixed(mixer, other.trim, mixing, inputs=names).items()}
 
         def response(linear: LinearModel, axis: str, output: str, omega: Array) -> Complex:
-            return mixer_response(linear, moved[axis], output, omega, late=late, gravity=float(around.gravity))
+            return mixer_response(linear, moved[axis], output, omega, delay=late, gravity=float(around.gravity))
 
         swept = {axis: chirps[axis] for axis in flown}
         comparison = _judged(logs, swept, partial(response, other), partial(response, model), loop, pilot, lines)
@@ -166,7 +166,7 @@ def accept_helicopter(asked: Accept, vehicle: Vehicle, say: Say) -> Acceptance:
 
 def _heave(model: LinearModel, moved: Array, gravity: float) -> float:
     """The most acceleration per unit of the collective from 1 to 10 rad/s [m/s^2]: motors come in between."""
-    answer = mixer_response(model, moved, "az", np.geomspace(1.0, 10.0, 10), late=0.0, gravity=gravity)
+    answer = mixer_response(model, moved, "az", np.geomspace(1.0, 10.0, 10), delay=0.0, gravity=gravity)
     return float(np.abs(answer).max())
 
 
@@ -222,7 +222,7 @@ def _flown(
         if physics.failed:
             trial.lines.append(TrialLine("physics", str(physics.failed[0]), "answers to the end", False))
         wall = time.monotonic() - begun
-    return trial.lines, trial.flown, session.plant.time / max(wall, 1e-9), values
+    return trial.lines, trial.swept_axes, session.plant.time / max(wall, 1e-9), values
 
 
 def _lean_max(reading: ParameterReading) -> float:
@@ -288,7 +288,7 @@ def _judged(
 
 def _rotor_line(flight: Flight, pilot: TrialPilot) -> TrialLine:
     """The rotor speed that the log has, beside the true one; told, not judged: not every version reads it."""
-    true = float(np.max([seen.rotor for seen in pilot.seen])) * 30.0 / math.pi
+    true = float(np.max([seen.rotor for seen in pilot.looks])) * 30.0 / math.pi
     logged = float(np.max(flight.values("omega_rotor"))) * 30.0 / math.pi if "omega_rotor" in flight else 0.0
     words = f"{logged:.0f} rpm" if logged else "none: this version reads no rpm, or RPM1_TYPE is not 10"
     return TrialLine("rotor speed in the log, largest", words, f"{true:.0f} rpm")

@@ -109,7 +109,7 @@ def accept_multirotor(
     say("reading the log")
     logs = sitl.logs()
     other = model if truth is None else linearize(airborne(truth), trim(airborne(truth), environment=around))
-    comparison = _judged(logs, trial, other, mapping) if trial.flown else None
+    comparison = _judged(logs, trial, other, mapping) if trial.excited else None
     called, log = name_of(asked.vehicle) or vehicle.card.called, logs[-1] if logs else None
     command = (str(sitl.binary),)
     return Acceptance(
@@ -142,7 +142,7 @@ def _judged(
     damage = "; ".join(flight.provenance.damage)
     lines.append(TrialLine("log", damage or f"{flight.duration:.0f} s", "read, not damaged", not damage))
     comparison, longest = TruthBeside(), trial.session.exchanged.longest
-    for axis, (sweep, began) in trial.flown.items():
+    for axis, (sweep, began) in trial.excited.items():
         try:
             lines += _axis(flight, axis, sweep, began, trial, model, mapping, longest, comparison)
         except SwashError as error:

@@ -81,7 +81,7 @@ class Estimating:
         say: Callable[[str], None] | None = None,
     ) -> None:
         self.model, self._say = model, say
-        late = {name: (delays or {}).get(name, 0.0) for name in model.input_names}
+        lags = {name: (delays or {}).get(name, 0.0) for name in model.input_names}
         sensors = suite(f"mocap@{rate:g}+0ms,gyro@{rate:g}+0ms")
         self._channels = (*model.state_names, *model.input_names, "voltage")
         self._sigma = np.zeros(len(self._channels))
@@ -106,13 +106,13 @@ class Estimating:
                     where=text,
                     channel=strange[0],
                 )
-            used = {name: late[name] for name in bare.channels if late.get(name) and name != bare.left}
+            used = {name: lags[name] for name in bare.channels if lags.get(name) and name != bare.left}
             e = regression_equation(text, delays=used)
             plan = regression_plan(e, rate=rate, held=[name for name in model.input_names if name in e.channels])
             self._regressions.append((RecursiveRegression(plan), [self._channels.index(n) for n in e.channels]))
             known += [KnownNow(name, coefficient_unit(e, name, {}), None) for name in e.names]
         if names:
-            plan_of = slow_plan(model, names, sensors=sensors, rate=rate, spread=SPREAD, wander=WANDER, delays=late)
+            plan_of = slow_plan(model, names, sensors=sensors, rate=rate, spread=SPREAD, wander=WANDER, delays=lags)
             self._filter = SlowParameters(plan_of)
             self._read = [self._channels.index(name) for sensor in sensors for name in sensor.channels]
             card = model.card.parameters
@@ -160,15 +160,15 @@ class Estimating:
     def _look(self) -> tuple[KnownNow, ...]:
         runs: list[RecursiveRegression | SlowParameters] = [regression for regression, _ in self._regressions]
         runs += [] if self._filter is None else [self._filter]
-        told: list[tuple[float | None, float | None]] = []
+        rows: list[tuple[float | None, float | None]] = []
         for run in runs:
             estimate = run.estimate()
             names = run.plan.equation.names if isinstance(run, RecursiveRegression) else run.plan.unknown
-            told += (
+            rows += (
                 [(None, None)] * len(names)
                 if estimate is None
                 else list(zip(estimate.values.tolist(), estimate.sigmas.tolist(), strict=True))
             )
         return tuple(
-            KnownNow(k.name, k.unit, k.model, value, sigma) for k, (value, sigma) in zip(self.known, told, strict=True)
+            KnownNow(k.name, k.unit, k.model, value, sigma) for k, (value, sigma) in zip(self.known, rows, strict=True)
         )

@@ -45,9 +45,9 @@ class MappingTable:
         inner = self._get(key, missing)
         if not isinstance(inner, Mapping):
             raise self.error(key, f"is {inner!r}, expected a table.")
-        made = MappingTable(inner, self.where, f"{self._path}{key}.")
-        self._parts.append(made)
-        return made
+        table = MappingTable(inner, self.where, f"{self._path}{key}.")
+        self._parts.append(table)
+        return table
 
     def text(self, key: str) -> str:
         value = self._get(key, _MISSING)
@@ -91,16 +91,16 @@ class MappingTable:
         if number != channel or not 1 <= number <= CHANNELS:
             raise self.error("channel", f"is {channel:g}, expected an output of 1 to {CHANNELS}.")
         entry = servos.part(str(number), missing={})
-        made = Servo(
+        servo = Servo(
             number,
             entry.number("low", missing=1000.0),
             entry.number("centre", missing=1500.0),
             entry.number("high", missing=2000.0),
             entry.flag("reversed"),
         )
-        if not PULSES[0] <= made.low < made.centre < made.high <= PULSES[1]:
+        if not PULSES[0] <= servo.low < servo.centre < servo.high <= PULSES[1]:
             raise entry.error("low", f"expected {PULSES[0]} <= low < centre < high <= {PULSES[1]} us.")
-        return made
+        return servo
 
     def done(self) -> None:
         """Complain about entries that nobody asked for."""

@@ -19,15 +19,15 @@ class Notices:
         self._say = say
         self.counts: Counter[str] = Counter()
 
-    def tell(self, kind: str, words: str) -> None:
-        """Say `words` if nothing of this kind was said before; count it in any case."""
+    def tell(self, kind: str, text: str) -> None:
+        """Say `text` if nothing of this kind was said before; count it in any case."""
         self.counts[kind] += 1
         if self.counts[kind] == 1:
-            self._say(words)
+            self._say(text)
 
-    def always(self, words: str) -> None:
+    def always(self, text: str) -> None:
         """Say what happens rarely and matters every time (a start, a restart, a crash)."""
-        self._say(words)
+        self._say(text)
 
     def summary(self) -> str:
         """The counts in one line, empty where there are none."""

@@ -97,7 +97,7 @@ class Plant:
         self.restart()
 
     @property
-    def moved(self) -> Motion:
+    def motion(self) -> Motion:
         """The newest motion."""
         return self._held
 
@@ -157,15 +157,15 @@ class Plant:
 
     def _follow(self, move: Callable[[], Motion]) -> None:
         try:
-            moved = move()
+            motion = move()
         except DivergenceError as error:
             self._break(f"{error.state} left the finite numbers", self._held.states)
             return
-        self._held = moved
-        if moved.body.z > 0.0:
-            self._break("it went over and its centre of gravity touched the ground", moved.states)
-        elif max(map(abs, moved.body[3:6] + moved.body[9:12])) > FASTEST:
-            self._break("it moves faster than any small helicopter can", moved.states)
+        self._held = motion
+        if motion.body.z > 0.0:
+            self._break("it went over and its centre of gravity touched the ground", motion.states)
+        elif max(map(abs, motion.body[3:6] + motion.body[9:12])) > FASTEST:
+            self._break("it moves faster than any small helicopter can", motion.states)
 
     def _estimate(self, estimating: Estimating, inputs: Array) -> None:
         elapsed, self._estimated = self.time - self._estimated, self.time

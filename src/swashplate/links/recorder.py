@@ -180,19 +180,19 @@ class Recorder:
         self._troubles.append(f"the recording has stopped: {why}")
         self._say(f"the recording has stopped, the flight goes on: {why}")
 
-    def _save(self, target: Path, flown: Growing) -> None:
+    def _save(self, target: Path, recording: Growing) -> None:
         try:
-            flight = read_grown(flown.path)
+            flight = read_grown(recording.path)
             if flight is not None:
                 judged = self._judge(flight)
                 self._saved.append(save(judged, target))
-                for words in judged.provenance.notes:
-                    self._say(f"{self._saved[-1]}: {words}.")
+                for note in judged.provenance.notes:
+                    self._say(f"{self._saved[-1]}: {note}.")
         except FlightError as error:
-            flown.close()
-            self._troubles.append(f"{error} What was flown stays in {flown.path}; `swash inspect` reads it.")
+            recording.close()
+            self._troubles.append(f"{error} What was flown stays in {recording.path}; `swash inspect` reads it.")
         else:
-            flown.discard()
+            recording.discard()
 
     def finish(self) -> tuple[Path, ...]:
         """End the recording and save its flights; returns the files of all of them.
@@ -202,8 +202,8 @@ class Recorder:
         """
         waiting = self._waiting if self._now is None else [*self._waiting, self._now]
         self._now, self._waiting = None, []
-        for target, flown in waiting:
-            self._save(target, flown)
+        for target, recording in waiting:
+            self._save(target, recording)
         if self._troubles:
             raise LinkError(" ".join(self._troubles), channel="--record")
         return tuple(self._saved)

@@ -79,38 +79,38 @@ class Sensing:
         """Whether what it reads differs from what is."""
         return self._unit is not None
 
-    def read(self, moved: Motion) -> Readings:
+    def read(self, motion: Motion) -> Readings:
         """Readings of a motion at the plant's time."""
-        return self.sensed(moved, self._plant.time, self._plant.voltage, self._drawn(), FLOATS)
+        return self.sensed(motion, self._plant.time, self._plant.voltage, self._drawn(), FLOATS)
 
     def sensed(
-        self, moved: Motion, time: Scalar, voltage: Scalar, noise: Sequence[Scalar] | None, xp: Backend
+        self, motion: Motion, time: Scalar, voltage: Scalar, noise: Sequence[Scalar] | None, xp: Backend
     ) -> Readings:
         """Readings of a motion: a function of nothing else, so that it can be traced.
 
         Args:
-            moved: the motion. time: [s]. voltage: of the battery [V].
+            motion: the newest. time: [s]. voltage: of the battery [V].
             noise: added to gyros and accelerometers, 6 numbers; None for none.
             xp: the operations.
         """
-        plant, body = self._plant, moved.body
+        plant, body = self._plant, motion.body
         wind = self._wind
         air = body.velocity
         if any(wind):
             air = air + local_to_body(wind, body.attitude, xp).scaled(-1.0)
-        gyro, force = body.rates, moved.force
+        gyro, force = body.rates, motion.force
         if noise is not None:
             gyro, force = (Vector(*map(add, v, n)) for v, n in ((gyro, noise[:3]), (force, noise[3:])))
         down = xp.cos(body.phi) * xp.cos(body.theta)
         height = xp.minimum(FARTHEST, xp.maximum(0.0, -body.z) / xp.maximum(down, _LEAST_DOWN))
-        rotors = plant.rotor_speeds(moved, xp)
+        rotors = plant.rotor_speeds(motion, xp)
         voltage, current = self._battery(rotors, voltage, xp)
         return Readings(
             time,
             gyro,
             force,
             Vector(body.x, body.y, body.z + plant.standing_depth),
-            moved.velocity,
+            motion.velocity,
             (_within_half_a_turn(body.phi, xp), body.theta, _within_half_a_turn(body.psi, xp)),
             xp.where(down > _LEAST_DOWN, height, FARTHEST),
             xp.maximum(0.0, air.x),

@@ -40,9 +40,9 @@ def listen_tcp(address: str, port: int) -> socket.socket:
     Raises:
         LinkError: as `listen_udp`.
     """
-    made = _bound(socket.SOCK_STREAM, address, port)
-    made.listen(1)
-    return made
+    bound = _bound(socket.SOCK_STREAM, address, port)
+    bound.listen(1)
+    return bound
 
 
 def wait_at_most(bound: socket.socket, seconds: float) -> None:
@@ -51,24 +51,24 @@ def wait_at_most(bound: socket.socket, seconds: float) -> None:
     What is over is a TimeoutError or a BlockingIOError.
     """
     if os.name == "posix":
-        whole, parts = divmod(round(1e6 * seconds), 1_000_000)
+        seconds_of_it, parts = divmod(round(1e6 * seconds), 1_000_000)
         bound.settimeout(None)
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", whole, parts))
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", seconds_of_it, parts))
     else:
         bound.settimeout(seconds)
 
 
 def _bound(kind: socket.SocketKind, address: str, port: int) -> socket.socket:
     is_loopback(address)
-    made = socket.socket(socket.AF_INET, kind)
+    bound = socket.socket(socket.AF_INET, kind)
     if kind is socket.SOCK_STREAM:  # a connection that was just closed must not keep its port
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        made.bind((address, port))
+        bound.bind((address, port))
     except OSError as error:
-        made.close()
+        bound.close()
         raise LinkError(_why(error, address, port), channel="--port", hint=_hint(error)) from None
-    return made
+    return bound
 
 
 def _why(error: OSError, address: str, port: int) -> str:

@@ -166,7 +166,7 @@ def truth_of(vehicle: Vehicle, *, name: str, rate: float = 200.0) -> Truth:
 
     def truth(axis: str, output: str, omega: np.ndarray) -> np.ndarray:
         late = (HELD + LOGGED) / rate + output_delays("ardupilot", law.frame, len(flying.input_names), rate)
-        return mixer_response(model, moves[axis], output, omega, late=late, gravity=9.80665)
+        return mixer_response(model, moves[axis], output, omega, delay=late, gravity=9.80665)
 
     return truth
 
@@ -318,7 +318,7 @@ def test_the_truth_of_an_axis_has_its_sign_and_size() -> None:
         moved = (inputs(*step) - inputs(*-step)) / 2e-3
         np.testing.assert_allclose(moves[axis], moved, atol=1e-9)
         a = MIXER_AXES[axis]
-        low = mixer_response(model, moves[axis], a.output, np.array([200.0]), late=0.0, gravity=9.81)
+        low = mixer_response(model, moves[axis], a.output, np.array([200.0]), delay=0.0, gravity=9.81)
         assert abs(low[0]) > 0.0
 
 

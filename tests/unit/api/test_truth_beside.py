@@ -31,7 +31,7 @@ def own_responses(model: LinearModel, moved: dict[str, Array], axes: tuple[str, 
     named = [MIXER_AXES[axis] for axis in axes]
     gravity = float(model.trim.environment.gravity)
     columns = [
-        [mixer_response(model, moved[axis], a.output, omega, late=LATE, gravity=gravity) for axis in axes]
+        [mixer_response(model, moved[axis], a.output, omega, delay=LATE, gravity=gravity) for axis in axes]
         for a in named
     ]
     h = np.moveaxis(np.array(columns), -1, 0)

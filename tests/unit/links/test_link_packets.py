@@ -54,7 +54,7 @@ def test_only_outputs_in_use_are_looked_at() -> None:
     assert isinstance(parse(servo_packet(400, 1, [1500, 1500, 3]), used=(1, 2)), ServoPacket)
     refused = parse(servo_packet(400, 1, PULSES), used=(17,))
     assert isinstance(refused, Refusal)
-    assert "SERVO_32_ENABLE" in refused.words
+    assert "SERVO_32_ENABLE" in refused.sentence
 
 
 def steps(*packets: tuple[tuple[str, int], int, float]) -> list[str]:

@@ -118,7 +118,7 @@ def test_it_lifts_off_waits_for_answers_and_starts_anew(session: Px4Session) -> 
                 lift = 0.60 if k < 350 else float("nan")  # a motor that PX4 does not drive
                 px4.command(lift, lift, 0.0, 0.0)
                 if k == 340:
-                    rotor, lower = px4.latest["RAW_RPM"], session.plant.rotor_speeds(session.plant.moved)[0]
+                    rotor, lower = px4.latest["RAW_RPM"], session.plant.rotor_speeds(session.plant.motion)[0]
             truth = px4.latest["HIL_STATE_QUATERNION"]
             assert truth.alt > 488_100
             assert rotor.index == 0

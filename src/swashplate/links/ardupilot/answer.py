@@ -32,5 +32,5 @@ def form(count: int) -> str:
 def in_order(r: Readings) -> tuple[Scalar, ...]:
     """The numbers of the line."""
     battery = () if r.voltage is None else (r.voltage, r.current)
-    moved = (r.time, *r.gyro, *r.force, *r.place, *r.attitude, *r.velocity)
-    return (*moved, r.range, r.airspeed, *r.wind, *r.vane, *r.rotors, *battery)
+    motion = (r.time, *r.gyro, *r.force, *r.place, *r.attitude, *r.velocity)
+    return (*motion, r.range, r.airspeed, *r.wind, *r.vane, *r.rotors, *battery)

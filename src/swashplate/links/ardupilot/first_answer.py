@@ -64,7 +64,7 @@ def who_it_is(sitl: Sitl, vehicle: Vehicle, mapping: ServoMapping, environment: 
     """
     around = Surroundings(environment)
     still = Immovable(at_rest(vehicle, environment), float(environment.gravity))
-    plant = Plant(vehicle, mapping, around, engine=lambda moved, air: still)
+    plant = Plant(vehicle, mapping, around, engine=lambda motion, air: still)
     session = ArduPilotSession(plant, Sensing(plant), Notices(lambda text: None))
     with (
         listen_udp("127.0.0.1", sitl.physics_port) as bound,
@@ -74,8 +74,8 @@ def who_it_is(sitl: Sitl, vehicle: Vehicle, mapping: ServoMapping, environment: 
         sitl.wait_for_port(timeout)
         with naming_the_end(sitl), Connection(f"tcp:127.0.0.1:{sitl.mavlink_port}", timeout=timeout) as connection:
             kind = greet(connection, ARDUPILOT, timeout)
-            if told := other_build(kind, vehicle.traits.servo_layout):
-                raise LinkError(told, where=sitl.binary)
+            if mismatch := other_build(kind, vehicle.traits.servo_layout):
+                raise LinkError(mismatch, where=sitl.binary)
             return f"version {_dotted(_version(Commanding(connection), timeout, sitl))}"
 
 
@@ -85,8 +85,8 @@ def naming_the_end(sitl: Sitl) -> Iterator[None]:
     try:
         yield
     except LinkError as error:
-        if told := sitl.ended(patience=2.0):
-            raise LinkError(told, where=sitl.binary, hint=f"All it printed is in {sitl.output}.") from None
+        if ending := sitl.ended(patience=2.0):
+            raise LinkError(ending, where=sitl.binary, hint=f"All it printed is in {sitl.output}.") from None
         raise error
 
 

@@ -97,8 +97,8 @@ def place(frames: Frames, sender: Address, count: int, now: float) -> tuple[Fram
             return here, PacketAction.START if fallen > 0 else PacketAction.SKIP
         if (who, which) == (sender, count):
             return frames, PacketAction.DOUBTFUL
-    late = 0 < fallen <= LATE
-    return frames._replace(doubt=(sender, count, now)), PacketAction.LATE if late else PacketAction.DOUBTFUL
+    delayed = 0 < fallen <= LATE
+    return frames._replace(doubt=(sender, count, now)), PacketAction.LATE if delayed else PacketAction.DOUBTFUL
 
 
 def _claimed(frames: Frames, here: Frames) -> tuple[Frames, PacketAction]:

@@ -67,12 +67,12 @@ class Lockstep:
     def __init__(self, plant: Plant, sensing: Sensing) -> None:
         native = plant.native
         assert native is not None
-        source, told = _source(plant, sensing)
+        source, count = _source(plant, sensing)
         library = loaded(source, options=_OPTIONS)
         self._fly = library.fly
         self._fly.argtypes, self._fly.restype = [ctypes.POINTER(_Link)], None
         self._plant = plant
-        self._link = _Link(frame=native.function, form=form(told).encode("ascii"))
+        self._link = _Link(frame=native.function, form=form(count).encode("ascii"))
         for name, row in zip(("x", "u", "s", "p", "g", "told"), native.rows, strict=True):
             setattr(self._link, name, row.ctypes.data)
 
@@ -134,17 +134,17 @@ def _source(plant: Plant, sensing: Sensing) -> tuple[str, int]:
     low, high = np.transpose([(float(a), float(b)) for a, b in plant.vehicle.input_limits])
     held = [xp.maximum(a, xp.minimum(u, b)) for u, a, b in zip(inputs, low, high, strict=True)]
     after = throttle if mapping.engine is None else mapping.engine.throttle
-    moved = casadi.Function("f", [pulses, duration, throttle], [casadi.vertcat(*held), casadi.vertcat(after)])
+    advance = casadi.Function("f", [pulses, duration, throttle], [casadi.vertcat(*held), casadi.vertcat(after)])
     n = len(plant.vehicle.state_names)
-    told, time, voltage = casadi.SX.sym("told", n + 6), casadi.SX.sym("time"), casadi.SX.sym("voltage")
-    row = [told[k] for k in range(n + 6)]
+    numbers, time, voltage = casadi.SX.sym("told", n + 6), casadi.SX.sym("time"), casadi.SX.sym("voltage")
+    row = [numbers[k] for k in range(n + 6)]
     body_of = RigidBody._make(row[: len(RigidBody._fields)])
     motion = Motion(body_of, Vector._make(row[n : n + 3]), Vector._make(row[n + 3 :]), row[:n])
     values = in_order(sensing.sensed(motion, time, voltage, None, xp))
-    felt = casadi.Function("f", [told, time, voltage], [casadi.vertcat(*values)], {"cse": True})
+    felt = casadi.Function("f", [numbers, time, voltage], [casadi.vertcat(*values)], {"cse": True})
     names = [("pulses", "duration", "throttle"), ("told", "time", "voltage")]
     blanks = {
-        "MOVED": _c(moved, names[0], ["u", "after"]),
+        "MOVED": _c(advance, names[0], ["u", "after"]),
         "FELT": _c(felt, names[1], ["r"]),
         "NUMBERS": str(len(values)),
         "PRINTED": ", ".join(f"r[{k}]" for k in range(len(values))),

@@ -54,20 +54,20 @@ def mixed(mixer: Mixer, hover: Trim, parameters: Mapping[str, float], *, inputs:
 
 
 def mixer_response(
-    model: LinearModel, moved: Array, output: str, omega: Array, *, late: Array | float, gravity: float
+    model: LinearModel, direction: Array, output: str, omega: Array, *, delay: Array | float, gravity: float
 ) -> Complex:
     """The linearised vehicle's answer to a mixer command, shape (n_f,).
 
     Args:
         model: about the trim that is flown.
-        moved: from `mixed`.
+        direction: from `mixed`.
         output: "p", "q", "r", or "az" (specific force at the centre of gravity along body z).
         omega: frequencies [rad/s].
-        late: by which the inputs move later than the command [s], shape (n_inputs,) or one number for all.
+        delay: by which the inputs move later than the command [s], shape (n_inputs,) or one number for all.
         gravity: [m/s^2].
     """
     place, eye = model.states.index, np.eye(len(model.states))
-    drives = np.exp(-1j * omega[:, None] * late) * moved @ model.B.T
+    drives = np.exp(-1j * omega[:, None] * delay) * direction @ model.B.T
     states = np.array([np.linalg.solve(1j * w * eye - model.A, drive) for w, drive in zip(omega, drives, strict=True)])
     if output == "az":
         trim = model.trim.states()

@@ -39,7 +39,7 @@ class Refusal(NamedTuple):
     """Why bytes are no packet: a kind (one word) and a sentence."""
 
     kind: str
-    words: str
+    sentence: str
 
 
 def parse(data: bytes, used: Iterable[int] = ()) -> ServoPacket | Refusal:

@@ -66,7 +66,7 @@ class ArduPilotSession:
         """
         packet = parse(data, self._used)
         if isinstance(packet, Refusal):
-            self._notices.tell(packet.kind, packet.words)
+            self._notices.tell(packet.kind, packet.sentence)
             return None
         before = self._frames
         self._frames, step = place(before, sender, packet.frame_count, now)
@@ -109,10 +109,10 @@ class ArduPilotSession:
         if self._lockstep is None or sender is None or self.plant.broken:
             return None
         until = min(until, self.plant.due)
-        flown = self._lockstep.fly(bound, sender, frames.last, self._rate, until)
-        if flown:
-            self._frames = Frames(sender, frames.last + flown, time.monotonic())
-            self._exchanges += flown
+        answered = self._lockstep.fly(bound, sender, frames.last, self._rate, until)
+        if answered:
+            self._frames = Frames(sender, frames.last + answered, time.monotonic())
+            self._exchanges += answered
             self._answer = self._lockstep.answer
         return self._lockstep.left
 
@@ -140,7 +140,7 @@ class ArduPilotSession:
         if abs(packet.frame_rate - self._rate) > 1:
             self._notices.tell("frame rate", f"the autopilot now asks for {packet.frame_rate} Hz.")
             self._rate = packet.frame_rate
-        moved = self.plant.advance(packet.pulses, 1.0 / self._rate)
+        motion = self.plant.advance(packet.pulses, 1.0 / self._rate)
         if self.plant.broken and not self._said_broken:
             self._said_broken = True
             self._notices.always(
@@ -148,7 +148,7 @@ class ArduPilotSession:
                 "is restarted."
             )
         self._exchanges += 1
-        self._answer = line(self._sensing.read(moved))
+        self._answer = line(self._sensing.read(motion))
         return self._answer
 
 

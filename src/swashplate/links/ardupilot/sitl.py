@@ -77,12 +77,12 @@ class Sitl:
     def __enter__(self) -> Sitl:
         self.folder.mkdir(parents=True, exist_ok=True)
         try:
-            with self.output.open("wb") as told:
+            with self.output.open("wb") as log:
                 self._process = subprocess.Popen(
                     self.command,
                     cwd=self.folder,
                     stdin=subprocess.DEVNULL,
-                    stdout=told,
+                    stdout=log,
                     stderr=subprocess.STDOUT,
                     start_new_session=True,  # whatever it starts itself is ended with it
                 )
@@ -116,9 +116,9 @@ class Sitl:
         if code is None:
             return ""
         how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        words = self.last_words()
-        told = f"; its last words: {words.rstrip('.')}" if words else "; it said nothing"
-        return f"the binary ended {how}{told}."
+        text = self.last_words()
+        ending = f"; its last words: {text.rstrip('.')}" if text else "; it said nothing"
+        return f"the binary ended {how}{ending}."
 
     def last_words(self, lines: int = 4) -> str:
         """The end of what it printed, in one line."""
@@ -137,8 +137,8 @@ class Sitl:
         """
         until = time.monotonic() + timeout
         while time.monotonic() < until:
-            if told := self.ended():
-                raise LinkError(told, where=self.binary, hint=f"All it printed is in {self.output}.")
+            if ending := self.ended():
+                raise LinkError(ending, where=self.binary, hint=f"All it printed is in {self.output}.")
             if _listens(self.mavlink_port):
                 return
             time.sleep(0.05)

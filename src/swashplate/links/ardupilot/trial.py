@@ -79,7 +79,7 @@ class Trial:
         autopilot: over MAVLink. sitl: the binary.
         plan: what is flown.
         lines: what was found so far.
-        flown: axes whose sweep was flown to its end.
+        swept_axes: axes whose sweep was flown to its end.
     """
 
     session: ArduPilotSession
@@ -88,7 +88,7 @@ class Trial:
     sitl: Sitl
     plan: TrialPlan
     lines: list[TrialLine] = field(default_factory=list)
-    flown: list[str] = field(default_factory=list)
+    swept_axes: list[str] = field(default_factory=list)
 
     @property
     def time(self) -> float:
@@ -102,14 +102,14 @@ class Trial:
         Raises:
             TrialEndedError: where the binary ends or restarts, the vehicle breaks, or time stands still.
         """
-        begun, last, moved = self.time, -1.0, time.monotonic()
+        begun, last, advanced = self.time, -1.0, time.monotonic()
         while not done():
             self._check()
             if self.time - begun > longest:
                 return False
             if self.time != last:
-                last, moved = self.time, time.monotonic()
-            elif time.monotonic() - moved > _STALLED:
+                last, advanced = self.time, time.monotonic()
+            elif time.monotonic() - advanced > _STALLED:
                 raise TrialEndedError(
                     f"the binary sent no servo packet for {_STALLED:g} s; its last words: "
                     f"{self.sitl.last_words() or 'none'}."
@@ -126,8 +126,8 @@ class Trial:
         self.wait(lambda: self.time >= until, longest=2.0 * seconds + 1.0)
 
     def _check(self) -> None:
-        if told := self.sitl.ended():
-            raise TrialEndedError(told)
+        if ending := self.sitl.ended():
+            raise TrialEndedError(ending)
         if self.session.progress.restarts or self.autopilot.health.restarted:
             raise TrialEndedError(f"the autopilot restarted by itself; its last words: {self.sitl.last_words()}.")
         if self.session.plant.broken:
@@ -147,13 +147,13 @@ class Trial:
 
         return self.wait(again, longest=longest)
 
-    def _tell(self, what: str, found: str, expected: str, passed: bool) -> bool:
-        self.lines.append(TrialLine(what, found, expected, passed))
+    def _tell(self, what: str, result: str, expected: str, passed: bool) -> bool:
+        self.lines.append(TrialLine(what, result, expected, passed))
         return passed
 
-    def _end(self, what: str, found: str, expected: str) -> None:
-        self._tell(what, found, expected, False)
-        raise TrialEndedError(f"{what}: {found}.")
+    def _end(self, what: str, result: str, expected: str) -> None:
+        self._tell(what, result, expected, False)
+        raise TrialEndedError(f"{what}: {result}.")
 
     # ---- the flight ----------------------------------------------------------------------------------------------
     def fly(self, say: Callable[[str], None]) -> None:
@@ -217,8 +217,8 @@ class Trial:
         """Change the mode, or end."""
         said = len(self.autopilot.health.texts)
         if not self._asked(lambda: self.autopilot.ask_mode(mode), lambda: self.autopilot.mode == mode, longest=15.0):
-            words = "; ".join(dict.fromkeys(self.autopilot.health.texts[said:])) or "it does not say why"
-            self._end(f"mode {name}", f"refused: {words}", "entered")
+            reason = "; ".join(dict.fromkeys(self.autopilot.health.texts[said:])) or "it does not say why"
+            self._end(f"mode {name}", f"refused: {reason}", "entered")
 
     def take_off(self) -> None:
         """Run-up, then up to the height."""
@@ -230,17 +230,17 @@ class Trial:
         def there() -> bool:
             if not self.autopilot.health.armed:
                 self._end("lift-off", "it disarmed itself", "in the air")
-            now = self.pilot.seen[-1]
+            now = self.pilot.looks[-1]
             return abs(now.down + self.plan.height) < _REACHED and self.speed_of_climb() < _CALM
 
         if not self.wait(there, longest=60.0):
-            now = self.pilot.seen[-1]
+            now = self.pilot.looks[-1]
             self._end("lift-off", f"{-now.down:.1f} m high after 60 s", f"{self.plan.height:g} m")
-        self._tell("lift-off", f"{-self.pilot.seen[-1].down:.1f} m", f"{self.plan.height:g} m", True)
+        self._tell("lift-off", f"{-self.pilot.looks[-1].down:.1f} m", f"{self.plan.height:g} m", True)
 
     def speed_of_climb(self) -> float:
         """Of the last half second [m/s]."""
-        last, before = self.pilot.seen[-1], self.pilot.seen[-25 if len(self.pilot.seen) > 25 else 0]
+        last, before = self.pilot.looks[-1], self.pilot.looks[-25 if len(self.pilot.looks) > 25 else 0]
         return abs(last.down - before.down) / max(0.02, last.time - before.time)
 
     def hover(self, name: str, mode: int, hands: Hands, limit: float) -> None:
@@ -248,9 +248,9 @@ class Trial:
         self.set_mode(name, mode)
         self.pilot.hands = hands
         self.pause(min(5.0, self.plan.hover))
-        first = len(self.pilot.seen)
+        first = len(self.pilot.looks)
         self.pause(self.plan.hover)
-        rows = np.array(self.pilot.seen[first:])
+        rows = np.array(self.pilot.looks[first:])
         place, height, lean = strayed(rows)
         held = height if hands == "height let go" else max(place, height)
         motion = f"place {place:.2f} m, height {height:.2f} m, lean {math.degrees(lean):.1f} deg"
@@ -260,7 +260,7 @@ class Trial:
 
     def sweep(self, axis: str, chirp: Chirp) -> None:
         """From STABILIZE into System ID and back."""
-        self.pilot.hands, self.pilot.place = "flying", (self.pilot.seen[-1].north, self.pilot.seen[-1].east)
+        self.pilot.hands, self.pilot.place = "flying", (self.pilot.looks[-1].north, self.pilot.looks[-1].east)
         self.set_mode("STABILIZE", STABILIZE)
         self.pause(4.0)
         for name, value in chirp.parameters().items():
@@ -279,7 +279,7 @@ class Trial:
         if bad() and self.time < until:
             self._tell(f"sweep of {axis}", bad()[0], "flown to its end", False)
         else:
-            self.flown.append(axis)
+            self.swept_axes.append(axis)
             self._tell(
                 f"sweep of {axis}",
                 f"{chirp.record:g} s, {chirp.start_hz:g} to {chirp.stop_hz:g} Hz",
@@ -302,7 +302,7 @@ class Trial:
         self.pilot.interlock = False
         if down:
             self.pause(2.0)
-        now = self.pilot.seen[-1]
+        now = self.pilot.looks[-1]
         lean = math.degrees(math.hypot(now.roll, now.pitch))
         landed = f"{abs(now.down):.2f} m high, {lean:.1f} deg, {'disarmed' if down else 'still armed'}"
         self._tell("landing", landed, "on the ground, upright, disarmed", down and abs(now.down) < 0.1 and lean < 10.0)
@@ -310,11 +310,11 @@ class Trial:
 
 def strayed(rows: Array) -> tuple[float, float, float]:
     """How far looks (rows of `Seen`) are at most from their middle in place and height [m], and the lean [rad]."""
-    seen = Seen(*rows.T)
-    centre = [0.5 * (float(np.max(x)) + float(np.min(x))) for x in (seen.north, seen.east, seen.down)]
-    place = np.hypot(seen.north - centre[0], seen.east - centre[1])
-    lean = np.hypot(seen.roll - np.mean(seen.roll), seen.pitch - np.mean(seen.pitch))
-    return float(place.max()), float(np.abs(seen.down - centre[2]).max()), float(lean.max())
+    looks = Seen(*rows.T)
+    centre = [0.5 * (float(np.max(x)) + float(np.min(x))) for x in (looks.north, looks.east, looks.down)]
+    place = np.hypot(looks.north - centre[0], looks.east - centre[1])
+    lean = np.hypot(looks.roll - np.mean(looks.roll), looks.pitch - np.mean(looks.pitch))
+    return float(place.max()), float(np.abs(looks.down - centre[2]).max()), float(lean.max())
 
 
 class Piloted:
@@ -332,7 +332,7 @@ class Piloted:
         answer = self._session.handle(data, sender, now)
         if answer is not None:
             plant = self._session.plant
-            self._pilot.look(plant.time, plant.moved, plant.rotor_speeds(plant.moved)[0])
+            self._pilot.look(plant.time, plant.motion, plant.rotor_speeds(plant.motion)[0])
         return answer
 
     def carry_on(self, bound: socket.socket) -> tuple[bytes, tuple[str, int]] | None:

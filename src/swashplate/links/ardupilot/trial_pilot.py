@@ -54,7 +54,7 @@ class TrialPilot:
         depth: of the ground below the origin of the motion [m].
         hands: what they do. interlock: whether the switch on channel 8 is up.
         height: to keep [m]. place: to keep, north and east [m].
-        seen: every look. due: when the next one is [s].
+        looks: every look. due: when the next one is [s].
     """
 
     send: Callable[[bytes], object]
@@ -67,25 +67,25 @@ class TrialPilot:
     interlock: bool = False
     height: float = 0.0
     place: tuple[float, float] = (0.0, 0.0)
-    seen: list[Seen] = field(default_factory=list)
+    looks: list[Seen] = field(default_factory=list)
     _lift: float = 0.0
     due: float = 0.0
 
     def take_off(self) -> None:
         """Take the sticks where the vehicle stands; the collective begins a little below hover."""
-        self.place = (self.seen[-1].north, self.seen[-1].east) if self.seen else (0.0, 0.0)
+        self.place = (self.looks[-1].north, self.looks[-1].east) if self.looks else (0.0, 0.0)
         self._lift = 0.6 * self.hover_stick
         self.hands = "flying"
 
-    def look(self, time: float, moved: Motion, rotor: float) -> None:
+    def look(self, time: float, motion: Motion, rotor: float) -> None:
         """Called after every step of the physics."""
         if time < self.due - 1e-9 and time > self.due - 1.0:
             return
         self.due = time + PERIOD
-        body, v = moved.body, moved.velocity
+        body, v = motion.body, motion.velocity
         x, y, z, phi, theta, psi = map(float, (body.x, body.y, body.z, body.phi, body.theta, body.psi))
         now = Seen(time, x, y, z + self.depth, phi, theta, psi, rotor)
-        self.seen.append(now)
+        self.looks.append(now)
         leans = self.hands in ("flying", "height let go")
         roll, pitch = self._lean(now, float(v.x), float(v.y)) if leans else (0.0, 0.0)
         lift = self._collective(now, float(v.z)) if self.hands == "flying" else 0.0

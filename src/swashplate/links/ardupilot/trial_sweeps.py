@@ -32,7 +32,7 @@ RESOLVED_AT_TRIM = 14.0
 
 def gentle_sweep(
     model: LinearModel,
-    moved: Array,
+    direction: Array,
     axis: str,
     gains: Mapping[str, float],
     *,
@@ -49,7 +49,7 @@ def gentle_sweep(
     an output by `least`.
 
     Args:
-        model: about hover. moved: how far a unit of the mixer's command moves its inputs. axis: that is swept.
+        model: about hover. direction: how far a unit of the mixer's command moves its inputs. axis: that is swept.
         gains: of the loops, by ArduPilot's names.
         band: asked for [Hz]. seconds: of the sweep. gravity: [m/s^2]. mapping: from outputs to inputs.
         least: amplitude of the output that moves most [us]. quickest: rate, below what is gentle [rad/s].
@@ -59,11 +59,11 @@ def gentle_sweep(
     """
     a = MIXER_AXES[axis]
     omega = 2.0 * np.pi * np.geomspace(*band, 60)
-    answer = mixer_response(model, moved, a.output, omega, late=0.0, gravity=gravity)
+    answer = mixer_response(model, direction, a.output, omega, delay=0.0, gravity=gravity)
     left = np.abs(1.0 / (1.0 + answer * _feedback(axis, gains, omega)))
     answer = np.abs(answer) * left
     quick, far = _GENTLE[a.output]
-    pulse = largest_pulse(mapping, moved)
+    pulse = largest_pulse(mapping, direction)
     size, start = 0.0, 0
     while start < 2 * omega.size // 3:
         part = slice(start, None)
@@ -81,7 +81,7 @@ def gentle_sweep(
     )
 
 
-def largest_pulse(mapping: ServoMapping, moved: Array) -> float:
+def largest_pulse(mapping: ServoMapping, direction: Array) -> float:
     """Of the output that moves most, per unit of the mixer's command [us]."""
     wide = 1e6  # s: an engine that is run up slowly is not asked here
     middle = [CENTRE] * max(mapping.channels)
@@ -92,7 +92,7 @@ def largest_pulse(mapping: ServoMapping, moved: Array) -> float:
         pulses[channel - 1] += 1.0
         slopes.append(np.array(mapping.inputs(pulses, wide)) - still)
     mapping.restart()
-    return float(np.abs(np.linalg.pinv(np.array(slopes).T) @ moved).max())
+    return float(np.abs(np.linalg.pinv(np.array(slopes).T) @ direction).max())
 
 
 def _feedback(axis: str, gains: Mapping[str, float], omega: Array) -> Complex:

@@ -151,8 +151,8 @@ class BetaflightBinary:
         """
         until = time.monotonic() + timeout
         while time.monotonic() < until:
-            if told := self.ended():
-                raise LinkError(told, where=self.binary)
+            if ending := self.ended():
+                raise LinkError(ending, where=self.binary)
             if _UP in self.text():
                 time.sleep(_SETTLING)
                 return
@@ -169,8 +169,8 @@ class BetaflightBinary:
 
     def refusals(self) -> str:
         """Why it refuses to be armed, in its own words, as it said last; empty for nothing."""
-        told = [line for line in self.text().splitlines() if "Arming disabled:" in line]
-        return told[-1].partition("Arming disabled:")[2].strip() if told else ""
+        lines = [line for line in self.text().splitlines() if "Arming disabled:" in line]
+        return lines[-1].partition("Arming disabled:")[2].strip() if lines else ""
 
     def logs(self) -> list[Path]:
         """Blackbox logs that it wrote, in order."""

@@ -55,9 +55,9 @@ class BetaflightGains:
 
 def axis_response(model: LinearModel, mapping: MotorMapping, axis: int, omega: Array) -> Complex:
     """From the mixer's roll, pitch or yaw command to the rate, in Betaflight's signs [rad/s], shape (n,)."""
-    moved = np.array([row[axis] for row in mapping.mixer])
+    shares = np.array([row[axis] for row in mapping.mixer])
     # A positive yaw command is turned around before it is mixed.
-    drive = model.B @ (moved * TRAVEL * (-1.0 if axis == 2 else 1.0))
+    drive = model.B @ (shares * TRAVEL * (-1.0 if axis == 2 else 1.0))
     eye, place = np.eye(len(model.states)), model.states.index(RATES[axis])
     states = np.array([np.linalg.solve(1j * w * eye - model.A, drive)[place] for w in omega])
     return np.asarray(SIGNS[axis] * states, dtype=np.complex128)
@@ -72,7 +72,7 @@ def betaflight_gains(model: LinearModel, mapping: MotorMapping) -> BetaflightGai
     settings: dict[str, float] = {"tpa_rate": 0.0, "anti_gravity_gain": 0.0}
     loops: list[LoopWorth] = []
     s: Complex = np.asarray(1j * FREQUENCIES, dtype=np.complex128)
-    late = np.exp(-s * _LATE) * _poles(s, _GYRO)
+    delay = np.exp(-s * _LATE) * _poles(s, _GYRO)
     strengths = []
     for axis, name in enumerate(AXES):
         plant = axis_response(model, mapping, axis, FREQUENCIES)
@@ -84,7 +84,7 @@ def betaflight_gains(model: LinearModel, mapping: MotorMapping) -> BetaflightGai
         ).T
         p, i, d = grid[0], np.round(grid[1] * grid[0]), np.round(grid[2] * grid[0])
         k = {key: (each * _SCALES[key] / _WHOLE * _DEGREES)[:, None] for key, each in (("p", p), ("i", i), ("d", d))}
-        back = (k["p"] + k["i"] / s + k["d"] * s * _poles(s, _SLOPE)) * late
+        back = (k["p"] + k["i"] / s + k["d"] * s * _poles(s, _SLOPE)) * delay
         outer = (k["p"] + k["i"] / s) * np.exp(-s * _LATE) * (grid[3][:, None] if axis < 2 else 0.0) / s
         trial = BrokenLoops(FREQUENCIES, (plant * (back + outer))[..., None], np.zeros(p.size))
         bare = BrokenLoops(FREQUENCIES, (plant * back)[..., None], np.zeros(p.size))

@@ -64,8 +64,8 @@ def log_clock(
 
     near = (at > best[1]) & (at < best[1] + seconds / best[2])
     sign = np.sign(float(sent((at[near] - best[1]) * best[2]) @ logged[near])) or 1.0
-    found = least_squares(missed, [best[1], best[2], sign * size], x_scale=[0.01, 1e-3, size or 1.0])
-    start, ratio, _ = found.x
+    fitted = least_squares(missed, [best[1], best[2], sign * size], x_scale=[0.01, 1e-3, size or 1.0])
+    start, ratio, _ = fitted.x
     form = sent((at[near] - start) * ratio)
     like = (
         abs(float(np.corrcoef(form, logged[near])[0, 1])) if np.ptp(form) > 0.0 and np.ptp(logged[near]) > 0.0 else 0.0

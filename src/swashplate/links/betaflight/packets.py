@@ -37,7 +37,7 @@ class PulseRefusal(NamedTuple):
     """Why a packet is none of Betaflight's: a kind to count it by, and words."""
 
     kind: str
-    words: str
+    sentence: str
 
 
 def pulses_of(data: bytes) -> Pulses | PulseRefusal:
@@ -50,8 +50,8 @@ def pulses_of(data: bytes) -> Pulses | PulseRefusal:
     if not (1 <= count <= CHANNELS) or not all(math.isfinite(v) and 0.0 <= v <= 3000.0 for v in values):
         turned, *others = struct.unpack(_EITHER[">"], data)
         if 1 <= turned <= CHANNELS and all(math.isfinite(v) and 0.0 <= v <= 3000.0 for v in others):
-            words = "pulses in another byte order came in, expected little-endian; they are ignored."
-            return PulseRefusal("byte order", words)
+            text = "pulses in another byte order came in, expected little-endian; they are ignored."
+            return PulseRefusal("byte order", text)
         return PulseRefusal("pulses", f"{count} outputs with pulses beyond 0 to 3000 us came in; they are ignored.")
     return Pulses(count, tuple(values))
 

@@ -52,7 +52,7 @@ class AnglePilot:
         depth: of the ground below the origin of the motion [m].
         phase: what is done. height: to keep [m].
         sweep: added to the roll, pitch or yaw stick (0 to 2), a function of time since it began; None for none.
-        seen: every look. sent: time [s] and roll, pitch and yaw sticks (-1 to 1) of each.
+        looks: every look. sent: time [s] and roll, pitch and yaw sticks (-1 to 1) of each.
     """
 
     lift: float
@@ -61,7 +61,7 @@ class AnglePilot:
     phase: Phase = "off"
     height: float = 1.0
     sweep: tuple[int, Callable[[float], float]] | None = None
-    seen: list[Look] = field(default_factory=list)
+    looks: list[Look] = field(default_factory=list)
     sent: list[tuple[float, float, float, float]] = field(default_factory=list)
     _since: float = 0.0
     _due: float = -1.0
@@ -71,24 +71,24 @@ class AnglePilot:
 
     def take_off(self, height: float) -> None:
         """Take the sticks where it stands."""
-        self._place, self.height = (self.seen[-1].north, self.seen[-1].east) if self.seen else (0.0, 0.0), height
+        self._place, self.height = (self.looks[-1].north, self.looks[-1].east) if self.looks else (0.0, 0.0), height
         self._sum, self.phase = 0.7 * self.hover_stick, "flying"
 
     def begin_sweep(self, axis: int, signal: Callable[[float], float]) -> None:
         """Add a signal to a stick from now on."""
-        self.sweep, self._since = (axis, signal), self.seen[-1].time
+        self.sweep, self._since = (axis, signal), self.looks[-1].time
 
-    def __call__(self, time: float, moved: Motion) -> list[float]:
+    def __call__(self, time: float, motion: Motion) -> list[float]:
         """Sticks and switches [us]: roll, pitch, throttle, yaw, arm, angle."""
         if self._sticks is not None and time < self._due - 1e-9:
             return self._sticks
         self._due = time + _PERIOD
-        body = moved.body
+        body = motion.body
         now = Look(time, *map(float, (body.x, body.y, body.z + self.depth, body.phi, body.theta, body.psi)))
-        self.seen.append(now)
+        self.looks.append(now)
         roll = pitch = yaw = throttle = 0.0
         if self.phase == "flying":
-            v = moved.velocity
+            v = motion.velocity
             roll, pitch = self._lean(now, float(v.x), float(v.y))
             yaw = max(-1.0, min(1.0, _TURN * math.remainder(now.yaw, 2.0 * math.pi)))
             throttle = self._throttle(now, float(v.z))
@@ -129,11 +129,11 @@ def pilot_for(model: LinearModel, depth: float) -> AnglePilot:
 def hovering(pilot: AnglePilot, *, height: float = 1.5) -> Callable[[float, Motion], list[float]]:
     """The same as who arms by himself, takes off and stays at a height [m]."""
 
-    def sticks(time: float, moved: Motion) -> list[float]:
+    def sticks(time: float, motion: Motion) -> list[float]:
         if pilot.phase == "off" and time > _ARMS:
             pilot.phase = "armed"
         elif pilot.phase == "armed" and time > _LIFTS:
             pilot.take_off(height)
-        return pilot(time, moved)
+        return pilot(time, motion)
 
     return sticks

@@ -54,9 +54,9 @@ class SwashServoMapping:
 
     def inputs(self, pulses: Sequence[float], duration: float) -> list[float]:
         """theta0, B1, A1, theta0T [rad] and throttle for pulses [us] by output, held for `duration` [s]."""
-        moved = [(pulse - CENTRE) / HALF for pulse in pulses[1:5]]
-        roll, pitch, collective = (commands_of(self._swash, np.array(moved[:3])) / RATE).tolist()
-        rig, turn = self._rigging, moved[3] / RATE
+        travel = [(pulse - CENTRE) / HALF for pulse in pulses[1:5]]
+        roll, pitch, collective = (commands_of(self._swash, np.array(travel[:3])) / RATE).tolist()
+        rig, turn = self._rigging, travel[3] / RATE
         self._running = min(self._throttle.share(pulses[0]), self._running + duration / _SPOOL)
         return [
             rig.pitch * collective,

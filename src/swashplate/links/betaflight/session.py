@@ -84,7 +84,7 @@ class BetaflightSession:
         sensing: Sensing,
         notices: Notices,
         *,
-        sticks: Sticks = lambda time, moved: None,
+        sticks: Sticks = lambda time, motion: None,
         doubles: int = 18,
     ) -> None:
         self.plant, self._sensing, self._notices, self.sticks, self._size = plant, sensing, notices, sticks, 8 * doubles
@@ -95,36 +95,36 @@ class BetaflightSession:
 
     def take(self, data: bytes) -> None:
         """A datagram of the motors' port, whatever it holds."""
-        told = pulses_of(data)
-        if isinstance(told, PulseRefusal):
-            self._notices.tell(told.kind, told.words)
+        packet = pulses_of(data)
+        if isinstance(packet, PulseRefusal):
+            self._notices.tell(packet.kind, packet.sentence)
             return
         wanted = self._motors
-        if told.motors != wanted:
-            words = f"the firmware drives {told.motors} motors, the vehicle has {wanted}: load its configuration."
-            self._notices.tell("motors", words)
+        if packet.motors != wanted:
+            text = f"the firmware drives {packet.motors} motors, the vehicle has {wanted}: load its configuration."
+            self._notices.tell("motors", text)
             return
-        if wanted < len(self.pulses) and not any(told.values[wanted : len(self.pulses)]):
+        if wanted < len(self.pulses) and not any(packet.values[wanted : len(self.pulses)]):
             self._notices.tell("servos", "the firmware sends no servos behind its motor: the vehicle stays as it is.")
             return
         if not self.exchanged.motors:
-            self._notices.always(f"Betaflight drives {told.motors} motors.")
+            self._notices.always(f"Betaflight drives {packet.motors} motors.")
         self.exchanged.motors += 1
-        self.pulses = list(told.values[: len(self.pulses)])
+        self.pulses = list(packet.values[: len(self.pulses)])
 
     def begun(self, stamp: float) -> bytes:
         """The state where it stands, with a time stamp [s]."""
-        return state_packet(stamp, self._sensing.read(self.plant.moved))[: self._size]
+        return state_packet(stamp, self._sensing.read(self.plant.motion))[: self._size]
 
     def step(self, duration: float) -> tuple[bytes, bytes | None]:
         """Move so long [s] under the newest motors. Returns the state to send, and sticks where they are due."""
-        moved = self.plant.advance(self.pulses, duration)
+        motion = self.plant.advance(self.pulses, duration)
         if self.plant.broken and not self._said_broken:
             self._said_broken = True
             self._notices.always(f"the vehicle broke at {self.plant.time:.2f} s: {self.plant.broken}. It lies there.")
-        held = self.sticks(self.plant.time, moved)
+        held = self.sticks(self.plant.time, motion)
         self.exchanged.states += 1
-        state = state_packet(_STAMP, self._sensing.read(moved))[: self._size]
+        state = state_packet(_STAMP, self._sensing.read(motion))[: self._size]
         if held is None or self.plant.time < self._due:
             return state, None
         self._due = self.plant.time + STICKS_EVERY - 1e-9
@@ -163,14 +163,14 @@ def serve(
             ticks = int((now - moved_to) * pace / _TICK)
             moved_to += ticks * _TICK / pace
             duration = min(LONGEST, ticks * _TICK)
-            told = session.exchanged
-            told.longest, told.lost = max(told.longest, ticks * _TICK), told.lost + ticks * _TICK - duration
+            counts = session.exchanged
+            counts.longest, counts.lost = max(counts.longest, ticks * _TICK), counts.lost + ticks * _TICK - duration
             state, sticks = session.step(duration)
             _send(out, state, STATE_PORT)
             if sticks is not None:
                 _send(out, sticks, STICKS_PORT)
-            if told.motors > came:
-                heard, came = now, told.motors
+            if counts.motors > came:
+                heard, came = now, counts.motors
             if idle_exit is not None and now - heard >= idle_exit:
                 return
 

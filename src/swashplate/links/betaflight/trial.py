@@ -56,7 +56,7 @@ class BetaflightTrial:
         height: of the hover [m]. hover: s of it. sweeps: that are flown.
         lines: what was found so far.
         armed: simulated time at which the motors began to turn [s].
-        flown: sweeps that were flown to their end, and when they began [s].
+        excited: sweeps that were flown to their end, and when they began [s].
     """
 
     session: BetaflightSession
@@ -67,7 +67,7 @@ class BetaflightTrial:
     sweeps: tuple[StickSweep, ...]
     lines: list[TrialLine] = field(default_factory=list)
     armed: float = math.nan
-    flown: dict[str, tuple[StickSweep, float]] = field(default_factory=dict)
+    excited: dict[str, tuple[StickSweep, float]] = field(default_factory=dict)
 
     @property
     def time(self) -> float:
@@ -82,8 +82,8 @@ class BetaflightTrial:
         """
         begun, heard, when = self.time, self.session.exchanged.motors, time.monotonic()
         while not done():
-            if told := self.binary.ended():
-                raise TrialEndedError(told)
+            if ending := self.binary.ended():
+                raise TrialEndedError(ending)
             if self.session.plant.broken:
                 raise TrialEndedError(f"the vehicle broke at {self.time:.1f} s: {self.session.plant.broken}.")
             if self.time - begun > longest:
@@ -102,8 +102,8 @@ class BetaflightTrial:
         until = self.time + seconds
         self.wait(lambda: self.time >= until, longest=2.0 * seconds + 1.0)
 
-    def _tell(self, what: str, told: str, expected: str, passed: bool) -> None:
-        self.lines.append(TrialLine(what, told, expected, passed))
+    def _tell(self, what: str, result: str, expected: str, passed: bool) -> None:
+        self.lines.append(TrialLine(what, result, expected, passed))
 
     def fly(self, say: Callable[[str], None]) -> None:
         """All of it; `say` is told every step.
@@ -168,20 +168,20 @@ class BetaflightTrial:
         self.pilot.take_off(self.height)
 
         def there() -> bool:
-            now = self.pilot.seen[-1]
+            now = self.pilot.looks[-1]
             return abs(now.down + self.height) < 0.2
 
         reached = self.wait(there, longest=30.0)
-        self._tell("lift-off", f"{-self.pilot.seen[-1].down:.2f} m", f"{self.height:g} m", reached)
+        self._tell("lift-off", f"{-self.pilot.looks[-1].down:.2f} m", f"{self.height:g} m", reached)
         if not reached:
             raise TrialEndedError("it does not lift off.")
         self.pause(4.0)
-        first = len(self.pilot.seen)
+        first = len(self.pilot.looks)
         self.pause(self.hover)
-        rows = np.array(self.pilot.seen[first:])
+        rows = np.array(self.pilot.looks[first:])
         place, height, lean = _strayed(rows)
-        words = f"place {place:.2f} m, height {height:.2f} m, lean {math.degrees(lean):.1f} deg"
-        self._tell("hover in ANGLE", words, f"place and height within {_STRAYS:g} m", max(place, height) <= _STRAYS)
+        text = f"place {place:.2f} m, height {height:.2f} m, lean {math.degrees(lean):.1f} deg"
+        self._tell("hover in ANGLE", text, f"place and height within {_STRAYS:g} m", max(place, height) <= _STRAYS)
 
     def fly_sweep(self, sweep: StickSweep) -> None:
         """One stick, from one end of the band to the other."""
@@ -189,22 +189,22 @@ class BetaflightTrial:
         self.pilot.begin_sweep(AXES.index(sweep.axis), sweep)
         self.pause(sweep.seconds + 0.5)
         self.pilot.sweep = None
-        self.flown[sweep.axis] = sweep, began
-        words = f"{sweep.seconds:g} s, {sweep.low:g} to {sweep.high:g} Hz"
-        self._tell(f"sweep of {sweep.axis}", words, "flown to its end", True)
+        self.excited[sweep.axis] = sweep, began
+        text = f"{sweep.seconds:g} s, {sweep.low:g} to {sweep.high:g} Hz"
+        self._tell(f"sweep of {sweep.axis}", text, "flown to its end", True)
         self.pause(4.0)
 
     def land(self) -> None:
         """Down, and the switch off."""
         self.pilot.height = -0.3
-        down = self.wait(lambda: abs(self.pilot.seen[-1].down) < 0.05, longest=20.0)
+        down = self.wait(lambda: abs(self.pilot.looks[-1].down) < 0.05, longest=20.0)
         self.pause(1.0)
         self.pilot.phase = "off"
         off = self.wait(lambda: max(self.session.pulses) < _IDLE, longest=3.0)
-        now = self.pilot.seen[-1]
+        now = self.pilot.looks[-1]
         lean = math.degrees(math.hypot(now.roll, now.pitch))
-        words = f"{abs(now.down):.2f} m high, {lean:.1f} deg, {'disarmed' if off else 'still armed'}"
-        self._tell("landing", words, "on the ground, upright, disarmed", down and off and lean < 10.0)
+        text = f"{abs(now.down):.2f} m high, {lean:.1f} deg, {'disarmed' if off else 'still armed'}"
+        self._tell("landing", text, "on the ground, upright, disarmed", down and off and lean < 10.0)
         self.pause(1.0)  # the log is closed
 
 

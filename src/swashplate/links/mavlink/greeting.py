@@ -40,8 +40,8 @@ def greet(connection: Connection, autopilot: int, timeout: float) -> int:
                 other = AUTOPILOT_NAMES.get(message.autopilot, f"autopilot number {message.autopilot}")
                 raise LinkError(f"{other} answers, expected {AUTOPILOT_NAMES[autopilot]}.", where=connection.address)
             if message.type not in _ROTORCRAFT:
-                told = f"a vehicle of MAVLink's type {message.type} answers, expected a helicopter or a multicopter."
-                raise LinkError(told, where=connection.address, hint="Is it ArduCopter's binary?")
+                problem = f"a vehicle of MAVLink's type {message.type} answers, expected a helicopter or a multicopter."
+                raise LinkError(problem, where=connection.address, hint="Is it ArduCopter's binary?")
             connection.system = message.get_srcSystem()
             return int(message.type)
     raise LinkError(

@@ -80,9 +80,9 @@ def px4_file(values: dict[str, float], *, title: str) -> str:
     """The text of a .params file, as QGroundControl loads it: vehicle, component, name, value, type (9: a float)."""
     head = f"# {' '.join(title.split())}: outputs and gains, written by swash control gains\n"
     head += "# Vehicle-Id Component-Id Name Value Type\n"
-    whole = ("CA_AIRFRAME", "CA_SP0_COUNT", "PWM_MAIN_FUNC", "PWM_MAIN_REV")
+    int32 = ("CA_AIRFRAME", "CA_SP0_COUNT", "PWM_MAIN_FUNC", "PWM_MAIN_REV")
     lines = (
-        f"1\t1\t{name}\t{round(value)}\t6\n" if name.startswith(whole) else f"1\t1\t{name}\t{round(value, 6):.9g}\t9\n"
+        f"1\t1\t{name}\t{round(value)}\t6\n" if name.startswith(int32) else f"1\t1\t{name}\t{round(value, 6):.9g}\t9\n"
         for name, value in values.items()
     )
     return head + "".join(lines)

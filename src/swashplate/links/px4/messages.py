@@ -127,15 +127,15 @@ def pulses(controls: Sequence[float], shares: Sequence[int]) -> list[float]:
         controls: of the outputs from 1.
         shares: outputs that go from 0 to 1; the others go from -1 to 1.
     """
-    made = []
+    widths = []
     for number, control in enumerate(controls, start=1):
         if not math.isfinite(control):
-            made.append(float(NO_PULSE))
+            widths.append(float(NO_PULSE))
         elif number in shares:
-            made.append(CENTRE - HALF + 2.0 * HALF * min(1.0, max(0.0, control)))
+            widths.append(CENTRE - HALF + 2.0 * HALF * min(1.0, max(0.0, control)))
         else:
-            made.append(CENTRE + HALF * min(1.0, max(-1.0, control)))
-    return made
+            widths.append(CENTRE + HALF * min(1.0, max(-1.0, control)))
+    return widths
 
 
 def _microseconds(time: float) -> int:

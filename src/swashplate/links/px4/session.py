@@ -63,14 +63,14 @@ class Px4Session:
     def step(self) -> bytes:
         """Move by one frame under the latest controls. Returns the sensors to send."""
         duration = 1.0 / RATE
-        moved = self.plant.advance(pulses(self._controls, self.plant.mapping.shares), duration)
+        motion = self.plant.advance(pulses(self._controls, self.plant.mapping.shares), duration)
         if self.plant.broken and not self._said_broken:
             self._said_broken = True
             self._notices.always(
                 f"the vehicle broke at {self.plant.time:.2f} s: {self.plant.broken}. It lies there until PX4 connects "
                 "anew."
             )
-        readings = self._sensing.read(moved)
+        readings = self._sensing.read(motion)
         frame, self._frame = self._frame, self._frame + 1
         noise = self._random.standard_normal(4).tolist()
         sent = self._mavlink.sensor(

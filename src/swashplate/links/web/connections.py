@@ -72,10 +72,10 @@ class OneLine(logging.Filter):
         kind, error, _ = record.exc_info
         record.exc_info, record.args = None, None
         if isinstance(error, UnicodeDecodeError):
-            told, self._told = self._told, True
+            before, self._told = self._told, True
             record.msg = "A page's message was refused: it is no UTF-8."
-            return not told
+            return not before
         name = "error" if kind is None else kind.__name__
-        words = f"A request failed inside swash ({name}: {error}). Please report it; SWASHPLATE_DEBUG=1 shows where."
-        record.msg = words
+        text = f"A request failed inside swash ({name}: {error}). Please report it; SWASHPLATE_DEBUG=1 shows where."
+        record.msg = text
         return True

@@ -41,19 +41,19 @@ def listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
             channel="host",
             hint="Whoever reaches the page can do all that it does; if that is meant: --settings allow_remote=true.",
         )
-    made = socket.socket(resolved[0], socket.SOCK_STREAM)
+    bound = socket.socket(resolved[0], socket.SOCK_STREAM)
     try:
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        made.bind(resolved[4])
-        made.listen(64)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind(resolved[4])
+        bound.listen(64)
     except OSError as error:
-        made.close()
+        bound.close()
         raise SwashError(
             f"port {port} of {host} cannot be had: {error.strerror or error}.",
             channel="--port",
             hint="Is another page of swash open there? --port 0 takes any free port.",
         ) from None
-    return made
+    return bound
 
 
 def address_of(listening: socket.socket) -> str:
@@ -95,7 +95,7 @@ def configured(app: ASGIApp, *, frame: int = 0) -> uvicorn.Config:
     Args:
         frame: longest frame of a WebSocket [bytes]; 0 where the app has none.
     """
-    made = uvicorn.Config(
+    config = uvicorn.Config(
         app,
         http=Punctual,
         log_level="warning",
@@ -108,7 +108,7 @@ def configured(app: ASGIApp, *, frame: int = 0) -> uvicorn.Config:
     )
     for log in ("uvicorn.error", "asyncio"):
         logging.getLogger(log).addFilter(OneLine())
-    return made
+    return config
 
 
 class _Server(uvicorn.Server):
@@ -117,8 +117,8 @@ class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         with super().capture_signals():
-            own = threading.current_thread() is threading.main_thread()
-            if HANGUP is None or not own or signal.getsignal(HANGUP) is signal.SIG_IGN:  # as `nohup` asks for
+            in_main = threading.current_thread() is threading.main_thread()
+            if HANGUP is None or not in_main or signal.getsignal(HANGUP) is signal.SIG_IGN:  # as `nohup` asks for
                 yield
                 return
             before = signal.signal(HANGUP, self.handle_exit)

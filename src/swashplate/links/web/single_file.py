@@ -96,10 +96,10 @@ def _add(address: str, modules: dict[str, str], places: Mapping[str, Path], inst
         return
 
     def named(match: re.Match[str]) -> str:
-        whole = posixpath.normpath(posixpath.join(posixpath.dirname(address), match[2]))
-        whole = instead.get(whole, whole)
-        _add(whole, modules, places, instead)
-        return f'{match[1]}"{whole}"'
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(address), match[2]))
+        path = instead.get(path, path)
+        _add(path, modules, places, instead)
+        return f'{match[1]}"{path}"'
 
     modules[address] = _IMPORT.sub(named, _text(address, places))
 
