@@ -5,8 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,31 +17,11 @@ import pytest
 import chromium
 import swashplate as sp
 from flown_here import World
+from page_flights import FLY, flies_the_same, opened, wait_until
 from swashplate.api.verbs.export import ExportModel
-from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.web.libraries import PAGE
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import FloatBackend
-from swashplate.physics.frames import Euler, Vector, local_to_body
-
-FLY = """plan => {
-  const { connection } = swash, { flight } = connection;
-  connection.runs = false;
-  flight.reset();
-  let seed = 1;
-  Math.random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
-  for (let k = 0; k < plan.sticks.length; k += 1) {
-    flight.setting.sticks = Object.fromEntries(plan.axes.map((axis, i) => [axis, plan.sticks[k][i]]));
-    if (k === plan.maneuver) flight.flyManeuver("3211", "roll", 1);
-    if (k === plan.mode) flight.setMode("velocity");
-    if (k === plan.blow && plan.wind) flight.setting.wind = [1, -0.5, 0];
-    flight.step();
-  }
-  const result = { x: [...flight.places[0].x], u: [...flight.places[0].inputs], trouble: flight.trouble };
-  return { ...result, air: flight.airSpeed(), fan: flight.fanned()?.x ?? [] };
-}"""
-MANEUVER, BLOW, MODE = 300, 500, 700
 
 
 @pytest.fixture(scope="module")
@@ -54,70 +33,9 @@ def browser() -> Iterator[Any]:
     yield from chromium.running_browser(webgl=True)
 
 
-def opened(browser: Any, file: Path, size: tuple[int, int] = (1280, 860)) -> tuple[Any, list[str]]:
-    """The page, flying, and what it said and asked for elsewhere."""
-    context = browser.new_context(offline=True, viewport={"width": size[0], "height": size[1]})
-    page, said = context.new_page(), []
-    page.on("console", lambda message: said.append(f"{message.type}: {message.text}"))
-    page.on("pageerror", lambda error: said.append(f"error: {error}"))
-    page.on(
-        "request",
-        lambda request: said.append(f"error: asked for {request.url}") if request.url.startswith("http") else None,
-    )
-    page.goto(file.as_uri())
-    page.locator("html[data-drawn]").wait_for(state="attached", timeout=90_000)
-    return page, said
-
-
-def wait_until(page: Any, condition: str) -> None:
-    """Until an expression of the page holds; the page's own policy forbids playwright's way to ask."""
-    end = time.monotonic() + 90.0
-    while not page.evaluate(condition):
-        assert time.monotonic() < end, condition
-        page.wait_for_timeout(50)
-
-
-def plan_of(world: World) -> dict[str, Any]:
-    at = np.arange(round(10.0 / world.period)) * world.period
-    waves = (0.5 * np.sin(2.0 * at), 0.4 * np.sin(1.3 * at), 0.3 * np.cos(at), 0.2 * np.sin(0.7 * at))
-    known = {"axes": list(STICKS), "maneuver": MANEUVER, "mode": MODE, "blow": BLOW}
-    return {**known, "sticks": np.stack(waves, axis=1).tolist(), "wind": world.vehicle.traits.wind}
-
-
-def air_speed(world: World) -> float:
-    """Of the craft in the wind of the sliders [m/s], by the package's own rotation."""
-    x = np.array(world.moment().crafts["own"][0])
-    u, v, w, *angles = (float(x[world.vehicle.index(name)]) for name in ("u", "v", "w", "phi", "theta", "psi"))
-    wind = local_to_body(Vector(*world.setting.wind), Euler(*angles), FloatBackend())
-    return float(np.linalg.norm(np.array([u, v, w]) - np.array(wind)))
-
-
-def same_normals() -> Callable[[], float]:
-    """Normal draws as the page makes them of the uniform ones of `FLY`: Lehmer's with Park and Miller's numbers."""
-    seed = 1
-
-    def uniform() -> float:
-        nonlocal seed
-        seed = seed * 48271 % 2147483647
-        return seed / 2147483647
-
-    return lambda: math.sqrt(-2.0 * math.log(1.0 - uniform())) * math.cos(2.0 * math.pi * uniform())
-
-
-def flown_here(world: World, plan: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    world.normal = same_normals()
-    for k, sticks in enumerate(plan["sticks"]):
-        world.setting.sticks = dict(zip(STICKS, sticks, strict=True))
-        if k == MANEUVER:
-            pilot = world.pilot
-            world.fly_maneuver(Maneuver("3211", (pilot.excited["roll"],), 3.5, pilot.amplitude["roll"]))
-        if k == MODE:
-            world.set_mode("velocity")
-        if k == BLOW and plan["wind"]:
-            world.setting.wind = (1.0, -0.5, 0.0)
-        world.step()
-    own = world.moment().crafts["own"]
-    return np.array(own[0]), np.array(own[1])
+APART = """document.getElementById("views").getBoundingClientRect().left
+  - document.getElementById("instruments").getBoundingClientRect().right"""
+"""Between the numbers and the buttons beside them [px]; four rotors' speeds are long."""
 
 
 def fitted(**nuisance: float) -> Vehicle:
@@ -135,23 +53,42 @@ def test_it_flies_as_here_with_the_network_off(browser: Any, name: str, tmp_path
     draws = [fitted(delay_servo=0.01), fitted(level_theta=0.05)] if name == "fitted" else []
     (file,) = sp.export_model(vehicle, "web", name=name, draws=draws).save(tmp_path)
     assert file.stat().st_size < 1_000_000
-    page, said = opened(browser, file)
+    page, said = opened(browser, file, (390, 844) if name == "crazyflie" else (1280, 860))
     world = World(vehicle, draws=draws)
+    assert page.evaluate(APART) > 0.0
     assert world.delays.any() == (name == "fitted")
     assert world.not_held == ""
     shown = "a point (20, 0, -50) mm ahead, right and below" if draws else "the true states"
     assert shown in page.locator("#sensors").text_content()
-    plan = plan_of(world)
-    found = page.evaluate(FLY, plan)
-    x, u = flown_here(world, plan)
-    assert found["trouble"] == world.trouble == ""
-    np.testing.assert_allclose(found["x"], x, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(found["u"], u, rtol=1e-9, atol=1e-9)
+    x = flies_the_same(page, world)
     fan = [row[:12] for row in world.moment().fan if row is not None]
-    assert len(fan) == len(draws)
-    np.testing.assert_allclose(found["fan"], np.reshape(fan, (-1, 12)) if fan else [], rtol=1e-9, atol=1e-9)
     assert all(np.abs(row - x[:12]).max() > 1e-3 for row in fan), "each with delays and sensors of its own"
-    assert found["air"] == pytest.approx(air_speed(world), rel=1e-9)
+    assert not chromium.complaints(said)
+
+
+def test_a_gamepad_flies_it_and_one_that_is_gone_lets_the_sticks_go(browser: Any, tmp_path: Path) -> None:
+    """A stand-in of what browsers tell; axes point right and down, as the standard has them."""
+    (file,) = sp.export_model("coax", "web").save(tmp_path)
+    page, said = opened(browser, file)
+    page.evaluate("window.pads = []; navigator.getGamepads = () => window.pads")
+    tell = "axes => (window.pads = [null, { connected: true, id: 'stand-in', axes }], swash.sticks.read(0))"
+    for place, (axis, sense) in enumerate([("yaw", 1.0), ("heave", -1.0), ("roll", 1.0), ("pitch", -1.0)]):
+        for pushed in (-1.0, 0.8):
+            found = page.evaluate(tell, [pushed * (k == place) + 0.05 * (k != place) for k in range(4)])
+            expected = sense * math.copysign((abs(pushed) - 0.06) / 0.94, pushed)
+            assert found == pytest.approx(dict.fromkeys(STICKS, 0.0) | {axis: expected}), "no other axis than this"
+    page.evaluate(tell, [0, 0, 0.9, 0])
+    wait_until(page, "swash.now.own.x[4] > 0.1")  # to the right
+    assert page.evaluate("swash.sticks.right.knob.style.transform").startswith("translate(35.7")
+    assert page.locator("#gamepad").text_content() == "Gamepad: stand-in"
+    for gone in ("[]", "[null]", "[{ ...window.pads[1], connected: false }]"):
+        page.evaluate(tell, [0, 0, 0.9, 0])
+        page.evaluate(f"window.pads = {gone}")
+        wait_until(page, "swash.now.setting.sticks.roll === 0")
+        assert page.evaluate("swash.sticks.right.knob.style.transform") == "translate(0%, 0%)"
+    page.get_by_text("No gamepad").wait_for(state="attached")
+    page.evaluate("navigator.getGamepads = undefined")
+    assert page.evaluate("swash.sticks.read(0).roll") == 0.0
     assert not chromium.complaints(said)
 
 

@@ -23,6 +23,7 @@ import pytest
 
 import swashplate as sp
 from chromium import running_browser
+from swashplate.models.card import packaged_cards
 
 sphinx = pytest.importorskip("sphinx", reason="the site's packages are not installed")
 
@@ -111,6 +112,17 @@ def test_a_page_of_a_vehicle_flies_it(site: Path) -> None:
     assert 'src="../fly/raptor50.html"' in page
     assert "Content-Security-Policy" in (site / "fly" / "raptor50.html").read_text(encoding="utf-8")
     assert dead_links(site / "fly") == []
+
+
+def test_every_ready_vehicle_flies_from_the_list_and_the_readme_s_third_door_leads_there(read: dict[str, str]) -> None:
+    if find_spec("ziglang") is None:
+        pytest.skip("the extra 'compiler' is not installed: nothing makes WebAssembly")
+    listed = read["reference/vehicles.md"]
+    assert re.findall(r'href="\.\./fly/(\w+)\.html"', listed) == list(packaged_cards())
+    opening = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n## Get a model")[2].partition("\n## ")[0]
+    assert {"docs/doors/get-a-model.md", "docs/reference/vehicles.md"} <= set(re.findall(r"\]\(([^)]+)\)", opening))
+    for page, name in (("doors/get-a-model", "raptor50"), ("explanation/coax-model", "coax")):
+        assert f'src="../fly/{name}.html"' in read[f"{page}.md"]
 
 
 def _headings(page: str) -> list[tuple[int, str]]:
