@@ -189,6 +189,10 @@ def _log(name: str) -> Any:
     return replace(log, provenance=replace(log.provenance, source=name))
 
 
+_HELD = {"ties": "tie", "fixed": "fix", "priors": "prior"}
+"""What holds parameters, as `parameterize` and as `sp.identify` call it."""
+
+
 @contextlib.contextmanager
 def stand_ins() -> Iterator[None]:
     """Short simulated logs in place of the real flights, a small fit in place of a long one: the calls are tried."""
@@ -203,8 +207,8 @@ def stand_ins() -> Iterator[None]:
     def identifying(*given: Any, **options: Any) -> Any:
         asked = inspect.signature(identify).bind(*given, **options)
         asked.apply_defaults()
-        vehicle, flights = asked.arguments["model"], asked.arguments["flights"]
-        question = {name: asked.arguments[name] for name in ("ties", "fixed", "priors")}
+        vehicle, flights = asked.arguments["vehicle"], asked.arguments["flight"]
+        question = {plural: asked.arguments[name] for plural, name in _HELD.items() if asked.arguments[name]}
         parameterize(vehicle, asked.arguments["free"] or "full", **question)  # are the names right?
         small = {"free": ["tau_f_upper", "linkage_lower"], "method": "output-error", "iterations": 3}
         return _once(("identify", flights.provenance.source), lambda: identify(vehicle, flights, **small))

@@ -15,7 +15,7 @@ from swashplate.physics.environment import Environment
 class RateLeastSquares:
     """For a first look: nothing is integrated, and noise in the measured states biases what it finds."""
 
-    takes = frozenset({"free", "fixed"})  # what of `sp.identify`'s arguments it heeds
+    takes = frozenset({"free", "fix"})  # what of `sp.identify`'s arguments it heeds
 
     def unsuited(self, model, data):
         """Why it cannot serve, "" where it can."""
@@ -25,7 +25,7 @@ class RateLeastSquares:
         return f"the flights do not have the states {', '.join(missing)}" if missing else ""
 
     def estimate(self, model, data, question):
-        table = parameterize(model, question.free or "full", fixed=question.fixed)
+        table = parameterize(model, question.free or "full", fixed=question.fix)
         air, xp = Environment(), ArrayBackend()
         pieces = [piece for flight in data for piece in flight.split()]
         states = [piece.array(model.state_names) for piece in pieces]

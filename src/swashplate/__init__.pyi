@@ -14,6 +14,7 @@ from swashplate.api.verbs.decouple import decouple as decouple
 from swashplate.api.verbs.export import export_model as export_model
 from swashplate.api.verbs.identify import fit_ss as fit_ss
 from swashplate.api.verbs.identify import fit_tf as fit_tf
+from swashplate.api.verbs.identify import identify as identify
 from swashplate.api.verbs.link import accept_autopilot as accept_autopilot
 from swashplate.api.verbs.link import check_autopilot as check_autopilot
 from swashplate.api.verbs.maneuver import design_maneuver as design_maneuver
@@ -39,7 +40,6 @@ from swashplate.flights.spectrum import spectrogram as spectrogram
 from swashplate.flights.spectrum import spectrum as spectrum
 from swashplate.identification.core.result import Result as Result
 from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function as fit_transfer_function
-from swashplate.identification.identify import identify as identify
 from swashplate.identification.posterior import posterior as posterior
 from swashplate.identification.responses.arithmetic import combine as combine
 from swashplate.identification.responses.frequency_response import FrequencyResponse as FrequencyResponse

@@ -119,10 +119,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Iterator[Work]:
     monkeypatch.setattr(identification, "identify", done.identify)
     monkeypatch.setattr("swashplate.validation.validate.validate", done.validate)
     monkeypatch.setattr("swashplate.reporting.report.report", done.report)
-    monkeypatch.setattr(identification, "structure_of", lambda *results, title: results)
-    monkeypatch.setattr(
-        "swashplate.api.report_folder.write_page", lambda path, results: done.report(*results, path=path)
-    )
+    monkeypatch.setattr(identification, "report", done.report)
     return done
 
 
@@ -210,9 +207,9 @@ def test_what_the_user_said_reaches_the_identification(work: Work, simulated: Pa
     assert outcome.code == 0
     assert work.asked["free"] == ("tau_f_upper", "linkage_lower")
     assert work.asked["method"] == "output-error"
-    assert work.asked["fixed"] == {"mass": 0.333}
-    assert work.asked["ties"] == ("a_beta_u = a_alpha_v",)
-    assert work.asked["priors"] == {"tau_f_upper": (1.6, 0.4)}
+    assert work.asked["fix"] == {"mass": 0.333}
+    assert work.asked["tie"] == ("a_beta_u = a_alpha_v",)
+    assert work.asked["prior"] == {"tau_f_upper": (1.6, 0.4)}
     assert work.asked["iterations"] == 7
     (flight,) = work.asked["flights"]
     assert flight.rate("phi") == pytest.approx(50.0)

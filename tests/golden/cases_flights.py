@@ -47,9 +47,9 @@ def real_fit_of_six_with_ties_and_priors(folder: Path) -> Values:
         sp.vehicle("coax"),
         whole.between(whole.start, whole.start + 20.0),
         free=["linkage_lower", "a_alpha_v_linear", "tau_f_upper", "hub_stiffness_lower"],
-        ties=["a_beta_u_linear = a_alpha_v_linear", "hub_stiffness_upper = 0.25 * hub_stiffness_lower"],
-        fixed={"mass": 0.305},
-        priors={"tau_f_upper": (1.0, 0.2)},
+        tie=["a_beta_u_linear = a_alpha_v_linear", "hub_stiffness_upper = 0.25 * hub_stiffness_lower"],
+        fix={"mass": 0.305},
+        prior={"tau_f_upper": (1.0, 0.2)},
     )
     return extract.of_fit(fit)
 

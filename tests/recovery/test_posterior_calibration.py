@@ -56,7 +56,7 @@ def ranked(seed: int, *, gusts: bool) -> dict[str, Array]:
     truth = {name: float(mean + sigma * random.standard_normal()) for name, (mean, sigma) in PRIOR.items()}
     flown = flight(truth, random, GUSTS if gusts else None)
     method = "filter-error" if gusts else "output-error"
-    fit = sp.identify(rolling(), flown, free=list(PRIOR), priors=PRIOR, outputs=OUTPUTS_OF_ROLL, method=method)
+    fit = sp.identify(rolling(), flown, free=list(PRIOR), prior=PRIOR, outputs=OUTPUTS_OF_ROLL, method=method)
     asked: dict[str, dict[str, Any]] = {"laplace": {}, "nuts": {"chains": 2, "warmup": 60, "draws": 2000}}
     found = {}
     for name, how in asked.items():

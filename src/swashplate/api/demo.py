@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swashplate.api.identification import Identification
 from swashplate.api.saying import Say
 from swashplate.api.verbs.identify import FitVehicle
 from swashplate.control.laws.hold import hover_hold
@@ -15,6 +14,7 @@ from swashplate.flights import datasets
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import parse
 from swashplate.flights.readers.read import read
+from swashplate.identification.core.result import Result
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import simulate_closed_loop
@@ -34,10 +34,10 @@ _TRUTH = {"tau_f_upper": 1.3, "linkage_lower": 0.11, "hub_stiffness_upper": 0.09
 """What the simulated aircraft has instead of the card's numbers, for the identification to find."""
 
 
-def run_demo(asked: Demo, say: Say) -> Identification:
-    """The demo that was asked for; `fit.data` and the report's first line say which flights it took.
+def run_demo(asked: Demo, say: Say) -> Result[Any, Any]:
+    """The demo that was asked for; its `data` and the report's first line say which flights it took.
 
-    The numbers of the simulated aircraft are `fit.truth`, and stand in the tables beside the published and the
+    The numbers of the simulated aircraft are its `truth`, and stand in the tables beside the published and the
     identified ones.
     """
     seed = asked.seed
@@ -55,8 +55,8 @@ def run_demo(asked: Demo, say: Say) -> Identification:
     if len(files) == 2:
         return made
     true = _aircraft(coax).card.values()
-    known = {e.name: true[e.name] for e in made.fit.estimates if e.name in true}
-    return replace(made, fit=replace(made.fit, truth=known))
+    known = {e.name: true[e.name] for e in made.estimates if e.name in true}
+    return replace(made, truth=known)
 
 
 def _aircraft(vehicle: Vehicle) -> Vehicle:

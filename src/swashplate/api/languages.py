@@ -30,7 +30,10 @@ Bands: TypeAlias = Mapping[str, Band] | Band
 Delays: TypeAlias = Mapping[str, float] | float
 Limits: TypeAlias = Mapping[str, float]
 Paths: TypeAlias = Sequence[Path] | Path
-Priors: TypeAlias = Mapping[str, tuple[float, float]]
+Priors: TypeAlias = Any
+"""A card or its file, or means and standard deviations by name, the card's file under the name ""."""
+Air: TypeAlias = Any
+"""An `Environment`, or numbers of it by name."""
 Logs: TypeAlias = Any
 """A flight, its file or a data set's name, or several."""
 FlightLimits: TypeAlias = Any
@@ -245,6 +248,16 @@ def in_seconds(milliseconds: Any) -> Any:
     return None if milliseconds is None else milliseconds / 1e3
 
 
+def _environment(value: Any, called: str) -> Any:
+    """An environment of its numbers by name; one as it is."""
+    from swashplate.physics.environment import Environment
+
+    for name in value if isinstance(value, Mapping) else ():
+        if name not in Environment._fields:
+            raise SwashError(f"'{name}' is unknown, expected one of {', '.join(Environment._fields)}.", channel=called)
+    return Environment(**value) if isinstance(value, Mapping) else value
+
+
 def _priors(texts: Sequence[str], called: str) -> dict[str, Any]:
     """`CARD` (under the name "") and `name=mean,sigma`."""
     cards = [text for text in texts if "=" not in text]
@@ -307,6 +320,7 @@ _LANGUAGES: Mapping[str, Language] = {
     "Band": Language(band, metavar="LOW-HIGH"),
     "Bands": Language(_bands, repeated=True, metavar="[PAIR=]LOW-HIGH"),
     "Stretches": Language(_stretches, repeated=True, metavar="START,STOP"),
+    "Air": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=_environment),
     "Values": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE"),
     "Limits": Language(limits_by_name, metavar="NAME=VALUE,..."),
     "Switches": Language(_switches, repeated=True, metavar="NAME=VALUE"),

@@ -38,22 +38,36 @@ class Question:
     """What an identification is asked beside the model and the data; None and empty: nothing was said.
 
     Attributes:
-        free: a ready choice or the names of what may move.
-        ties, fixed, priors, prior_card: what holds parameters.
+        free: a ready choice of the vehicle or names; "full" where nothing is said and the vehicle has that choice. A
+            state-space model says itself what is free.
+        tie: "name = expression" each. fix: values of parameters that are not to move.
+        prior: mean and standard deviation by name.
+        prior_card: a card from the bench or from another flight: see `parameterize`.
         outputs: measured channels to fit.
         iterations: at most this many.
-        keep_unexcited, wind, leave_out: see `identify`.
-        environment: wind, density and gravity.
-        shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
-        horizon: seconds ahead, first and last, of the errors that are made small after maximum likelihood.
-        residual: also a linear residual, of what the fit itself made small.
+        keep_unexcited: also free parameters of axes that the flights do not move independently.
+        wind: estimate a horizontal wind that acts through the equations (filter error of tracked helicopters only).
+        leave_out: stamps (start, stop) [s] of stretches that the filter passes and nothing is learnt from, as where the
+            aircraft was touched (`Contact.intervals`; as `wind`).
+        environment: wind, density and gravity, for equations of your own.
+        shifts: constants in the states' rates, per record (None: for state-space models alone).
+        biases: outputs with a constant of their own, per record.
+        gusts: of filter error for state-space models, "white" (None) or "lasting", which move the air that the states
+            u, v, w fly through.
+        horizon: seconds ahead, first and last: after maximum likelihood, make errors FIRST, 2 FIRST, ... LAST seconds
+            ahead small, predicted from the filter's states (`core.multi_step`). Bounds are those of this criterion,
+            corrected for predictions that overlap.
+        residual: also fit accelerations that the equations lack, linear in motion and inputs (`models.residual`), as
+            far as blocks of these flights, left out, speak for them; to the innovations together with the physics, or
+            with `horizon` to the errors ahead, the physics held. `result.problems` says what it gained, its part of
+            each acceleration and which physics moved.
         progress: told the iteration and the cost.
     """
 
     free: str | Sequence[str | Free] | None = None
-    ties: Sequence[str] = ()
-    fixed: Mapping[str, float] | None = None
-    priors: Mapping[str, tuple[float, float]] | None = None
+    tie: Sequence[str] = ()
+    fix: Mapping[str, float] | None = None
+    prior: Mapping[str, tuple[float, float]] | None = None
     prior_card: Card | None = None
     outputs: Sequence[str] | None = None
     iterations: int | None = None
@@ -68,10 +82,15 @@ class Question:
     residual: bool = False
     progress: Callable[[int, float], None] | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("tie", "outputs", "leave_out", "biases", "horizon"):
+            value = getattr(self, name)
+            object.__setattr__(self, name, None if value is None else tuple(value))
+
     @property
     def asked(self) -> dict[str, Any]:
-        """What was said, by name."""
-        every = {f.name: getattr(self, f.name) for f in fields(self)}
+        """What was said, by name; who is told of progress is no question to an estimator."""
+        every = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "progress"}
         return {
             name: value for name, value in every.items() if value is not None and value is not False and value != ()
         }

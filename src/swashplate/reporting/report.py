@@ -49,7 +49,8 @@ def report(
     The file needs no network: plotly.js and all data are in it. It appears by rename when it is complete.
 
     Args:
-        results: of any identification, a validation or a verification of it, measured responses; None is left out. A
+        results: of any identification, a validation or a verification of it (its own where none is given), measured
+            responses; None is left out. A
             page is about one vehicle's fit and validation, or about linear models, their responses and verification.
             All else that plots (a flight, a spectrum, trims, a check of a controller ...) makes a page alone.
         path: where to write; the folder is made where it is missing.
@@ -71,7 +72,9 @@ def structure_of(
     modes: Mapping[str, Sequence[Mode]] | None = None,
 ) -> Report:
     """What `report` writes, before it is a page; arguments and errors as there."""
-    asked = [one for one in results if one is not None]
+    judged = any(isinstance(one, Validation | Verification) for one in results)
+    held_out = [one.validation for one in results if isinstance(one, Result) and not judged]
+    asked = [one for one in (*results, *held_out) if one is not None]
     if not asked:
         raise SwashError("there is nothing to report: neither a result nor a validation was given.")
     given: list[Reportable] = []

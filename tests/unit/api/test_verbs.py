@@ -26,7 +26,7 @@ RESULTS = (
     "swashplate.api.design_controller:ControllerDesign",
     "swashplate.api.designed_maneuver:DesignedManeuver",
     "swashplate.api.fly_maneuver:SimulatedFlight",
-    "swashplate.api.identification:Identification",
+    "swashplate.identification.core.result:Result",
     "swashplate.api.linear_study:LinearStudy",
     "swashplate.api.monte_carlo:MonteCarlo",
     "swashplate.api.track:Tracking",
@@ -55,7 +55,8 @@ def test_a_result_prints_is_saved_and_makes_a_page(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["check_controller", "compare", "design_controller", "fit_ss", "monte_carlo", "respond", "validate"]
+    "name",
+    ["check_controller", "compare", "design_controller", "fit_ss", "identify", "monte_carlo", "respond", "validate"],
 )
 def test_a_function_is_its_question(name: str) -> None:
     """Signature and help say each field with its unit, what comes of it, and what is raised."""

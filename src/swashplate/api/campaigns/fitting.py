@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +22,6 @@ from swashplate.errors import CampaignError, SwashError
 from swashplate.identification.core.parameters import bounds_of, parameterize
 from swashplate.identification.core.result import Result
 from swashplate.identification.estimators import check_method
-from swashplate.identification.identify import identify
 from swashplate.models.vehicle import Vehicle
 
 
@@ -32,11 +30,9 @@ class FitWords(CampaignSettings, forbid_unknown_fields=True, kw_only=True, froze
 
     Attributes:
         vehicle: a name or a file: the equations and the numbers that starts are about.
-        biases: outputs with a constant bias in each record, of a state-space model.
     """
 
     vehicle: str
-    biases: list[str] = msgspec.field(default_factory=list)
 
 
 class FitKind(CampaignKind):
@@ -85,13 +81,7 @@ class FitKind(CampaignKind):
 
         def fitted(seed: int, values: Array) -> Result[Any, Any]:
             begin = model.with_values({name: float(value) for name, value in zip(names, values, strict=True)})
-            if begin.structure is None:
-                return replace(asked, vehicle=begin, flight=data(seed)).answer().fit
-            outputs = None if asked.outputs is None else strings(asked.outputs)
-            return identify(
-                begin.structure, data(seed), method=asked.method, outputs=outputs, iterations=asked.iterations,
-                horizon=asked.horizon, biases=settings.biases,
-            )  # fmt: skip
+            return replace(asked, vehicle=begin, flight=data(seed)).answer()
 
         return model, names, fitted
 
@@ -108,7 +98,9 @@ def _moved_by(asked: FitVehicle, model: Vehicle) -> tuple[str, ...]:
     """
     if model.structure is None:
         free = strings(asked.free)
-        return parameterize(model, free[0] if len(free) == 1 else free, ties=strings(asked.tie), fixed=asked.fix).names
+        return parameterize(
+            model, free[0] if len(free) == 1 else free or "full", ties=strings(asked.tie), fixed=asked.fix
+        ).names
     for name in _OF_VEHICLES:
         if getattr(asked, name) != default_of(FitVehicle, name):
             raise CampaignError(

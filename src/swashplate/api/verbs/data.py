@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from swashplate.api.question import VerbQuestion, argument, option, setting
 from swashplate.api.saying import Say, silent
-from swashplate.api.verbs.identify import Identify
+from swashplate.api.verbs.identify import AnswersFit, Identify
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from swashplate.api.identification import Identification
+    from swashplate.identification.core.result import Result
 
 
 class ListData(VerbQuestion[Any]):
@@ -52,7 +52,7 @@ class FetchData(VerbQuestion["list[Path]"]):
         return ["\n".join(map(str, answer))]
 
 
-class Demo(VerbQuestion["Identification"]):
+class Demo(AnswersFit):
     """Run the main job: identify the CoaX from one flight and predict another, with a report.
 
     On the real flights of the data set coax56 where they are found on this machine, otherwise on simulated flights
@@ -64,16 +64,13 @@ class Demo(VerbQuestion["Identification"]):
     simulated: bool = option(default=False, help="Use simulated flights even if real ones are available.")
     seed: int = setting(default=1, help="seed of the simulated flights' noise.", least=0)
 
-    def answer(self, say: Say = silent) -> Identification:
+    def answer(self, say: Say = silent) -> Result[Any, Any]:
         from swashplate.api.demo import run_demo
 
         return run_demo(self, say)
 
-    def text(self, answer: Identification, width: int) -> list[Any]:
-        parts = answer.parts()
-        if any(source.simulated for source in answer.fit.data):
+    def text(self, answer: Result[Any, Any], width: int) -> list[Any]:
+        parts = super().text(answer, width)
+        if any(source.simulated for source in answer.data):
             parts = ["On simulated flights; `swash data fetch coax56` gets the real ones.\n", *parts]
-        return parts + ([f"Truth:      {answer.fit.beside_truth}"] if answer.fit.beside_truth else [])
-
-    def problems(self, answer: Identification) -> list[str]:
-        return list(answer.problems)
+        return parts + ([f"Truth:      {answer.beside_truth}"] if answer.beside_truth else [])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import FLIGHT, FromConditioned
 from swashplate.api.languages import (
+    Air,
     Aircraft,
     Bands,
     Logs,
@@ -19,17 +20,38 @@ from swashplate.api.languages import (
     Things,
     Values,
 )
-from swashplate.api.question import Answer, default_of, entries, option, setting, verb
+from swashplate.api.question import Answer, VerbQuestion, default_of, entries, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.api.verbs.respond import load_responses
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
-    from swashplate.api.identification import Identification
     from swashplate.api.linear_study import LinearStudy
+    from swashplate.identification.core.result import Result
     from swashplate.models.linear.state_space import StateSpaceModel
+
+
+class AnswersFit(VerbQuestion["Result[Any, Any]"]):
+    """A verb whose answer is a fit, judged on what was held out."""
+
+    def document(self, answer: Result[Any, Any]) -> Any:
+        validation = answer.validation and answer.validation.to_document()
+        return {"fit": answer.to_document(comparisons=False), "validation": validation}
+
+    def write(self, answer: Result[Any, Any], folder: Path, names: tuple[str, ...]) -> None:
+        from swashplate.api.identification import write_fit
+
+        write_fit(answer, folder)
+
+    def text(self, answer: Result[Any, Any], width: int) -> list[Any]:
+        from swashplate.api.identification import fit_parts
+
+        return fit_parts(answer)
+
+    def problems(self, answer: Result[Any, Any]) -> Sequence[str]:
+        return [f"The fit failed: {' '.join(answer.problems) or 'see the report.'}"] if answer.failed else []
 
 
 class Fit(FromConditioned[Answer]):
@@ -46,12 +68,45 @@ class Fit(FromConditioned[Answer]):
     kind: ClassVar[str]
 
 
+class FitOfRecords(Fit[Answer]):
+    """What fits to records in time take."""
+
+    method: str | None = option(
+        default=None,
+        help="output-error (undisturbed, open loop), filter-error (disturbed air or feedback; usual where the "
+        "pose was tracked), prediction-error (long records, any stationary gust), or another's.",
+    )
+    horizon: Numbers | None = option(
+        default=None,
+        metavar="FIRST,LAST",
+        help="After maximum likelihood, minimise errors FIRST, 2 FIRST, ... LAST seconds ahead, e.g. 0.25,1.",
+    )
+    iterations: int | None = setting(default=None, help="largest number of iterations; the method's own", least=1)
+    gusts: str | None = setting(
+        default=None,
+        help="of filter-error of a state-space model: white (usual) or lasting, in the air of u, v, w or on p, q, r",
+    )
+    biases: Names = setting(default=(), help="outputs with a constant bias in each record")
+    shifts: bool | None = setting(
+        default=None, help="estimate constants in the states' rates; usual for state-space models"
+    )
+
+
 class LinearFit(Fit[Answer]):
     """What fits of linear models take."""
 
     rename: Renamed | None = option(
         default=None, help="NAME=CHANNEL, by commas: the log's CHANNEL as the model's NAME, for example az=az_sid."
     )
+
+    def remarks(self, answer: Any) -> Sequence[str]:
+        return answer.remarks
+
+    def text(self, answer: Any, width: int) -> list[Any]:
+        return answer.parts()
+
+    def problems(self, answer: Any) -> Sequence[str]:
+        return answer.problems
 
 
 class FromResponses(LinearFit[Answer]):
@@ -95,23 +150,28 @@ class WithStructure(LinearFit[Answer]):
             yield structure_of(structure(one) if isinstance(one, str | Path) else one)
 
 
-class FitVehicle(Fit["Identification"]):
-    """Identify a vehicle from flights and, where it has not failed, predict others with it."""
+class FitVehicle(AnswersFit, FitOfRecords["Result[Any, Any]"]):
+    """Identify a model from flights, and predict with it those that are held out, as `validation` of the result.
+
+    Raises:
+        IdentificationError: where no fit can be started: no method suits, unknown names, parameters without a trace.
+        FlightError: a flight that lacks a channel, or is on no uniform grid.
+        CardError: a prior card of another vehicle.
+    """
 
     vehicle: Aircraft | None = option(
         default=None, help="A vehicle's name, or a card or model file.", complete="vehicle", kw_only=False
     )
     flight: Logs | None = option(
-        default=None, help=f"Flight: {FLIGHT}. May be repeated.", complete="flight", kw_only=False
-    )
-    free: Names = option(
-        default=("full",),
-        metavar="NAMES",
-        help="Ready choice (full, flight, ...) or parameter names separated by commas.",
-    )
-    method: str | None = option(
         default=None,
-        help="filter-error (a vehicle's usual), output-error (the usual in time), prediction-error, or another's.",
+        help=f"Flight: {FLIGHT}. May be repeated; in Python also measured responses.",
+        complete="flight",
+        kw_only=False,
+    )
+    free: Names | None = option(
+        default=None,
+        metavar="NAMES",
+        help="Ready choice (full, flight, ...) or parameter names separated by commas; full where there is that.",
     )
     tie: Texts = setting(default=(), metavar="'A = B'", help="tie a parameter to an expression. Repeatable.")
     prior: Priors | None = option(
@@ -120,11 +180,6 @@ class FitVehicle(Fit["Identification"]):
     )
     keep_unexcited: bool = option(default=False, help="Also fit parameters of axes that no flight moves independently.")
     wind: bool = option(default=False, help="Estimate a horizontal wind too: flights outdoors or in strong gusts.")
-    horizon: Numbers | None = option(
-        default=None,
-        metavar="FIRST,LAST",
-        help="After maximum likelihood, minimise errors FIRST, 2 FIRST, ... LAST seconds ahead, e.g. 0.25,1.",
-    )
     residual: bool = option(
         default=False,
         help="Also fit accelerations that the equations lack, linear in motion and inputs, as far as blocks of the "
@@ -142,17 +197,24 @@ class FitVehicle(Fit["Identification"]):
         help="Draw models from the fit's uncertainty, into posterior.nc (for ArviZ) and for Monte Carlo: laplace "
         "(normal, fast) or nuts (from the likelihood, minutes).",
     )
-    iterations: int | None = setting(default=None, help="largest number of iterations; 60, in time 80", least=1)
+    environment: Air | None = setting(
+        default=None, help="air_density, gravity, wind, for equations of your own; the card's where not given"
+    )
     leave_out: Stretches = setting(
         default=(), help="learn nothing from these stretches, as ['10,12'], where it was touched", unit="s"
     )
 
     kind = "a vehicle"
 
-    def answer(self, say: Say = silent) -> Identification:
+    def answer(self, say: Say = silent) -> Result[Any, Any]:
         from swashplate.api.identification import identify_vehicle
 
         return identify_vehicle(self, say)
+
+    def problems(self, answer: Result[Any, Any]) -> Sequence[str]:
+        refused = self.posterior is not None and answer.posterior is None and not answer.failed
+        told = [f"The fit is written, its posterior is not: {answer.warnings[-1]}"] if refused else []
+        return told or super().problems(answer)
 
 
 class FitTransferFunctions(FromResponses["LinearStudy"]):
@@ -209,23 +271,13 @@ class FitStateSpace(FromResponses["LinearStudy"], WithStructure["LinearStudy"]):
         return state_space(self, say)
 
 
-class FitInTime(WithStructure["LinearStudy"]):
+class FitInTime(FitOfRecords["LinearStudy"], WithStructure["LinearStudy"]):
     """Fit a state-space model, delays included, to records in time by maximum likelihood, and verify it on others.
 
     Without hold-outs the records of the fit are shown, and marked as such.
     """
 
     flight: Logs | None = option(default=None, help=f"Flight: {FLIGHT}.", complete="flight", kw_only=False)
-    method: str | None = option(
-        default=None, help="output-error; in gusts filter-error (a gain made of the noise) or prediction-error."
-    )
-    horizon: Numbers | None = option(default=None, metavar="FIRST,LAST", help="As of a vehicle.")
-    iterations: int | None = setting(default=None, help="largest number of iterations", least=1)
-    gusts: str | None = setting(
-        default=None, help="of filter-error in time: white (usual) or lasting, in the air of u, v, w or on p, q, r"
-    )
-    biases: Names = setting(default=(), help="outputs with a constant bias in each record, in time")
-    shifts: bool = setting(default=True, help="estimate constants in the states' rates, in time")
 
     kind = "a state-space model in time"
 
@@ -292,15 +344,22 @@ class Identify(FitVehicle, FitTransferFunctions, FitStateSpace, FitInTime):  # p
             load_responses(self.responses)
         return SwashError("is missing.", channel=which, hint=hint)
 
-    def remarks(self, answer: Any) -> list[str]:
-        return list(answer.remarks)
+    def remarks(self, answer: Any) -> Sequence[str]:
+        return self._kind().remarks(self, answer)
+
+    def document(self, answer: Any) -> Any:
+        return self._kind().document(self, answer)
+
+    def write(self, answer: Any, folder: Path, names: tuple[str, ...]) -> None:
+        self._kind().write(self, answer, folder, names)
 
     def text(self, answer: Any, width: int) -> list[Any]:
-        return answer.parts()
+        return self._kind().text(self, answer, width)
 
-    def problems(self, answer: Any) -> list[str]:
-        return list(answer.problems)
+    def problems(self, answer: Any) -> Sequence[str]:
+        return self._kind().problems(self, answer)
 
 
+identify = verb("identify", FitVehicle)
 fit_tf = verb("fit_tf", FitTransferFunctions)
 fit_ss = verb("fit_ss", FitStateSpace)

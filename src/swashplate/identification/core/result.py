@@ -160,6 +160,7 @@ class Result(Shown, Generic[Model, Details]):
         settings: what was asked.
         details: what only this method has.
         posterior: draws of what the fit does not know (`swashplate.posterior`); None: normal ones, when asked for.
+        validation: how it predicts the flights that were held out; None where there were none. A file of its own.
         truth: numbers of the aircraft that was simulated, where they are known; empty where one flew.
         seconds: wall time; it is no part of the document.
         fitted: the likelihood and its optimum, for a posterior; None where the method has none, or for a file's result.
@@ -187,6 +188,7 @@ class Result(Shown, Generic[Model, Details]):
     data: tuple[DataSource, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     posterior: Posterior | None = None
+    validation: Any = field(default=None, repr=False, compare=False)
     truth: Mapping[str, float] = field(default_factory=dict)
     seconds: float = 0.0
     fitted: Fitted | None = field(default=None, repr=False, compare=False)

@@ -29,7 +29,7 @@ from swashplate.models.vehicle import Vehicle
 
 KIND, SCHEMA = "result", 1
 _HINT = "`swash identify --out DIR` (or fit-ss, fit-tf, fit-time) writes DIR/fit.json."
-_SPECIAL = ("solution", "model", "start", "details", "seconds", "fitted")
+_SPECIAL = ("solution", "model", "start", "details", "seconds", "fitted", "validation")
 _RARE = {"comparisons", "posterior", "truth"}
 """Entries that a document may lack."""
 _TOLD = {"kind", "schema", "costs"}
@@ -80,7 +80,7 @@ def from_document(
         )
     hints = typing.get_type_hints(Result)
     table: dict[str, Any] = {}
-    names = {f.name for f in fields(Result)} - {"seconds", "solution", "fitted"} | {"model"}
+    names = {f.name for f in fields(Result)} - {"seconds", "solution", "fitted", "validation"} | {"model"}
     for name in names - _RARE | (set(document) - _TOLD):
         if name not in names:
             raise DocumentError("is not known here.", where=where, channel=name[:60])

@@ -261,7 +261,7 @@ def frequencies(targets: Sequence[Target]) -> tuple[float, float]:
 class ResponseEstimator:
     """`fit_state_space` as an estimator."""
 
-    takes: frozenset[str] = frozenset({"iterations", "progress"})
+    takes: frozenset[str] = frozenset({"iterations"})
 
     def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
         if not isinstance(data, FrequencyResponse):

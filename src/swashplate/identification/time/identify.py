@@ -211,9 +211,9 @@ class FlightKind:
         table = parameterize(
             model,
             "full" if question.free is None else question.free,
-            ties=question.ties,
-            fixed=question.fixed,
-            priors=question.priors,
+            ties=question.tie,
+            fixed=question.fix,
+            priors=question.prior,
             prior_card=question.prior_card,
         )
         pieces = _long_enough(records(flights, model, outputs=question.outputs))
@@ -226,7 +226,7 @@ class FlightKind:
         return FlightProblem(method, model, flights, table, pieces, question, axes, notes)
 
 
-_TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "keep_unexcited"})
+_TAKES = frozenset({"free", "tie", "fix", "prior", "prior_card", "keep_unexcited"})
 FILTER_ERROR = RecordEstimator("filter-error", FlightKind(_TAKES | {"wind", "leave_out", "residual"}))
 OUTPUT_ERROR = RecordEstimator("output-error", FlightKind(_TAKES))
 

@@ -280,7 +280,7 @@ class RecordEstimator(Generic[Model]):
     @property
     def takes(self) -> frozenset[str]:
         # A horizon is heard by all, so that output error can say why it has none.
-        return self.kind.takes | {"outputs", "iterations", "horizon", "progress"}
+        return self.kind.takes | {"outputs", "iterations", "horizon"}
 
     def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
         return "it fits records in time" if isinstance(data, FrequencyResponse) else self.kind.unsuited(model)

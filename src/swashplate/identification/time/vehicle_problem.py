@@ -28,7 +28,7 @@ from swashplate.models.vehicle import Vehicle
 class VehicleKind:
     """Any vehicle."""
 
-    takes = frozenset({"free", "ties", "priors", "environment", "shifts", "biases"})
+    takes = frozenset({"free", "tie", "prior", "environment", "shifts", "biases"})
     solver = SOLVER
 
     def unsuited(self, model: Vehicle | StateSpaceModel) -> str:
@@ -45,7 +45,7 @@ class VehicleKind:
             )
         outputs = _outputs(model, flights, question)
         check_biases(question.biases, outputs)
-        table = parameterize(model, question.free, ties=question.ties, priors=question.priors)
+        table = parameterize(model, question.free, ties=question.tie, priors=question.prior)
         if isinstance(question.free, str):  # a ready choice is also for methods that have them
             table = replace(table, of_records=(), noises=())
         beside = [*(item.name for item in table.of_records), *table.noises]

@@ -38,7 +38,7 @@ def _measured(cutoff: float = 0.0) -> Flight:
 
 
 def _fit(flight: Flight) -> Result:
-    return sp.identify(sp.vehicle("coax"), flight, free=FREE, method="output-error", ties=[TIE])
+    return sp.identify(sp.vehicle("coax"), flight, free=FREE, method="output-error", tie=[TIE])
 
 
 @lru_cache(maxsize=1)

@@ -100,7 +100,7 @@ def _flight() -> Flight:
 
 def _fit(card: Card | None) -> Result[Any, Any]:
     start = sp.vehicle("coax")
-    return sp.identify(start, _flight(), free=FREE, method="output-error", ties=[TIE], prior_card=card)
+    return sp.identify(start, _flight(), free=FREE, method="output-error", tie=[TIE], prior=card)
 
 
 @lru_cache(maxsize=1)

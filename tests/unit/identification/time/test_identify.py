@@ -30,7 +30,7 @@ def _flight() -> Flight:
 @lru_cache(maxsize=1)
 def _fit() -> Result[Any, Any]:
     start = sp.vehicle("coax").with_values({"tau_f_upper": 1.2, "linkage_lower": 0.1})
-    return sp.identify(start, _flight(), free=FREE, method="output-error", ties=[TIE])
+    return sp.identify(start, _flight(), free=FREE, method="output-error", tie=[TIE])
 
 
 def test_the_card_of_the_identified_vehicle_comes_back_from_its_file(tmp_path: Path) -> None:

@@ -55,8 +55,8 @@ def test_a_fit_carries_a_channel_that_is_off_by_a_factor_and_is_not_failed() -> 
 def test_priors_and_ties_of_any_vehicle_are_told() -> None:
     """A prior that lies two of its own deviations below the truth is told from what the flight says."""
     free, prior = [name for name in TRUTH if name != "A"], (0.8 * TRUTH["Lb"], 0.1 * abs(TRUTH["Lb"]))
-    how: dict[str, Any] = {"outputs": ("p", "pdot", "ay"), "biases": ["ay"], "free": free, "ties": ["A = 2 * tau"]}
-    alone, found = identify(rolling(), gusty(), **how), identify(rolling(), gusty(), priors={"Lb": prior}, **how)
+    how: dict[str, Any] = {"outputs": ("p", "pdot", "ay"), "biases": ["ay"], "free": free, "tie": ["A = 2 * tau"]}
+    alone, found = identify(rolling(), gusty(), **how), identify(rolling(), gusty(), prior={"Lb": prior}, **how)
     share = (found["Lb"].sigma / prior[1]) ** 2
     assert (found["Lb"].prior_share, alone["Lb"].prior_share) == (pytest.approx(share), 0.0)
     assert found["Lb"].alone == pytest.approx(alone["Lb"].value, abs=0.1 * alone["Lb"].sigma)
