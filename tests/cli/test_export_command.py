@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from commands import one_message, swash
 
 import swashplate as sp
 from swashplate import compiler
+from swashplate.commit import commit
 from swashplate.control.kinds import save_controller
 from swashplate.export import fmu
 from swashplate.models.linear.state_space_file import structure, to_toml
@@ -137,6 +139,12 @@ def test_a_log_becomes_a_page_and_says_what_is_in_it(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["sent.html"]
     assert "Inside: 27 channels of 20.0 s" in outcome.err
     assert "Left out: latitude, longitude, the map; serial numbers;" in outcome.err
+    log = sp.read("examples/ordinary_flight").provenance.sha256
+    assert len(log) == 64
+    text = (tmp_path / "sent.html").read_text(encoding="utf-8")
+    assert re.search(
+        rf"Made by swashplate [\w.]+, commit {re.escape(commit())}, from a log with the SHA-256 {log}", text
+    )
 
 
 @pytest.mark.parametrize(

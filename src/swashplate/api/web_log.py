@@ -6,9 +6,8 @@ import os
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
-from swashplate.commit import commit
 from swashplate.export.formats import Export
-from swashplate.extras import version_of
+from swashplate.export.origin import program_and_commit
 from swashplate.flights.datasets import locate
 from swashplate.flights.readers.options import split_log, split_window
 from swashplate.flights.readers.read import read as read_log
@@ -44,9 +43,7 @@ def export_log(
     mapped = mapping or (None if units else kept(path))
     flight = read_log(log, units=units, mapping=mapped, bad_stamps=bad_stamps)
     read = Read(path.name, Remedy(dict(units or {}), bad_stamps == "drop"), os.fspath(mapped) if mapped else "")
-    at = commit()
-    program = f"swashplate {version_of('swashplate')}{f', commit {at},' if at else ''}"
-    made = f"Made by {program} from a log with the SHA-256 {flight.provenance.sha256}."
+    made = f"Made by {program_and_commit()}, from a log with the SHA-256 {flight.provenance.sha256}."
     page = sent_page(flight, path, read=read, keep=keep, made=made, say=say)
     size = f"{len(page.text.encode()) / 1e6:.1f} MB, opened by double-click."
     return Export({f"{name or 'log'}.html": page.text.encode()}, (*page.remarks, size))

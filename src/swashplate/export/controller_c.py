@@ -15,6 +15,7 @@ from swashplate.atomic import write_text
 from swashplate.control.kinds import kind_of
 from swashplate.engine.c_expression import array, filled, words
 from swashplate.engine.law import REFERENCES, print_function
+from swashplate.export.origin import digest, program_and_commit
 from swashplate.extras import library
 from swashplate.simulation.controller import Controller
 
@@ -68,6 +69,7 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
     blanks = {
         "RATE": f"{controller.rate:g}",
         "REAL": precision,
+        "MADE": f"by {program_and_commit()}; controller {digest(printed + repr(traced.start))}",
         "VEHICLE": words(traced.about),
         "LATE": _late(controller),
         "MEASURED_NAMES": "\n *            ".join(textwrap.wrap(", ".join(traced.measured), 100)),

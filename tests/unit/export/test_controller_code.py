@@ -7,12 +7,14 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.commit import commit
 from swashplate.control.laws.autopilot import MODES, Autopilot, Memory, Reference, autopilot, step, unpack
 from swashplate.control.laws.height_yaw import HeightYawGains, HeightYawMemory
 from swashplate.export.controller_c import Precision, controller_code
@@ -106,3 +108,16 @@ def test_it_calls_nothing_but_four_functions_and_allocates_nothing(precision: Pr
         assert not re.search(r"\d\.\d*(e[+-]?\d+)?(?![\df.e])", body)  # every constant is a float's
     assert 100 < code.operations < 400
     assert code.work_bytes < 1024
+
+
+def test_it_says_commit_controller_and_the_card_with_its_data() -> None:
+    coax = sp.vehicle("coax")
+    fitted = coax.with_card(replace(coax.card, title=f"{coax.card.title}, identified from flight.mat"))
+    first, second = (controller_code(autopilot(one, sp.trim(one))).source for one in (coax, fitted))
+    gentler = controller_code(autopilot(coax, sp.trim(coax)).with_gains(place=0.01)).source
+    assert commit() in first
+    assert "identified from flight.mat" in second
+    (one, other) = (re.search(r"controller ([0-9a-f]{12})\n", text) for text in (first, gentler))
+    assert one is not None
+    assert other is not None
+    assert one[1] != other[1]

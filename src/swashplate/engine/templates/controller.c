@@ -3,6 +3,7 @@
  *   void swash_step(@REAL@ memory[@MEMORY@], const @REAL@ measured[@MEASURED@],
  *                   const @REAL@ reference[8], @REAL@ command[@COMMANDS@]);
  *
+ * made       @MADE@
  * vehicle    @VEHICLE@
  * late       @LATE@
  * measured   @MEASURED_NAMES@
