@@ -10,7 +10,7 @@ from swashplate.api.asking import drawn, linear_model, strings
 from swashplate.api.saying import Say
 from swashplate.control.kinds import read_controller
 from swashplate.documents import kind_of
-from swashplate.engine.c_expression import identifier
+from swashplate.engine.emit import identifier
 from swashplate.errors import ExportError, SwashError
 from swashplate.export import formats
 from swashplate.export.control_json import read_linear

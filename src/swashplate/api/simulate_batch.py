@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.engine.c_expression import Precision as Digits
 from swashplate.engine.card import fly_on_card
 from swashplate.engine.equations import SURROUNDINGS, parameter_row
 from swashplate.engine.fly import FlightPlan, fly
+from swashplate.engine.statements import Precision as Digits
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment

@@ -15,7 +15,7 @@ from swashplate.api.report_folder import ReportFolder
 from swashplate.api.saying import Say
 from swashplate.arrays import Array
 from swashplate.atomic import write_text
-from swashplate.engine.c_expression import Precision
+from swashplate.engine.statements import Precision
 from swashplate.errors import ExportError, FlightError, IdentificationError
 from swashplate.export.formats import Export
 from swashplate.export.regression_c import RegressionCode, regression_code

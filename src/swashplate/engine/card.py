@@ -12,10 +12,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.engine.c_expression import Precision, statements
 from swashplate.engine.equations import Equations, equations_of
 from swashplate.engine.fly import FlightPlan
 from swashplate.engine.on_arrays import columns_of, in_order, operations, value_of
+from swashplate.engine.statements import Precision, statements
 from swashplate.engine.trace import unrolled_rates
 from swashplate.errors import SwashError
 from swashplate.extras import library

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
-from swashplate.engine.c_expression import REAL, ROOTS, Precision, body, filled, literal, split, statements
-from swashplate.engine.c_loops import KERNELS, LANES, REDUCED, WHOLE, horner, moving, plain
+from swashplate.engine.emit import INTEGER, LANES, REAL, fill_template, print_graph, print_lane_searches, print_lanes
 from swashplate.engine.equations import CONSTANTS, SURROUNDINGS, Equations, equations_of
 from swashplate.engine.law import FELT, REFERENCES, LawGraph, law_code
+from swashplate.engine.statements import ROOTS, Precision, literal, split, statements
 from swashplate.engine.trace import traced_angles, traced_force, traced_rates
 from swashplate.engine.tumbling import from_euler, steep_at, tumbling
 from swashplate.engine.virtual import fly_virtually
@@ -300,26 +300,21 @@ def flight_code(
     code = statements(function, precision=precision, inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
     of_card, rest = split(code, moving=("x[", "w[", *ROOTS), fixed="cp")
     of_inputs, rest = split(rest)
-    whole, bits, rounding = WHOLE[precision]
-    kernel = KERNELS[precision]
     feels = law is not None and law.feels
     force, angles = "", ""
     if feels:
-        force = body(traced_force(moved), real="real", precision=precision, inputs=["x", "w", "p"], outputs=["felt"])
+        force = print_graph(
+            traced_force(moved), real="real", precision=precision, inputs=["x", "w", "p"], outputs=["felt"]
+        )
     if quaternion:
-        angles = body(traced_angles(), real="real", precision=precision, inputs=["q"], outputs=["angles"])
-    return filled(
+        angles = print_graph(traced_angles(), real="real", precision=precision, inputs=["q"], outputs=["angles"])
+    return fill_template(
         "fly.c",
         {
             "REAL": real,
-            "WHOLE": whole,
-            "BITS": bits,
-            "ROUNDING": literal(rounding, precision),
-            "PER_TURN": literal(0.63661977236758134308, precision),
+            "INTEGER": INTEGER[precision],
+            "TURNED": fill_template(f"turned_{precision}.h", {}),
             "PI": literal(np.pi, precision),
-            "REDUCED": " ".join(f"- turns * {literal(h, precision)}" for h in kernel.half_pi[: REDUCED[precision]]),
-            "SINE": horner(kernel.sine, precision),
-            "COSINE": horner(kernel.cosine, precision),
             "LANES": lanes,
             "ALIGNED": min(64, lanes * (8 if precision == "double" else 4)),
             "STATES": len(moved.vehicle.state_names),
@@ -329,9 +324,9 @@ def flight_code(
             "ROOTS": max(1, len(steps)),
             "OF_CARD_COUNT": max(1, len(of_card.outputs)),
             "OF_INPUTS_COUNT": max(1, len(of_inputs.outputs)),
-            "OF_CARD": plain(of_card, "cp", precision),
-            "OF_INPUTS": plain(of_inputs, "c", precision),
-            "MOVING": moving(rest, steps, precision),
+            "OF_CARD": print_lanes(of_card, "cp", precision),
+            "OF_INPUTS": print_lanes(of_inputs, "c", precision),
+            "MOVING": print_lane_searches(rest, steps, precision),
             "CONTROLLED": int(law is not None),
             "FELT": int(feels),
             "QUATERNION": int(quaternion),

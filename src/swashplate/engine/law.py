@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.atomic import scratch_folder
 from swashplate.compiled import can_compile, loaded
-from swashplate.engine.c_expression import filled
+from swashplate.engine.emit import fill_template
 from swashplate.engine.graph import Graph
 from swashplate.errors import WriteError
 
@@ -127,4 +127,6 @@ def law_code(law: LawGraph, inputs: int) -> str:
     f = law.function
     sizes = {"LONGEST": max(1, int(f.sz_w())), "WHOLES": max(1, int(f.sz_iw()))}
     sizes |= {"ARGUMENTS": max(3, int(f.sz_arg())), "RESULTS": max(1, int(f.sz_res()))}
-    return filled("law.c", {**sizes, "TRACED": print_function(f, "double")[0], "NAME": f.name(), "INPUTS": inputs})
+    return fill_template(
+        "law.c", {**sizes, "TRACED": print_function(f, "double")[0], "NAME": f.name(), "INPUTS": inputs}
+    )

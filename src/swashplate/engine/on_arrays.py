@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.engine.c_expression import Statements, statements
 from swashplate.engine.graph import Graph
+from swashplate.engine.statements import Statements, statements
 
 _ROWS = 512
 """Rows at a time: what a statement reads and writes then stays in a core's cache."""

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.engine.c_expression import Precision
 from swashplate.engine.equations import SURROUNDINGS, Equations, equations_of
 from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
+from swashplate.engine.statements import Precision
 from swashplate.engine.trace import traced_angles, traced_force, unrolled_rates
 from swashplate.engine.tumbling import from_euler, tumbling
 from swashplate.models.vehicle import Vehicle

@@ -9,11 +9,12 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from swashplate.atomic import write_text
 from swashplate.control.kinds import kind_of
-from swashplate.engine.c_expression import array, filled, words
+from swashplate.engine.emit import comment_text, fill_template, print_array
+from swashplate.engine.graph import Graph
 from swashplate.engine.law import REFERENCES, print_function
 from swashplate.export.origin import digest, program_and_commit
 from swashplate.extras import library
@@ -70,7 +71,7 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
         "RATE": f"{controller.rate:g}",
         "REAL": precision,
         "MADE": f"by {program_and_commit()}; controller {digest(printed + repr(traced.start))}",
-        "VEHICLE": words(traced.about),
+        "VEHICLE": comment_text(traced.about),
         "LATE": _late(controller),
         "MEASURED_NAMES": "\n *            ".join(textwrap.wrap(", ".join(traced.measured), 100)),
         "REFERENCE_NAMES": ", ".join(REFERENCES),
@@ -85,10 +86,12 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
         "ARGUMENTS": max(int(function.sz_arg()), 3),
         "RESULTS": max(int(function.sz_res()), 1),
         "TRACED": printed,
-        "START": array("swash_memory", traced.start, "double" if precision == "double" else "single", kind=precision),
+        "START": print_array(
+            "swash_memory", traced.start, "double" if precision == "double" else "single", kind=precision
+        ),
     }
     return ControllerCode(
-        source=filled("controller.c", blanks),
+        source=fill_template("controller.c", blanks),
         operations=operations_of(function),
         calls=calls,
         work_bytes=work * size,
@@ -97,7 +100,7 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
     )
 
 
-def operations_of(function: Any) -> int:
+def operations_of(function: Graph) -> int:
     """Instructions of the trace but reading inputs, writing outputs and constants; loops count by their rounds."""
     import casadi
 

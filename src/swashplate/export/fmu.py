@@ -14,7 +14,7 @@ import numpy as np
 
 from swashplate.atomic import scratch_folder
 from swashplate.compiler import compiler, shared_library
-from swashplate.engine.c_expression import filled
+from swashplate.engine.emit import fill_template
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced, Variable
 from swashplate.flights.base_units import base_units
@@ -179,7 +179,7 @@ def fmu(model: Traced, *, version: str) -> tuple[bytes, str]:
         ExportError: where the compiler refuses the sources.
     """
     code, step = model_code(model), internal_step(model)
-    texts = {f"{model.name}.c": code.source, f"{model.name}.h": code.header, _WRAPPER: filled(_WRAPPER, {})}
+    texts = {f"{model.name}.c": code.source, f"{model.name}.h": code.header, _WRAPPER: fill_template(_WRAPPER, {})}
     listed = (f"{model.name}.c", _WRAPPER)
     texts[_CONFIG] = _config(model, "", step)
     unsigned = description(model, guid="", version=version, sources=listed, step=step)
@@ -214,8 +214,8 @@ def _config(model: Traced, guid: str, step: float) -> str:
     delays = ""
     if model.delays:
         listed = ", ".join(repr(float(delay)) for delay in model.delays)
-        delays = filled("fmu_delays.h", {"LONGEST": repr(max(model.delays)), "PAST": _PAST, "DELAYS": listed})
-    return filled(_CONFIG, {"NAME": model.name, "STEP": repr(step), "GUID": guid, "DELAYS": delays})
+        delays = fill_template("fmu_delays.h", {"LONGEST": repr(max(model.delays)), "PAST": _PAST, "DELAYS": listed})
+    return fill_template(_CONFIG, {"NAME": model.name, "STEP": repr(step), "GUID": guid, "DELAYS": delays})
 
 
 def _binary(texts: Mapping[str, str], sources: tuple[str, ...]) -> bytes:

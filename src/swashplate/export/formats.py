@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swashplate.atomic import folder_when_complete, write_bytes
-from swashplate.engine.c_expression import Precision, identifier
+from swashplate.engine.emit import identifier
+from swashplate.engine.statements import Precision
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear, logged_delays, of_state_space, of_vehicle
 from swashplate.export.origin import origin_of

@@ -14,19 +14,16 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swashplate.engine.c_expression import (
-    FIXED,
+from swashplate.engine.emit import (
     REAL,
-    Precision,
-    array,
-    body,
-    filled,
-    printed,
-    split,
-    statements,
-    words,
+    comment_text,
+    fill_template,
+    print_array,
+    print_graph,
+    print_searches,
+    print_statements,
 )
-from swashplate.engine.c_loops import looped
+from swashplate.engine.statements import FIXED, Precision, split, statements
 from swashplate.export.traced import Traced, Variable, late_notes
 
 
@@ -50,18 +47,18 @@ def stages(model: Traced, *, real: str, precision: Precision) -> Stages:
     """Print the rates of a traced model.
 
     Raises:
-        ExportError: as `c_expression.statements`.
+        ExportError: as `statements`.
     """
     given = ("x", "u", "s", "p")
     if model.looped is None:
         first, rest = split(statements(model.rates, precision=precision, inputs=given))
-        moving = printed(rest, real, precision, ["rates"])
+        moving = print_statements(rest, real, precision, ["rates"])
     else:
         code = statements(model.looped.function, precision=precision, inputs=[*given, "guess", "root"])
         first, rest = split(code)
-        moving = looped(rest, model.looped.steps, real=real, precision=precision, outputs=["rates"])
+        moving = print_searches(rest, model.looped.steps, real=real, precision=precision, outputs=["rates"])
     count = 0 if model.looped is None else len(model.looped.steps)
-    return Stages(printed(first, real, precision, [FIXED]), moving, len(first.outputs), count)
+    return Stages(print_statements(first, real, precision, [FIXED]), moving, len(first.outputs), count)
 
 
 _KINDS = ("state", "input", "surrounding", "parameter", "output")
@@ -105,11 +102,11 @@ def model_code(model: Traced, *, precision: Precision = "double") -> ModelCode:
     return ModelCode(
         model.name,
         precision,
-        filled(
+        fill_template(
             "model.h", blanks | {"GUARD": f"{model.name.upper()}_H", "ENUMS": _enums(model), "HEADING": _heading(model)}
         ),
-        filled("model.c", blanks | equations),
-        filled("model_example.c", blanks | {"SHOWN": min(len(model.states), 12)}),
+        fill_template("model.c", blanks | equations),
+        fill_template("model_example.c", blanks | {"SHOWN": min(len(model.states), 12)}),
     )
 
 
@@ -121,8 +118,8 @@ def frame_code(model: Traced, told: object) -> str:
         told: a CasADi function of states, rates and gravity.
     """
     names = ("x", "rates", "g")
-    text = body(told, real=f"{model.name}_real", precision="double", inputs=names, outputs=["told"])
-    return filled(
+    text = print_graph(told, real=f"{model.name}_real", precision="double", inputs=names, outputs=["told"])
+    return fill_template(
         "model_frame.c", _blanks(model, "double") | _equations(model, "double") | {"TOLD": _used(text, names)}
     )
 
@@ -163,7 +160,7 @@ def _functions(model: Traced, precision: Precision) -> dict[str, str]:
     """The bodies of what is one evaluation of its own."""
 
     def single(function: object, outputs: Sequence[str]) -> str:
-        text = body(function, real=f"{model.name}_real", precision=precision, inputs=_GIVEN, outputs=outputs)
+        text = print_graph(function, real=f"{model.name}_real", precision=precision, inputs=_GIVEN, outputs=outputs)
         return _used(text, _GIVEN)
 
     return {"OUTPUTS": single(model.readings, ["outputs"]), "JACOBIANS": single(model.jacobians, ["A", "B"])}
@@ -177,7 +174,7 @@ def _enums(model: Traced) -> str:
         lines = []
         for place, v in enumerate(variables):
             limits = f", {v.limits[0]:.6g} to {v.limits[1]:.6g}" if v.limits else ""
-            meaning = words(f"[{v.unit or '?'}{limits}] {v.meaning}")
+            meaning = comment_text(f"[{v.unit or '?'}{limits}] {v.meaning}")
             lines.append(f"  {model.name}_{kind}_{v.name}{' = 0' if place == 0 else ''}, /* {meaning} */")
         enums.append(f"enum {model.name}_{kind} {{\n" + "\n".join(lines).replace(", /*", ", /*") + "\n};")
     return "\n\n".join(_without_last_comma(text) for text in enums)
@@ -193,18 +190,18 @@ def _arrays(model: Traced, precision: Precision) -> str:
     real = f"{model.name}_real"
     parts = (("states", "start_x"), ("inputs", "start_u"), ("surroundings", "start_s"), ("parameters", "start_p"))
     return "\n".join(
-        array(f"{model.name}_{name}", [v.start for v in getattr(model, kind)], precision, kind=real)
+        print_array(f"{model.name}_{name}", [v.start for v in getattr(model, kind)], precision, kind=real)
         for kind, name in parts
     )
 
 
 def _heading(model: Traced) -> str:
     lines = [
-        words(f"{model.name}: {model.title}"),
-        words(f"Trust: {model.trust}") if model.trust else "",
-        words(f"Starts: {model.about}"),
-        *(words(line) for line in model.origin),
-        *(words(note) for note in late_notes(model)),
+        comment_text(f"{model.name}: {model.title}"),
+        comment_text(f"Trust: {model.trust}") if model.trust else "",
+        comment_text(f"Starts: {model.about}"),
+        *(comment_text(line) for line in model.origin),
+        *(comment_text(note) for note in late_notes(model)),
         "",
         "Written by swashplate from the equations that it simulates with. SI units, radians; body axes",
         "forward-right-down, local axes north-east-down. No allocation, no static variables that change.",

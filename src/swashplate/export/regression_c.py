@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swashplate.engine.c_expression import REAL, Precision, filled, identifier, literal, words
+from swashplate.engine.emit import REAL, comment_text, fill_template, identifier
+from swashplate.engine.statements import Precision, literal
 from swashplate.errors import ExportError
 from swashplate.identification.recursive import fourier_regression
 from swashplate.identification.recursive.equation import BIAS
@@ -111,8 +112,8 @@ def regression_code(
     work = 2 * lines * (unknowns + 2) + 4 * unknowns**2 + 4 * unknowns
     return RegressionCode(
         name=called,
-        header=filled("regression.h", blanks),
-        source=filled("regression.c", blanks),
+        header=fill_template("regression.h", blanks),
+        source=fill_template("regression.c", blanks),
         memory_bytes=numbers * size + 8,
         work_bytes=work * size,
         table_bytes=(2 * (channels + 1) * lines + lines + channels) * size + 4 * (channels + unknowns),
@@ -125,10 +126,10 @@ def _about(plan: RegressionPlan) -> dict[str, str]:
     """What the header says of it."""
     e = plan.equation
     return {
-        "EQUATION": words(e.text),
+        "EQUATION": comment_text(e.text),
         "RATE": f"{1.0 / plan.dt:g}",
-        "CHANNEL_NAMES": words(", ".join(e.channels)),
-        "UNKNOWN_NAMES": words(", ".join(e.names)),
+        "CHANNEL_NAMES": comment_text(", ".join(e.channels)),
+        "UNKNOWN_NAMES": comment_text(", ".join(e.names)),
         "BAND": f"{plan.hertz[0]:g} to {plan.hertz[-1]:g} Hz, {plan.spacing:g} Hz apart",
         "FORGETS": "nothing" if np.isinf(plan.memory) else f"what is {plan.memory:g} s old counts e times less",
     }

@@ -6,7 +6,7 @@ in Simulink.
 
 from __future__ import annotations
 
-from swashplate.engine.c_expression import filled
+from swashplate.engine.emit import fill_template
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced
 
@@ -15,8 +15,8 @@ def simulink(model: Traced) -> dict[str, str]:
     """Texts by file name: NAME_sfun.c, sfun_model.h, NAME.c and NAME.h."""
     code = model_code(model)
     return {
-        f"{model.name}_sfun.c": filled("sfunction.c", {}),
-        "sfun_model.h": filled("sfun_model.h", {"NAME": model.name}),
+        f"{model.name}_sfun.c": fill_template("sfunction.c", {}),
+        "sfun_model.h": fill_template("sfun_model.h", {"NAME": model.name}),
         f"{model.name}.h": code.header,
         f"{model.name}.c": code.source,
     }

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.compiled import loaded
 from swashplate.engine.equations import SURROUNDINGS
+from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
 from swashplate.export.model_c import frame_code
 from swashplate.export.traced import trace_vehicle
@@ -69,7 +69,7 @@ class CompiledEngine:
         return self._told.tolist()
 
 
-def _told(states: int) -> Any:
+def _told(states: int) -> Graph:
     """`motion_row` as a CasADi function of a state row of `tumbling`, its rates and gravity."""
     casadi = require_casadi()
     x, rates, g = (casadi.SX.sym(name, size) for name, size in (("x", states), ("rates", states), ("g", 1)))

@@ -8,7 +8,7 @@ from types import ModuleType
 
 import numpy as np
 
-from swashplate.engine.c_expression import identifier
+from swashplate.engine.emit import identifier
 from swashplate.engine.graph import Expression, Graph
 from swashplate.engine.roots import Looped, Looping, require_casadi
 from swashplate.errors import ExportError

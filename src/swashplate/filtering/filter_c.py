@@ -13,12 +13,11 @@ from types import ModuleType
 
 import numpy as np
 
-from swashplate.engine.c_expression import ROOTS, Statements, filled, printed, split, statements
-from swashplate.engine.c_loops import looped
-from swashplate.engine.c_tangents import Tangents
+from swashplate.engine.emit import Tangents, fill_template, print_searches, print_statements
 from swashplate.engine.equations import Equations
 from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
+from swashplate.engine.statements import ROOTS, Statements, split, statements
 from swashplate.engine.trace import traced_rates
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.following import AWAY, SHARES, STILL
@@ -112,24 +111,24 @@ def sample_source(equations: Equations, sample: Sample, following: Following | N
         "CP": str(max(1, len(of_card.outputs))),
         "C": str(max(1, len(of_inputs.outputs))),
         "PUSHED": ", ".join(map(str, sample.pushed)),
-        "CORRECT": printed(corrected, "double", "double", _FOUND),
+        "CORRECT": print_statements(corrected, "double", "double", _FOUND),
         "CORRECT_MOVED": _indented(correcting),
-        "OF_CARD": printed(of_card, "double", "double", ["cp"]),
+        "OF_CARD": print_statements(of_card, "double", "double", ["cp"]),
         "OF_CARD_MOVED": _indented(card_lines),
-        "OF_INPUTS": printed(of_inputs, "double", "double", ["c"]),
+        "OF_INPUTS": print_statements(of_inputs, "double", "double", ["c"]),
         "OF_INPUTS_MOVED": _indented(input_lines),
         "MOVING": _rates_in_c(rest, rates.steps),
         "MOVING_MOVED": _indented([*lines, *moving.stores(stored, {0: "k"})]),
         "FOLLOWING": follow,
     }
-    return filled("filter.c", blanks)
+    return fill_template("filter.c", blanks)
 
 
 def _rates_in_c(code: Statements, steps: Sequence[int]) -> str:
     """Rates, by loops around their roots where there are some."""
     if steps:
-        return looped(code, steps, real="double", precision="double", outputs=["k"])
-    return printed(code, "double", "double", ["k"])
+        return print_searches(code, steps, real="double", precision="double", outputs=["k"])
+    return print_statements(code, "double", "double", ["k"])
 
 
 def _following(model: StochasticModel, rates: Statements, steps: Sequence[int]) -> str:
@@ -146,11 +145,11 @@ def _following(model: StochasticModel, rates: Statements, steps: Sequence[int]) 
         "SHARES": ", ".join(map(repr, SHARES)),
         "SURE": repr(STILL),
         "STILL_AIR": max(1, len(still.outputs)),
-        "IN_STILL_AIR": printed(still, "double", "double", ["ca"]),
+        "IN_STILL_AIR": print_statements(still, "double", "double", ["ca"]),
         "IN_WIND": _rates_in_c(windy, steps),
-        "SENSE": printed(sensed, "double", "double", ["y", "by_s"]),
+        "SENSE": print_statements(sensed, "double", "double", ["y", "by_s"]),
     }
-    return filled("follow.c", blanks)
+    return fill_template("follow.c", blanks)
 
 
 def sensing(model: StochasticModel) -> Graph:

@@ -15,7 +15,8 @@ import pytest
 import swashplate as sp
 from exported import compiled
 from swashplate.compiler import compiler, shared_library
-from swashplate.engine.c_expression import identifier, literal, words
+from swashplate.engine.emit import comment_text, identifier
+from swashplate.engine.statements import literal
 from swashplate.errors import ExportError
 from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space
@@ -274,7 +275,7 @@ def test_numbers_for_c() -> None:
 
 
 def test_words_and_names_for_c() -> None:
-    assert words("a/* b */ c\\\n??/") == "a/ * b * / c| ? ?/"
+    assert comment_text("a/* b */ c\\\n??/") == "a/ * b * / c| ? ?/"
     assert identifier("fit-2/model") == "fit_2_model"
     assert identifier("50raptor") == "model_50raptor"
     assert identifier("double") == "model_double"

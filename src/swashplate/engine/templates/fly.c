@@ -5,7 +5,7 @@
 #include <string.h>
 
 typedef @REAL@ real;
-typedef @WHOLE@ whole;
+typedef @INTEGER@ whole;
 enum {
   LANES = @LANES@, N = @STATES@, SEEN = @SEEN@, W = @DRIVING@, M = W - 4, P = @NUMBERS@, R = @ROOTS@, CP = @OF_CARD_COUNT@,
   C = @OF_INPUTS_COUNT@, REFERENCES = @REFERENCES@, MEASURED = @MEASURED@, MEMORY = @MEMORY@, DRAWS = @DRAWS@,
@@ -27,20 +27,7 @@ typedef struct {
   real *sent, *states, *inputs;
 } Flight;
 
-/* sin(x + quarter pi / 2): the nearest multiple of pi / 2 is taken away, its last two bits choose what is left. */
-static inline __attribute__((unused)) real turned(real x, int quarter) {
-  const real moved = x * @PER_TURN@ + @ROUNDING@, turns = moved - @ROUNDING@;
-  const real r = x @REDUCED@, z = r * r;
-  const real sine = r + r * z * @SINE@, cosine = 1 - z / 2 + z * z * @COSINE@;
-  union { real number; whole bits; } of = {moved}, to;
-  const whole odd = (whole)((unsigned @WHOLE@)of.bits << (@BITS@ - 1));
-  const whole two = (whole)((unsigned @WHOLE@)of.bits << (@BITS@ - 2));
-  const whole top = (whole)((unsigned @WHOLE@)1 << (@BITS@ - 1));
-  to.number = (odd < 0) != (quarter != 0) ? cosine : sine;
-  to.bits ^= (quarter ? two ^ odd : two) & top;
-  return to.number;
-}
-#define sine(x) turned(x, 0)
+@TURNED@#define sine(x) turned(x, 0)
 #define cosine(x) turned(x, 1)
 #define tangent(x) (turned(x, 0) / turned(x, 1))
 

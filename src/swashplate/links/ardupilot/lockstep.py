@@ -16,7 +16,7 @@ from copy import deepcopy
 import numpy as np
 
 from swashplate.compiled import loaded
-from swashplate.engine.c_expression import body, filled
+from swashplate.engine.emit import fill_template, print_graph
 from swashplate.engine.graph import Graph
 from swashplate.engine.roots import require_casadi
 from swashplate.errors import SwashError
@@ -157,9 +157,9 @@ def _source(plant: Plant, sensing: Sensing) -> tuple[str, int]:
         "FORMS": ", ".join(f"{{{magic}, {form.size}}}" for magic, form in FORMS.items()),
         "ROOM": str(_ROOM), "LONGEST": str(LONGEST + 1),
     }  # fmt: skip
-    return filled("lockstep.c", blanks), len(values)
+    return fill_template("lockstep.c", blanks), len(values)
 
 
 def _c(function: Graph, inputs: tuple[str, ...], outputs: list[str]) -> str:
     nods = "".join(f"  (void){name};\n" for name in inputs)  # strict compilers ask for one where it is not read
-    return body(function, real="double", precision="double", inputs=inputs, outputs=outputs) + nods
+    return print_graph(function, real="double", precision="double", inputs=inputs, outputs=outputs) + nods

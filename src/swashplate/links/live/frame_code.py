@@ -9,7 +9,7 @@ from pathlib import Path
 
 from swashplate.atomic import scratch_folder
 from swashplate.compiler import ran, web_compiler
-from swashplate.engine.c_expression import body, filled
+from swashplate.engine.emit import fill_template, print_graph
 from swashplate.engine.equations import equations_of
 from swashplate.engine.fly import flight_code
 from swashplate.engine.law import FELT, print_function
@@ -48,11 +48,11 @@ def frame_code(world: World) -> str:
     printed, _ = print_function(law.function, "double")
     force = placing = ""
     if world.pilot.feels:
-        force = body(
+        force = print_graph(
             traced_force(equations), real="double", precision="double", inputs=["x", "w", "p"], outputs=["felt"]
         )
     if not world.vehicle.traits.linear:
-        placing = body(
+        placing = print_graph(
             traced_placing(len(world.vehicle.state_names)),
             real="double",
             precision="double",
@@ -60,8 +60,8 @@ def frame_code(world: World) -> str:
             outputs=["row"],
         )
     f, period = law.function, world.substeps
-    sensors = body(traced_sensors(), real="double", precision="double", inputs=["x", "s"], outputs=["row"])
-    return filled(
+    sensors = print_graph(traced_sensors(), real="double", precision="double", inputs=["x", "s"], outputs=["row"])
+    return fill_template(
         "frame.c",
         {
             "FLIGHT": flight_code(
@@ -93,7 +93,7 @@ def frame_code(world: World) -> str:
 
 def module_name(source: str, exports: Sequence[str]) -> str:
     """The file's name of a module that ships, by what it is made of."""
-    made_of = "\n".join([source, filled("bare.h", {}), *_TARGET, *_OPTIONS, str(_STACK), *exports])
+    made_of = "\n".join([source, fill_template("bare.h", {}), *_TARGET, *_OPTIONS, str(_STACK), *exports])
     return f"{hashlib.sha256(made_of.encode()).hexdigest()[:20]}.wasm"
 
 
@@ -115,7 +115,7 @@ def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS, ready: bool =
     program = web_compiler()
     if program is None:
         raise missing("ziglang", what="a page in which a model flies")
-    bare = filled("bare.h", {}) + re.sub(r"#include <(?:math|string)\.h>\n", "", source)
+    bare = fill_template("bare.h", {}) + re.sub(r"#include <(?:math|string)\.h>\n", "", source)
     with scratch_folder() as folder:
         text, made = folder / "frame.c", folder / "frame.wasm"
         text.write_text(bare, encoding="utf-8")

@@ -11,8 +11,8 @@ import pytest
 
 from swashplate.compiled import NATIVE, loaded
 from swashplate.compiler import compiler
-from swashplate.engine.c_expression import Statement, filled
-from swashplate.engine.c_tangents import Tangents
+from swashplate.engine.emit import Tangents, fill_template
+from swashplate.engine.statements import Statement
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
 
@@ -54,7 +54,7 @@ def test_every_operation_moves_as_differences_do() -> None:
         stores += [f"out[{2 * number}] = t{number}; out[{2 * number + 1}] = {f'{moved}[0]' if moved else '0'};"]
     text = "\n  ".join(["const vec dx[2] = {{1.1}, {-0.3}};", *body, *stores])
     head = "void moved(const double *x, double *out);\n"
-    vectors = filled("vectors.h", {})
+    vectors = fill_template("vectors.h", {})
     source = f"#include <math.h>\n{vectors}{head}void moved(const double *x, double *out) {{\n  {text}\n}}\n"
     run = loaded(source, options=("-O1", NATIVE, "-Wno-psabi")).moved
     for place in _PLACES:
