@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,7 +34,7 @@ _TRUTH = {"tau_f_upper": 1.3, "linkage_lower": 0.11, "hub_stiffness_upper": 0.09
 """What the simulated aircraft has instead of the card's numbers, for the identification to find."""
 
 
-def run_demo(asked: Demo, say: Say) -> Result[Any, Any]:
+def run_demo(asked: Demo, say: Say) -> Result[object, object]:
     """The demo that was asked for; its `data` and the report's first line say which flights it took.
 
     The numbers of the simulated aircraft are its `truth`, and stand in the tables beside the published and the

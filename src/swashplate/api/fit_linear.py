@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from swashplate.api.asking import strings
 from swashplate.api.gains import suggest_gains
@@ -17,6 +17,7 @@ from swashplate.errors import CardError, IdentificationError, SwashError
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
 from swashplate.identification.core import stopping
+from swashplate.identification.core.result import Result
 from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.handling_readings import handling_lines, margin_lines
 from swashplate.identification.frequency.response_names import under_names_of
@@ -29,6 +30,7 @@ from swashplate.identification.frequency.transfer_function_forms import BAND, Tr
 from swashplate.identification.identify import identify
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.linearised_model import model_of
+from swashplate.identification.time.record_fit import TimeDetails
 from swashplate.models.catalogue import vehicle as find
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -178,7 +180,7 @@ def in_time(asked: FitInTime, say: Say) -> LinearStudy:
     unread = asked.read(asked.hold_out)
     say("fitting")
     with stopping.kept():
-        fit = identify(
+        result = identify(
             begun,
             records,
             outputs=wanted,
@@ -190,7 +192,7 @@ def in_time(asked: FitInTime, say: Say) -> LinearStudy:
             horizon=asked.horizon,
             progress=_iterations(say),
         )
-    fit = stopping.with_stop(fit)
+    fit = cast(Result[StateSpaceModel, TimeDetails], stopping.with_stop(result))
     say("flying the model")
     unseen = _uniform(asked, unread, channels) or records
     verification = marked(verify(fit.solution, unseen, outputs=wanted), fit.settings["records"])

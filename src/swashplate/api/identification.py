@@ -35,7 +35,7 @@ _SAME = {field.name for field in fields(Question)} & {field.name for field in fi
 """What the verb asks as the estimators do."""
 
 
-def write_fit(fit: Result[Any, Any], folder: Path) -> None:
+def write_fit(fit: Result[object, object], folder: Path) -> None:
     """The page, the model, the fit, and what was drawn and judged, into a folder that is there."""
     report(fit, path=folder / "report.html")
     fit.save(folder / "fit.json")
@@ -48,7 +48,7 @@ def write_fit(fit: Result[Any, Any], folder: Path) -> None:
         fit.posterior.save(folder / "posterior.nc")
 
 
-def fit_parts(fit: Result[Any, Any]) -> list[Any]:
+def fit_parts(fit: Result[object, object]) -> list[Any]:
     """What a terminal shows: tables, the report's warnings and its five lines, in words."""
     if not isinstance(fit.solution, Vehicle):
         return [repr(fit)]
@@ -57,7 +57,7 @@ def fit_parts(fit: Result[Any, Any]) -> list[Any]:
     return [fit_table(fit), *([f"\n{fit.posterior!r}"] if fit.posterior is not None else []), "\n" + "\n".join(told)]
 
 
-def identify_vehicle(asked: FitVehicle, say: Say) -> Result[Any, Any]:
+def identify_vehicle(asked: FitVehicle, say: Say) -> Result[object, object]:
     """The model that was asked for, with how it predicts what its fit has not seen."""
     posterior, close_loop = asked.posterior, strings(asked.close_loop)
     prior: Mapping[str, Any] = asked.prior if isinstance(asked.prior, Mapping) else {"": asked.prior}

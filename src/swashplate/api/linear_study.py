@@ -43,7 +43,7 @@ class LinearStudy(ReportFolder):
     remarks: tuple[str, ...] = ()
 
     @property
-    def fit(self) -> Result[Any, Any] | None:
+    def fit(self) -> Result[object, object] | None:
         """The fit: of a state-space model or of transfer functions."""
         m = self.material
         return m.fit or m.time_fit or (m.transfer_functions[0] if m.transfer_functions else None)

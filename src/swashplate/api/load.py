@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 from swashplate import documents
 from swashplate.errors import FlightError, SwashError
@@ -26,7 +25,16 @@ _HINT = "`swash identify`, `fit-ss`, `fit-tf`, `fit-time` and `validate` write s
 
 def load(
     path: str | os.PathLike[str], *, equations: Vehicle | None = None
-) -> Result[Any, Any] | FrequencyResponse | Flight | Vehicle | Validation | Verification | ModelComparison | Residuals:
+) -> (
+    Result[object, object]
+    | FrequencyResponse
+    | Flight
+    | Vehicle
+    | Validation
+    | Verification
+    | ModelComparison
+    | Residuals
+):
     """What a file of ours holds.
 
     A .json holds a fit, a validation, a verification, a comparison of models or residuals; a .nc holds frequency

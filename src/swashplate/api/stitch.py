@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from swashplate.simulation.trim import Trim
 if TYPE_CHECKING:
     from swashplate.api.verbs.vehicle import StitchModels
 
-Point: TypeAlias = LinearModel | StateSpaceModel | Vehicle | Result[Any, Any] | str | Path
+Point: TypeAlias = LinearModel | StateSpaceModel | Vehicle | Result[object, object] | str | Path
 """A linear model at one speed, or its file."""
 PointTrim: TypeAlias = Trim | Flight | Mapping[str, float]
 """Where a point stands: a trim, a flight whose means it is, or values by name."""

@@ -18,7 +18,8 @@ from swashplate.arrays import Array
 from swashplate.bench.record import LOADS, BenchRecord
 from swashplate.bench.refusals import COMMANDS
 from swashplate.engine.roots import require_casadi
-from swashplate.models.coax import CoaxInputs, CoaxParameters, CoaxState, Drive, loads
+from swashplate.engine.symbols import Operand
+from swashplate.models.coax import CoaxialLoads, CoaxInputs, CoaxParameters, CoaxState, Drive, loads
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, CasadiBackend
 from swashplate.physics.environment import Environment
@@ -148,7 +149,7 @@ class _Held:
     dt: float
 
 
-def _acting(plan: _Held, x: Sequence[Any], w: Sequence[Any], p: Sequence[Any], xp: Backend) -> Any:
+def _acting(plan: _Held, x: Sequence[Operand], w: Sequence[Operand], p: Sequence[Operand], xp: Backend) -> CoaxialLoads:
     """Loads and rates of the moving parts of the held vehicle."""
     drive = dict(zip(DRIVING, w, strict=True))
     parameters, density = CoaxParameters(*p[:-2]), p[-1]
@@ -178,11 +179,11 @@ def _graphs(plan: _Held) -> tuple[Any, Any]:
     x, w, then = (casadi.SX.sym(name, n) for name, n in (("x", len(_STATES)), ("w", len(DRIVING)), ("t", len(DRIVING))))
     p, dt = casadi.SX.sym("p", len(CoaxParameters._fields) + 2), plan.dt
 
-    def entries(column: Any) -> list[Any]:
+    def entries(column: Operand) -> list[Operand]:
         return [column[i] for i in range(column.shape[0])]
 
     acting = _acting(plan, entries(x), entries(w), entries(p), xp)
-    rates_of = [rate for part in (acting.lower, acting.bar, acting.drive) for rate in part]
+    rates_of = [rate for part in (acting.lower, acting.bar or (), acting.drive) for rate in part]
     rates = casadi.Function("rates", [x, w, p], [casadi.vertcat(*rates_of)])
     loads_of = casadi.Function("loads", [x, w, p], [casadi.vertcat(*acting.force, *acting.moment)])
     glides = casadi.DM([float(name in ("phi", "theta")) for name in DRIVING])

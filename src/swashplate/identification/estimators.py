@@ -108,7 +108,7 @@ class Estimator(Protocol):
         """Why it cannot serve for this model and these data, in words; "" where it can."""
         ...
 
-    def estimate(self, model: Any, data: Any, question: Question) -> Result[Any, Any]:
+    def estimate(self, model: Any, data: Any, question: Question) -> Result[object, object]:
         """The result."""
         ...
 

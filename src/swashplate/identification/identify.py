@@ -20,7 +20,7 @@ def identify(
     *,
     method: str | None = None,
     **asked: Any,
-) -> Result[Any, Any]:
+) -> Result[object, object]:
     """Identify a model's parameters from one or more conditioned flights, or from frequency responses.
 
     Args:

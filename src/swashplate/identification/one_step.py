@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -92,7 +91,9 @@ _SINGULAR = 1e14
 """Condition of a block of information beyond which the flights cannot tell its numbers apart."""
 
 
-def one_step_effects(fit: Result[Any, Any], effects: Sequence[PhysicalEffect] | None = None) -> tuple[EffectTest, ...]:
+def one_step_effects(
+    fit: Result[object, object], effects: Sequence[PhysicalEffect] | None = None
+) -> tuple[EffectTest, ...]:
     """A test of every effect that a vehicle's model names, by one step; empty where nothing can be said.
 
     Args:
@@ -140,7 +141,7 @@ def in_words(tests: Sequence[EffectTest]) -> str:
     return f"{line}{rest}. By one step from this fit."
 
 
-def not_judged(fit: Result[Any, Any], effects: Sequence[PhysicalEffect] | None = None) -> str:
+def not_judged(fit: Result[object, object], effects: Sequence[PhysicalEffect] | None = None) -> str:
     """What `one_step_effects` says nothing of, in a sentence: parts that the fit leaves out, where its likelihood
     cannot free them without being compiled anew; "" where there are none."""
     if fit.fitted is not None and hasattr(fit.fitted.likelihood, "widened"):
@@ -167,7 +168,7 @@ class _Split:
         return np.asarray(self.tested - self.between @ np.linalg.solve(self.others, self.between.T))
 
 
-def _without(fit: Result[Any, Any], effect: PhysicalEffect) -> EffectTest:
+def _without(fit: Result[object, object], effect: PhysicalEffect) -> EffectTest:
     """An effect that is free: how far its numbers are from none, and how the others stand without it."""
     names = list(effect.without)
     at = [fit.names.index(name) for name in names]
@@ -184,7 +185,7 @@ def _without(fit: Result[Any, Any], effect: PhysicalEffect) -> EffectTest:
     return _test(fit, effect, True, float(away @ pull), {n: (fit[n].value, fit[n].best_sigma) for n in names}, shifts)
 
 
-def _with(fit: Result[Any, Any], effects: Sequence[PhysicalEffect]) -> list[EffectTest]:
+def _with(fit: Result[object, object], effects: Sequence[PhysicalEffect]) -> list[EffectTest]:
     """Effects that are held out: the slope of the likelihood where they are not, all in one evaluation."""
     if not effects or fit.fitted is None:
         return []
@@ -236,7 +237,7 @@ def _with(fit: Result[Any, Any], effects: Sequence[PhysicalEffect]) -> list[Effe
 
 
 def _test(
-    fit: Result[Any, Any],
+    fit: Result[object, object],
     effect: PhysicalEffect,
     asked: bool,
     statistic: float,

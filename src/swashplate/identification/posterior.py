@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -26,7 +26,7 @@ _LEAST = 100
 
 
 def posterior(
-    result: Result[Any, Any],
+    result: Result[object, object],
     *,
     method: Literal["laplace", "nuts"] | str = "laplace",
     draws: int = 1000,
@@ -34,7 +34,7 @@ def posterior(
     warmup: int | None = None,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
-) -> Result[Any, Any]:
+) -> Result[object, object]:
     """A fit with draws of what it does not know, which `draw`, Monte Carlo and the control check then take.
 
     "laplace" is free: normal about the estimates from the covariance of the likelihood. "nuts" draws from the
@@ -100,7 +100,7 @@ def check_posterior(method: str) -> None:
         raise IdentificationError(f"'{method}' is no posterior; there are {', '.join(METHODS)}.", channel="posterior")
 
 
-def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, where: str) -> Posterior:
+def _laplace(result: Result[object, object], *, draws: int, chains: int, seed: int, where: str) -> Posterior:
     covariance = result.covariance
     vague = [n for n, v in zip(result.names, np.diag(covariance), strict=True) if not 0.0 < v < np.inf]
     if vague or not result.names or not np.all(np.isfinite(covariance)):
@@ -120,7 +120,7 @@ def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, wh
 
 
 def _drawn(
-    result: Result[Any, Any],
+    result: Result[object, object],
     fitted: Fitted,
     *,
     draws: int,

@@ -6,25 +6,25 @@ from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 
-def leaves(tree: Any) -> Iterator[Any]:
+def leaves(tree: object) -> Iterator[Any]:
     """The scalars of nested named tuples in order; a part that is None has none."""
     if tree is None:
         return
-    if hasattr(tree, "_fields"):
+    if isinstance(tree, tuple):
         for part in tree:
             yield from leaves(part)
     else:
         yield tree
 
 
-def rebuild(template: Any, values: Sequence[Any]) -> Any:
+def rebuild(template: object, values: Sequence[object]) -> Any:
     """The template's nested named tuples with their scalars replaced by `values`, in the order of `leaves`."""
     rest = iter(values)
 
-    def build(part: Any) -> Any:
+    def build(part: object) -> object:
         if part is None:
             return None
-        if hasattr(part, "_fields"):
+        if isinstance(part, tuple):
             return cast(Any, type(part))(*(build(inner) for inner in part))
         return next(rest)
 

@@ -6,13 +6,12 @@ import os
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 from swashplate.bench.result import Bench, BenchCheck, BenchResult, Curve
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Text, tabulate
 from swashplate.reporting.terms import first_screen
-from swashplate.reporting.theme import BLACK, GREY, axis, base_layout, dots, line, style, unit_words
+from swashplate.reporting.theme import BLACK, GREY, FigurePart, axis, base_layout, dots, line, style, unit_words
 from swashplate.reporting.versions import card_hash, versions
 from swashplate.reporting.words import counted, listed, sigma_words, value_words
 
@@ -135,7 +134,7 @@ def _figures(result: BenchResult) -> list[Figure]:
 
 def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
     first = curves[0]
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     keys = []
     if len(curves) == 1:
         keys.append(Key("measured", *((GREY, "solid") if first.x.size > _MANY else (BLACK, "circle"))))

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text, tabulate
-from swashplate.reporting.theme import FLIGHT, MODEL, VERMILION, axis_number, grid, line
+from swashplate.reporting.theme import FLIGHT, MODEL, VERMILION, FigurePart, axis_number, grid, line
 from swashplate.reporting.words import counted
 
 _BINS = 40
@@ -133,10 +133,10 @@ def _quantiles(shapes: Sequence[Shape], shares: Sequence[float], rows: str) -> T
 
 
 def _spread(shapes: Sequence[Shape], rows: str) -> Figure:
-    layout: dict[str, Any] = grid(
+    layout: FigurePart = grid(
         [_label(shape) for shape in shapes], columns=2, height=190, x_title="value", y_title=f"{rows}s [-]"
     )
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     diverged = 0
     for k, shape in enumerate(shapes):
         axis = axis_number(k)
@@ -160,12 +160,12 @@ def _spread(shapes: Sequence[Shape], rows: str) -> Figure:
 
 
 def _convergence(shapes: Sequence[Shape], shares: Sequence[float], rows: str) -> Figure:
-    layout: dict[str, Any] = grid(
+    layout: FigurePart = grid(
         [_label(shape) for shape in shapes], columns=2, height=190, x_title=f"{rows}s [-]", y_title="quantile"
     )
     for name in [name for name in layout if name.startswith("xaxis")]:
         layout[name] = {**layout[name], "type": "log"}
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     for k, shape in enumerate(shapes):
         axis = axis_number(k)
         values = shape.values[~np.isnan(shape.values)]

@@ -24,7 +24,18 @@ from swashplate.identification.responses.frequency_response import (
 from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.usual_axes import usual_axes
 from swashplate.reporting.structure import Cell, Figure, Key, Table, tabulate
-from swashplate.reporting.theme import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION, grid, line, phase_ticks
+from swashplate.reporting.theme import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    FigurePart,
+    grid,
+    line,
+    phase_ticks,
+)
 
 STYLES = ((BLACK, "solid"), (BLUE, "dash"), (VERMILION, "dot"), (GREEN, "dashdot"), (PURPLE, "dash"), (ORANGE, "dot"))
 MOST_PAIRS = 12
@@ -69,7 +80,7 @@ def bode_overlay(pairs: Mapping[tuple[str, str], Mapping[str, Curve]], *, whose:
     titles = [f"{o} / {i}, {what}" for o, i in shown for what in ("magnitude [dB]", "phase [deg]")]
     layout = grid(titles, columns=2, height=150, x_title="frequency [Hz]")
     layout["meta"] |= {"frequency": "Hz"}
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     for row, curves in enumerate(shown.values()):
         numbers = ["" if 2 * row + k == 0 else str(2 * row + k + 1) for k in (0, 1)]
         phases: list[Array] = []
@@ -295,7 +306,7 @@ def _at(one: FrequencyResponse, pair: tuple[str, str], omega: Array) -> tuple[Co
     return np.exp(logarithm), np.interp(x, where, error[known])
 
 
-def compare_estimates(cases: Mapping[str, Result[Any, Any]]) -> CaseParts:
+def compare_estimates(cases: Mapping[str, Result[object, object]]) -> CaseParts:
     """Values and standard deviations by parameter; differences from the first in standard deviations of the difference.
 
     The sigma of a difference is that of independent fits, sqrt(s1^2 + s2^2); fits to the same data are not, and that
@@ -358,7 +369,7 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _shared_data(cases: Mapping[str, Result[Any, Any]]) -> list[str]:
+def _shared_data(cases: Mapping[str, Result[object, object]]) -> list[str]:
     """Fits that have seen the same data: their differences are less certain to be chance than the sigmas say."""
     logs = {n: {s.signals or f"{s.sha256} {s.name}": s.name for s in r.data} for n, r in cases.items()}
     pairs = [(a, b, sorted({logs[a][k] for k in logs[a].keys() & logs[b].keys()})) for a, b in combinations(cases, 2)]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from swashplate.errors import SwashError
 from swashplate.identification.core.result import Result
 from swashplate.identification.estimators import GAINS
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting import sections_data, sections_fit, sections_prior, sections_sight, sections_validation
 from swashplate.reporting.figures_validation import key_picture
 from swashplate.reporting.glossary import PARAMETERS
@@ -22,7 +22,7 @@ from swashplate.validation.verification import Verification
 
 
 def compose(
-    fit: Result[Any, Any] | None = None,
+    fit: Result[Vehicle, object] | None = None,
     validation: Validation | None = None,
     verification: Verification | None = None,
     *,
@@ -78,7 +78,7 @@ _FIRST = {"Verdict": 0, "Warnings": 1}
 """Lines of the summary that a page begins with."""
 
 
-def _provenance(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
+def _provenance(fit: Result[Vehicle, object] | None, validation: Validation | None) -> Section:
     noise = sections_fit.noise(fit) if fit else None
     blocks = (
         *sections_data.asked(fit, validation),
@@ -89,7 +89,7 @@ def _provenance(fit: Result[Any, Any] | None, validation: Validation | None) -> 
 
 
 def hover_modes(
-    fit: Result[Any, Any] | None, validation: Validation | None
+    fit: Result[Vehicle, object] | None, validation: Validation | None
 ) -> tuple[dict[str, Sequence[Mode]], list[str]]:
     """Modes of the published and the identified vehicle at hover, and why one has none."""
     modes: dict[str, Sequence[Mode]] = {}
@@ -102,13 +102,13 @@ def hover_modes(
     return modes, problems
 
 
-def _with_warnings(fit: Result[Any, Any]) -> Section:
+def _with_warnings(fit: Result[Vehicle, object]) -> Section:
     section = sections_fit.parameters(fit)
     warned = sections_fit.warnings(fit)
     return replace(section, blocks=(warned, *section.blocks)) if warned else section
 
 
-def _picture(fit: Result[Any, Any] | None, validation: Validation | None) -> Figure | None:
+def _picture(fit: Result[Vehicle, object] | None, validation: Validation | None) -> Figure | None:
     """The key picture: the race of the predictors; without a validation, flight against model in roll and pitch."""
     if validation and validation.scores:
         return key_picture(validation)
@@ -118,7 +118,7 @@ def _picture(fit: Result[Any, Any] | None, validation: Validation | None) -> Fig
     return None
 
 
-def _title(fit: Result[Any, Any] | None, validation: Validation | None) -> str:
+def _title(fit: Result[Vehicle, object] | None, validation: Validation | None) -> str:
     source = fit.data if fit else validation.data if validation else ()
     names = list(dict.fromkeys(f.name for f in source if f.name))
     verb = "identified from" if fit else "predicting"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from swashplate.reporting.theme import (
     GREY,
     MODEL,
     PUBLISHED,
+    FigurePart,
     axis,
     axis_number,
     base_layout,
@@ -66,7 +66,7 @@ def residual_time(pieces: Mapping[str, Sequence[tuple[Array, Array]]], sigma: Ma
         sigma: promised standard deviation per channel.
     """
     names = list(pieces)
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     finely = {name: _finely(name, sigma[name]) for name in names}
     for i, name in enumerate(names):
         number = axis_number(i)
@@ -92,7 +92,7 @@ def residual_correlation(pieces: Mapping[str, Sequence[Array]], dt: float) -> Fi
     """Autocorrelation of the residuals with the bound of white noise."""
     names = list(pieces)
     layout = grid(names, columns=2, height=140, x_title="lag [s]", y_title="autocorrelation [-]")
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     outside = {}
     for i, name in enumerate(names):
         number = axis_number(i)

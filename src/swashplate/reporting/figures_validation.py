@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (
     PREDICTOR_STYLE,
     PREDICTOR_WORDS,
+    FigurePart,
     axis,
     axis_number,
     base_layout,
@@ -54,7 +54,7 @@ def key_picture(validation: Validation) -> Figure:
     layout["yaxis"] = axis(
         "", type="category", categoryarray=names[::-1], categoryorder="array", range=[-0.6, len(names) - 0.4]
     )
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     for predictor in reversed([p for p in PREDICTORS if p != "hold"]):
         rows = [scores[name, predictor] for name in names if (name, predictor) in scores]
         color, _, symbol = PREDICTOR_STYLE[predictor]
@@ -110,7 +110,7 @@ def fit_over_horizon(validation: Validation) -> Figure:
     """Fit % against the horizon, one small panel per channel."""
     names = _channels(validation)
     layout = grid(names, columns=3, height=118, x_title="ahead [s]", y_title="fit [%]")
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     for i, name in enumerate(names):
         number = axis_number(i)
         for predictor in reversed(PREDICTORS):

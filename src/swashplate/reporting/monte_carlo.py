@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from swashplate.flights.schema import ATTITUDE, POSITION
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.flight_page import flight_panels
 from swashplate.reporting.structure import Cell, Figure, Key, Points, Report, Row, Section, Table, Text, tabulate
-from swashplate.reporting.theme import MODEL, VERMILION, axis_number, grid, line
+from swashplate.reporting.theme import MODEL, VERMILION, FigurePart, axis_number, grid, line
 from swashplate.reporting.versions import card_hash
 from swashplate.reporting.words import counted
 
@@ -107,14 +106,14 @@ def _table(spread: Spread) -> Table:
 def _figure(spread: Spread) -> Figure:
     """How many flights went how far, by limit; the limit dashed."""
     limits = asdict(spread.limits)
-    layout: dict[str, Any] = grid(
+    layout: FigurePart = grid(
         [f"{n} [{u}]" for n, (u, _) in SHOWN.items()],
         columns=2,
         height=190,
         x_title="largest of a flight",
         y_title="flights [-]",
     )
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     for i, (name, (_, factor)) in enumerate(SHOWN.items()):
         axis = axis_number(i)
         values, bound = factor * spread.values[name], factor * limits[name]

@@ -26,7 +26,7 @@ from swashplate.simulation.linearize import Mode
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 
-Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse
+Reportable = Result[object, object] | Validation | Verification | FrequencyResponse
 
 
 @runtime_checkable

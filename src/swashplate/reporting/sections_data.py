@@ -15,7 +15,7 @@ from swashplate.reporting.words import counted, listed, noise_told, plain_words,
 from swashplate.validation.validation import Validation
 
 
-def asked(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[Block, ...]:
+def asked(fit: Result[Vehicle, object] | None, validation: Validation | None) -> tuple[Block, ...]:
     """What was asked: vehicle, method, flights and settings."""
     blocks: list[Block] = []
     vehicle = fit.model if fit else validation.vehicle if validation else None
@@ -67,14 +67,14 @@ def _sources(flights: Iterable[DataSource]) -> list[str]:
     return [flight.name or "an unnamed flight" for flight in flights]
 
 
-def used_twice(fit: Result[Any, Any] | None, validation: Validation | None) -> list[DataSource]:
+def used_twice(fit: Result[object, object] | None, validation: Validation | None) -> list[DataSource]:
     """Flights of the validation that come from a log which the fit used: predicting them proves less."""
     if fit is None or validation is None:
         return []
     return [one for one in validation.data if any(one.same_log(other) for other in fit.data)]
 
 
-def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
+def data(fit: Result[Vehicle, object] | None, validation: Validation | None) -> Section:
     """The flights: where they come from, what was done to them, what their readers found."""
     fitted, tested = fit.data if fit else (), validation.data if validation else ()
     twice = used_twice(fit, validation)
@@ -127,7 +127,7 @@ def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section
     return Section("data", "Which data, and what was done to it?", tuple(blocks), folded=True)
 
 
-def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[Block, ...]:
+def made_with(fit: Result[Vehicle, object] | None, validation: Validation | None) -> tuple[Block, ...]:
     """Versions and hashes: enough to know whether two reports say the same about the same data."""
     rows = tuple((name, number) for name, number in versions().items())
     hashes: list[tuple[str, str]] = []
@@ -155,12 +155,12 @@ def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> tu
     )
 
 
-def _numbers(fit: Result[Any, Any]) -> dict[str, Any]:
+def _numbers(fit: Result[Vehicle, object]) -> dict[str, Any]:
     """A result's numbers and words; the conditioned signals' last bits, and so their hash, depend on the machine."""
     return replace(fit, data=tuple(replace(one, signals="") for one in fit.data)).to_document(comparisons=False)
 
 
-def vehicles(fit: Result[Any, Any] | None, validation: Validation | None) -> dict[str, Vehicle]:
+def vehicles(fit: Result[Vehicle, object] | None, validation: Validation | None) -> dict[str, Vehicle]:
     """Before and after: by "published" and "identified"."""
     if fit:
         return {"published": fit.start, "identified": fit.model}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.estimators import GAINS
 from swashplate.identification.one_step import in_words, not_judged, one_step_effects
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.figures_fit import residual_correlation, residual_time
 from swashplate.reporting.figures_time import Series, flight_name, time_figures
 from swashplate.reporting.structure import Block, Cell, Points, Row, Section, Table, Text, tabulate
@@ -25,7 +25,7 @@ PRIOR_HEAVY = 0.5
 """Share of prior information above which a value says more about the prior than about the flight."""
 
 
-def parameters(fit: Result[Any, Any]) -> Section:
+def parameters(fit: Result[Vehicle, object]) -> Section:
     """Every estimated number, with where it comes from."""
     rows = tuple(_row(fit, estimate) for estimate in fit.estimates)
     blocks: list[Block] = [Text(problem, tone="bad") for problem in fit.problems]
@@ -76,7 +76,7 @@ def parameters(fit: Result[Any, Any]) -> Section:
     return Section("parameters", "Which numbers came out, and how sure are they?", tuple(blocks), folded=True)
 
 
-def noise(fit: Result[Any, Any]) -> Table | None:
+def noise(fit: Result[Vehicle, object]) -> Table | None:
     """The noise model, None where the method has none."""
     if fit.noise is None:
         return None
@@ -91,7 +91,7 @@ def noise(fit: Result[Any, Any]) -> Table | None:
     )
 
 
-def _row(fit: Result[Any, Any], e: Estimate) -> Row:
+def _row(fit: Result[Vehicle, object], e: Estimate) -> Row:
     change = e.value - e.start
     relative = _relative(change, e.start)
     sigmas = f"{change / e.sigma_corrected:+.1f}" if e.sigma_corrected > 0.0 else "–"
@@ -117,7 +117,7 @@ def _relative(change: float, published: float) -> str:
     return f"{share:+.0f} %" if abs(share) < 1000.0 else ("new" if not published else "> 999 %")
 
 
-def _remarks(fit: Result[Any, Any], e: Estimate) -> tuple[str, bool, str]:
+def _remarks(fit: Result[Vehicle, object], e: Estimate) -> tuple[str, bool, str]:
     remarks = []
     if e.at_bound:
         entry = fit.start.card.parameters.get(e.name)
@@ -130,7 +130,7 @@ def _remarks(fit: Result[Any, Any], e: Estimate) -> tuple[str, bool, str]:
     return "; ".join(remarks), False, "bad" if e.at_bound else "plain"
 
 
-def comparison(fit: Result[Any, Any]) -> Section:
+def comparison(fit: Result[Vehicle, object]) -> Section:
     """Flight against model for every channel, one pair of figures per flight."""
     one_step = GAINS.get(fit.method, "none") != "none"
     model_label = "one-step prediction" if one_step else "simulation on the recorded inputs"
@@ -161,7 +161,7 @@ def comparison(fit: Result[Any, Any]) -> Section:
     return Section("comparison", "Does it follow the flight it was fitted to?", tuple(blocks), folded=True)
 
 
-def _series(fit: Result[Any, Any], pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
+def _series(fit: Result[Vehicle, object], pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
     by_channel: dict[str, list[Series]] = {}
     for piece in pieces:
         record = piece.record
@@ -187,13 +187,13 @@ def _series(fit: Result[Any, Any], pieces: Sequence[Comparison]) -> dict[str, li
     return by_channel
 
 
-def _nuisance(fit: Result[Any, Any], log: str) -> Nuisance:
+def _nuisance(fit: Result[Vehicle, object], log: str) -> Nuisance:
     """The log's own delays, trims, lever and level, the mean ones where it has none."""
     of_log = {e.name: e.value for e in fit.constants if e.record == log and e.name in Nuisance._fields}
     return (fit.nuisance or Nuisance())._replace(**of_log)
 
 
-def residuals(fit: Result[Any, Any]) -> Section:
+def residuals(fit: Result[Vehicle, object]) -> Section:
     """What the model left over: over time, and its autocorrelation."""
     names = fit.in_time[0].record.output_names
     timed: dict[str, list[tuple[Array, Array]]] = {name: [] for name in names}
@@ -215,7 +215,7 @@ def residuals(fit: Result[Any, Any]) -> Section:
     )
 
 
-def meanings(fit: Result[Any, Any], glossary: Mapping[str, str]) -> Section:
+def meanings(fit: Result[Vehicle, object], glossary: Mapping[str, str]) -> Section:
     """What each number means and where its first value comes from."""
     published = fit.start.card.parameters
     rows = [
@@ -241,7 +241,7 @@ def _limit(value: float | None) -> str:
     return "–" if value is None else value_words(value)
 
 
-def warnings(fit: Result[Any, Any]) -> Points | None:
+def warnings(fit: Result[Vehicle, object]) -> Points | None:
     """What a reader must know before using the numbers, None where there is nothing."""
     texts = [f"{e.name} ended at its physical bound." for e in fit.estimates if e.at_bound]
     heavy = [e.name for e in fit.estimates if e.prior_share > PRIOR_HEAVY and not e.tie]

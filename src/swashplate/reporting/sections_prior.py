@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from swashplate.identification.core.parameters import FROM_CARD
 from swashplate.identification.core.result import APART, Estimate, Result
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.structure import Block, Cell, Row, Section, Text, tabulate
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.words import listed, percent, sigma_words, value_words
 
 
-def prior(fit: Result[Any, Any]) -> Section | None:
+def prior(fit: Result[Vehicle, object]) -> Section | None:
     """Prior and flight side by side, None where no prior came from a card."""
     estimates = [e for e in fit.estimates if e.prior_source.startswith(FROM_CARD)]
     held = [name for name in fit.settings.get("held at the prior card", ()) if name in fit.model.card.parameters]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from swashplate.identification.core.result import Result
 from swashplate.identification.time.feedback import AxisExcitation
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.figures_fit import correlation_matrix, eigenvalues
 from swashplate.reporting.structure import Block, Cell, Points, Row, Section, Table, Text, tabulate
 from swashplate.reporting.words import value_words
@@ -16,7 +16,7 @@ from swashplate.simulation.linearize import Mode
 _SLOW = 1e-6
 
 
-def sight(fit: Result[Any, Any]) -> Section:
+def sight(fit: Result[Vehicle, object]) -> Section:
     """What the data can and cannot tell."""
     blocks: list[Block] = [_excitation(axes)] if (axes := getattr(fit.details, "excitation", ())) else []
     if fit.directions:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import COLUMNS, ROWS, split_name
@@ -16,6 +15,7 @@ from swashplate.reporting.theme import (
     ORANGE,
     PURPLE,
     VERMILION,
+    FigurePart,
     axis,
     axis_number,
     base_layout,
@@ -109,7 +109,7 @@ def controls(curve: TrimCurve) -> Figure:
     )
 
 
-def _marked(speeds: Sequence[float]) -> dict[str, Any]:
+def _marked(speeds: Sequence[float]) -> FigurePart:
     """Few speeds are marked, so that one speed is seen at all."""
     return {"mode": "lines+markers", "marker": {"size": 5}} if len(speeds) < _FEW else {}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from swashplate.reporting.theme import (
     GREY,
     MODEL,
     PUBLISHED,
+    FigurePart,
     axis,
     axis_number,
     axis_title,
@@ -116,7 +116,7 @@ def _path_figure(runs: Mapping[str, StepRun], many: str) -> Figure:
     layout = base_layout(380)
     layout["xaxis"] = axis("ahead [m]")
     layout["yaxis"] = axis("to the right [m]", autorange="reversed", zeroline=True, zerolinecolor=GREY)
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     keys = []
     hover = "%{x:.2f} m ahead, %{y:+.2f} m right"
     for name, run in runs.items():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.sources import DataSource, problem_words, scale_words
@@ -19,7 +18,7 @@ _LEVELS = ("good", "usable", "poor", "cannot be judged")
 _TONES = {"good": "good", "usable": "caution", "poor": "bad"}
 
 
-def banners(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[tuple[str, str], ...]:
+def banners(fit: Result[object, object] | None, validation: Validation | None) -> tuple[tuple[str, str], ...]:
     """What stands above everything else: no aircraft flew; the fit failed; the iterations ran out."""
     lines: list[tuple[str, str]] = []
     flights = (*(fit.data if fit else ()), *(validation.data if validation else ()))
@@ -41,7 +40,7 @@ def banners(fit: Result[Any, Any] | None, validation: Validation | None) -> tupl
     return tuple(lines)
 
 
-def summary(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[Line, ...]:
+def summary(fit: Result[object, object] | None, validation: Validation | None) -> tuple[Line, ...]:
     """Five lines (label, words, tone): what was done, how it ended, how it predicts, the verdict, what to beware of."""
     rows = [_what(fit, validation)]
     if fit:
@@ -61,7 +60,7 @@ def _names(flights: Sequence[DataSource]) -> str:
     return listed([f"{f.name or 'an unnamed flight'} ({span_words(f)})" for f in flights], most=3)
 
 
-def _what(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
+def _what(fit: Result[object, object] | None, validation: Validation | None) -> Line:
     parts = []
     if fit:
         used = sum(float(c.record.time[-1] - c.record.time[0]) for c in fit.in_time)
@@ -75,7 +74,7 @@ def _what(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
     return "What", ", ".join(parts) + ".", "plain"
 
 
-def _fit(fit: Result[Any, Any]) -> Line:
+def _fit(fit: Result[object, object]) -> Line:
     steps = f" in {counted(len(fit.history) - 1, 'iteration')}" if len(fit.history) > 1 else ""
     state = "failed" if fit.failed else ("converged" if fit.converged else "did not converge")
     bounds = [e.name for e in fit.estimates if e.at_bound]
@@ -119,7 +118,7 @@ def _verdict(validation: Validation) -> Line:
     return "Verdict", ("; ".join(parts) or "no axis was judged") + ".", _TONES.get(worst, "caution")
 
 
-def _changes(fit: Result[Any, Any]) -> Line:
+def _changes(fit: Result[object, object]) -> Line:
     largest = sorted(
         (e for e in fit.estimates if not e.tie and e.best_sigma > 0.0),
         key=lambda e: -abs(e.value - e.start) / e.best_sigma,
@@ -134,7 +133,7 @@ def _in_short(problems: str) -> str:
     return f"{first}, and {counted(len(others), 'more remark')} on these data" if others else first
 
 
-def _warnings(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
+def _warnings(fit: Result[object, object] | None, validation: Validation | None) -> Line:
     warnings = []
     if fit:
         blind = list(dict.fromkeys(a.axis for a in getattr(fit.details, "excitation", ()) if not a.identifiable))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _FIGURES_FROM = 110  # columns of a terminal that hold all three figures side by side
 
 
-def fit_table(fit: Result[Any, Any]) -> TextTable:
+def fit_table(fit: Result[object, object]) -> TextTable:
     """Published and identified value of each parameter, two corrected sigmas, and what decided it."""
     rows = []
     for e in fit.estimates:

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
 from swashplate.flights.schema import channel
+
+FigurePart = dict[str, Any]
+"""A trace, a layout or an axis of a plotly figure, as JSON types."""
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#6B6B6B"
@@ -41,7 +44,7 @@ PREDICTOR_WORDS = {
 INPUT_COLORS = (ORANGE, PURPLE, SKY, GREEN)
 
 
-def numbers(values: Any) -> list[float | None]:
+def numbers(values: ArrayLike) -> list[float | None]:
     """A row of numbers as short JSON: six significant digits, gaps as null."""
     row = np.asarray(values, dtype=np.float64).ravel().tolist()
     return [float(f"{value:.6g}") if math.isfinite(value) else None for value in row]
@@ -52,7 +55,7 @@ _FAR = 4096.0
 """Beyond this, single precision no longer resolves a millisecond."""
 
 
-def packed(values: Any) -> list[float | None] | dict[str, str]:
+def packed(values: Iterable[float | None]) -> list[float | None] | dict[str, str]:
     """A long row of numbers in plotly's binary form (base64, little-endian; NaN are gaps), a short one as is."""
     row = np.asarray([np.nan if value is None else value for value in values], dtype=np.float64).ravel()
     if row.size <= _SMALL:
@@ -94,8 +97,8 @@ def axis_title(name: str) -> str:
 
 
 def line(
-    time: Any,
-    values: Any,
+    time: Iterable[float | None],
+    values: Iterable[float | None],
     *,
     name: str,
     color: str,
@@ -104,9 +107,9 @@ def line(
     axis: str = "",
     hover: str = "",
     **more: Any,
-) -> dict[str, Any]:
+) -> FigurePart:
     """A line trace on the subplot whose axes end in `axis` ("" for the first)."""
-    trace: dict[str, Any] = {
+    trace: FigurePart = {
         "type": "scatter",
         "mode": "lines",
         "x": packed(time),
@@ -120,13 +123,13 @@ def line(
     return {**trace, **more}
 
 
-def shade(x: Any, y: Any, *, name: str, color: str, axis: str = "") -> dict[str, Any]:
+def shade(x: Iterable[float | None], y: Iterable[float | None], *, name: str, color: str, axis: str = "") -> FigurePart:
     """A closed shape, filled, that answers no pointer."""
     edge = line(x, y, name=name, color=color, width=0, axis=axis)
     return {**edge, "fill": "toself", "fillcolor": color, "hoverinfo": "skip", "hovertemplate": None}
 
 
-def dots(x: Any, y: Any, marker: Any, **more: Any) -> dict[str, Any]:
+def dots(x: Iterable[float | None], y: Iterable[float | None], marker: FigurePart, **more: Any) -> FigurePart:
     """Markers instead of a line; `more` as of `line`."""
     return {**line(x, y, **{"color": marker.get("color", BLACK), **more}), "mode": "markers", "marker": marker}
 
@@ -145,7 +148,7 @@ _COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 _DASHES = ("solid", "dash", "dot", "dashdot")
 
 
-def base_layout(height: int, *, left: int = 58, top: int = 8, right: int = 10, bottom: int = 40) -> dict[str, Any]:
+def base_layout(height: int, *, left: int = 58, top: int = 8, right: int = 10, bottom: int = 40) -> FigurePart:
     """What every figure has: margins that leave a telephone some plot, no legend (keys stand in the page)."""
     return {
         "height": height,
@@ -163,9 +166,9 @@ def base_layout(height: int, *, left: int = 58, top: int = 8, right: int = 10, b
     }
 
 
-def axis(title: str = "", **more: Any) -> dict[str, Any]:
+def axis(title: str = "", **more: Any) -> FigurePart:
     """One axis: light grid, thin frame."""
-    defaults: dict[str, Any] = {
+    defaults: FigurePart = {
         "gridcolor": "#e4e4e4",
         "zeroline": False,
         "linecolor": "#999",
@@ -182,7 +185,7 @@ def axis(title: str = "", **more: Any) -> dict[str, Any]:
     return {**defaults, **more}
 
 
-def phase_ticks(values: Any) -> dict[str, Any]:
+def phase_ticks(values: ArrayLike) -> FigurePart:
     """What a phase axis [deg] has beside its title: marks at multiples of 5 degrees or more, few enough to be read."""
     finite = np.asarray(values, dtype=np.float64)
     finite = finite[np.isfinite(finite)]
@@ -196,7 +199,7 @@ def bands(count: int, *, gap: float) -> list[tuple[float, float]]:
     return [(max(0.0, 1.0 - (i + 1) * size - i * gap), min(1.0, 1.0 - i * size - i * gap)) for i in range(count)]
 
 
-def stacked(titles: Sequence[str], *, height: int, x_title: str = "time [s]") -> dict[str, Any]:
+def stacked(titles: Sequence[str], *, height: int, x_title: str = "time [s]") -> FigurePart:
     """A layout of panels one below the other that zoom in time together."""
     layout = base_layout(height * len(titles) + 48)
     for i, (title, domain) in enumerate(zip(titles, bands(len(titles), gap=0.1 / len(titles)), strict=True)):
@@ -209,7 +212,7 @@ def stacked(titles: Sequence[str], *, height: int, x_title: str = "time [s]") ->
     return layout
 
 
-def over_frequency(titles: Sequence[str], *, height: int = 170, unit: str = "rad/s") -> dict[str, Any]:
+def over_frequency(titles: Sequence[str], *, height: int = 170, unit: str = "rad/s") -> FigurePart:
     """A layout of panels over one logarithmic frequency axis, whose unit ("Hz" or "rad/s") a reader may change."""
     layout = stacked(titles, height=height, x_title=f"frequency [{unit}]")
     for k in range(len(titles)):
@@ -219,7 +222,7 @@ def over_frequency(titles: Sequence[str], *, height: int = 170, unit: str = "rad
 
 def grid(
     titles: Sequence[str], *, columns: int, height: int, x_title: str, y_title: str = "", gap: float = 0.12
-) -> dict[str, Any]:
+) -> FigurePart:
     """A layout of small panels in rows, each under its own heading; on a narrow screen the page puts fewer in a row.
 
     Args:

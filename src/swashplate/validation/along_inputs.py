@@ -109,7 +109,7 @@ def fitted(model: Any) -> Any:
 
 
 def along_inputs(
-    model: Result[Any, Any] | Vehicle | StateSpaceModel,
+    model: Result[object, object] | Vehicle | StateSpaceModel,
     flights: Flight | Sequence[Flight],
     *,
     outputs: Sequence[str] | None = None,

@@ -58,7 +58,7 @@ class FitKind(CampaignKind):
         model, names, fitted = self._problem(settings, files)
         seeds = [seed_of(portion.seed, row) for row in range(portion.count)]
         starts = np.array([self.start(settings, model, names, seed) for seed in seeds]).reshape(len(seeds), len(names))
-        fits: list[Result[Any, Any] | str] = []
+        fits: list[Result[object, object] | str] = []
         for seed, values in zip(seeds, starts, strict=True):
             try:
                 fits.append(fitted(seed, values))
@@ -66,20 +66,20 @@ class FitKind(CampaignKind):
                 fits.append(str(error))
         return fit_columns(fits, names) | {f"start.{name}": starts[:, k] for k, name in enumerate(names)}
 
-    def replay(self, settings: Any, portion: Portion, files: Mapping[str, Path], row: int) -> Result[Any, Any]:
+    def replay(self, settings: Any, portion: Portion, files: Mapping[str, Path], row: int) -> Result[object, object]:
         model, names, fitted = self._problem(settings, files)
         seed = seed_of(portion.seed, row)
         return fitted(seed, self.start(settings, model, names, seed))
 
     def _problem(
         self, settings: Any, files: Mapping[str, Path]
-    ) -> tuple[Vehicle, tuple[str, ...], Callable[[int, Array], Result[Any, Any]]]:
+    ) -> tuple[Vehicle, tuple[str, ...], Callable[[int, Array], Result[object, object]]]:
         """The model, the names that a fit moves, and the fit of a row's seed from values (p,)."""
         model = vehicle_of(str(files.get(settings.vehicle, settings.vehicle)))
         asked: FitVehicle = self.asked(settings, files, vehicle=model)
         names, data = _moved_by(asked, model), self.data(settings, asked, model, files)
 
-        def fitted(seed: int, values: Array) -> Result[Any, Any]:
+        def fitted(seed: int, values: Array) -> Result[object, object]:
             begin = model.with_values({name: float(value) for name, value in zip(names, values, strict=True)})
             return replace(asked, vehicle=begin, flight=data(seed)).answer()
 
@@ -111,7 +111,7 @@ def _moved_by(asked: FitVehicle, model: Vehicle) -> tuple[str, ...]:
     return model.structure.free
 
 
-def fit_columns(fits: Sequence[Result[Any, Any] | str], names: Sequence[str]) -> Columns:
+def fit_columns(fits: Sequence[Result[object, object] | str], names: Sequence[str]) -> Columns:
     """Whether each fit may be used, what was wrong with it (in words, where there is none), its cost and numbers."""
     there = [None if isinstance(fit, str) else fit for fit in fits]
     problems = [fit if isinstance(fit, str) else "; ".join(fit.problems) for fit in fits]

@@ -64,12 +64,12 @@ class Demo(AnswersFit):
     simulated: bool = option(default=False, help="Use simulated flights even if real ones are available.")
     seed: int = setting(default=1, help="seed of the simulated flights' noise.", least=0)
 
-    def answer(self, say: Say = silent) -> Result[Any, Any]:
+    def answer(self, say: Say = silent) -> Result[object, object]:
         from swashplate.api.demo import run_demo
 
         return run_demo(self, say)
 
-    def text(self, answer: Result[Any, Any], width: int) -> list[Any]:
+    def text(self, answer: Result[object, object], width: int) -> list[Any]:
         parts = super().text(answer, width)
         if any(source.simulated for source in answer.data):
             parts = ["On simulated flights; `swash data fetch coax56` gets the real ones.\n", *parts]

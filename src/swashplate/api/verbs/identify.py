@@ -33,24 +33,24 @@ if TYPE_CHECKING:
     from swashplate.models.linear.state_space import StateSpaceModel
 
 
-class AnswersFit(VerbQuestion["Result[Any, Any]"]):
+class AnswersFit(VerbQuestion["Result[object, object]"]):
     """A verb whose answer is a fit, judged on what was held out."""
 
-    def document(self, answer: Result[Any, Any]) -> Any:
+    def document(self, answer: Result[object, object]) -> Any:
         validation = answer.validation and answer.validation.to_document()
         return {"fit": answer.to_document(comparisons=False), "validation": validation}
 
-    def write(self, answer: Result[Any, Any], folder: Path, names: tuple[str, ...]) -> None:
+    def write(self, answer: Result[object, object], folder: Path, names: tuple[str, ...]) -> None:
         from swashplate.api.identification import write_fit
 
         write_fit(answer, folder)
 
-    def text(self, answer: Result[Any, Any], width: int) -> list[Any]:
+    def text(self, answer: Result[object, object], width: int) -> list[Any]:
         from swashplate.api.identification import fit_parts
 
         return fit_parts(answer)
 
-    def problems(self, answer: Result[Any, Any]) -> Sequence[str]:
+    def problems(self, answer: Result[object, object]) -> Sequence[str]:
         return [f"The fit failed: {' '.join(answer.problems) or 'see the report.'}"] if answer.failed else []
 
 
@@ -150,7 +150,7 @@ class WithStructure(LinearFit[Answer]):
             yield structure_of(structure(one) if isinstance(one, str | Path) else one)
 
 
-class FitVehicle(AnswersFit, FitOfRecords["Result[Any, Any]"]):
+class FitVehicle(AnswersFit, FitOfRecords["Result[object, object]"]):
     """Identify a model from flights, and predict with it those that are held out, as `validation` of the result.
 
     Raises:
@@ -206,12 +206,12 @@ class FitVehicle(AnswersFit, FitOfRecords["Result[Any, Any]"]):
 
     kind = "a vehicle"
 
-    def answer(self, say: Say = silent) -> Result[Any, Any]:
+    def answer(self, say: Say = silent) -> Result[object, object]:
         from swashplate.api.identification import identify_vehicle
 
         return identify_vehicle(self, say)
 
-    def problems(self, answer: Result[Any, Any]) -> Sequence[str]:
+    def problems(self, answer: Result[object, object]) -> Sequence[str]:
         refused = self.posterior is not None and answer.posterior is None and not answer.failed
         told = [f"The fit is written, its posterior is not: {answer.warnings[-1]}"] if refused else []
         return told or super().problems(answer)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -162,7 +161,7 @@ SENSOR_NOISE: Mapping[str, float] = {
 
 def draw_models(
     model: Vehicle | StateSpaceModel,
-    fit: Result[Any, Any] | str | Path,
+    fit: Result[object, object] | str | Path,
     *,
     count: int,
     seed: int,

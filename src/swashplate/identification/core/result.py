@@ -28,8 +28,8 @@ APART = 3.0
 
 NAN = float("nan")
 
-Model = TypeVar("Model")
-Details = TypeVar("Details")
+Model = TypeVar("Model", covariant=True)
+Details = TypeVar("Details", covariant=True)
 
 
 @dataclass(frozen=True)
@@ -318,9 +318,9 @@ class Result(Shown, Generic[Model, Details]):
         return document
 
     @staticmethod
-    def from_document(document: Mapping[str, Any], *, where: str = "", equations: Any = None) -> Result[Any, Any]:
+    def from_document(document: Mapping[str, Any], *, where: str = "", equations: Any = None) -> Result[object, object]:
         """The result of a document (see `swashplate.load`, whose errors it raises)."""
-        result: Result[Any, Any] = resolve("result_from_document")(document, where=where, equations=equations)
+        result: Result[object, object] = resolve("result_from_document")(document, where=where, equations=equations)
         return result
 
     def save(self, path: str | os.PathLike[str]) -> Path:

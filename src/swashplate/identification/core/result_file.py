@@ -36,7 +36,7 @@ _TOLD = {"kind", "schema", "costs"}
 """Entries that are no field: what it is, and J of each response for readers who leave the comparisons out."""
 
 
-def to_document(result: Result[Any, Any], *, comparisons: bool = True) -> dict[str, Any]:
+def to_document(result: Result[object, object], *, comparisons: bool = True) -> dict[str, Any]:
     """A result as JSON types; its wall time is no part of it, so that equal results are equal documents.
 
     Args:
@@ -59,7 +59,7 @@ def to_document(result: Result[Any, Any], *, comparisons: bool = True) -> dict[s
 
 def from_document(
     document: Mapping[str, Any], *, where: str = "", equations: Vehicle | None = None
-) -> Result[Any, Any]:
+) -> Result[object, object]:
     """The result of a document.
 
     Args:
@@ -89,7 +89,7 @@ def from_document(
         if name not in _SPECIAL:
             table[name] = decode(hints[name], document[name], where=where, at=name)
     details = document["details"]
-    result: Result[Any, Any] = Result(
+    result: Result[object, object] = Result(
         **table,
         solution=model_from(document["model"], where=where, at="model", equations=equations),
         start=model_from(document["start"], where=where, at="start", equations=equations),
@@ -99,7 +99,7 @@ def from_document(
     return result
 
 
-def save(result: Result[Any, Any], path: str | os.PathLike[str]) -> Path:
+def save(result: Result[object, object], path: str | os.PathLike[str]) -> Path:
     """Write a result as a JSON file, which appears when it is complete."""
     from swashplate.atomic import write_text
 
@@ -108,7 +108,7 @@ def save(result: Result[Any, Any], path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
-def load(path: str | os.PathLike[str], *, equations: Vehicle | None = None) -> Result[Any, Any]:
+def load(path: str | os.PathLike[str], *, equations: Vehicle | None = None) -> Result[object, object]:
     """A saved result, whole: estimates, matrices, comparisons with the data, and the model.
 
     Args:
@@ -171,7 +171,7 @@ def model_from(document: object, *, where: str, at: str, equations: Vehicle | No
 
 
 # ---- checks ----------------------------------------------------------------------------------------------------------
-def _check(result: Result[Any, Any], where: str) -> None:
+def _check(result: Result[object, object], where: str) -> None:
     known = [e.name for e in result.estimates]
     for key, names in (("estimates", known), ("names", result.names)):
         twice = sorted({n for n in names if names.count(n) > 1})

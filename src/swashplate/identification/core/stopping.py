@@ -11,9 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypeVar
 
 from swashplate.identification.core.result import Result
+
+Fit = TypeVar("Fit", bound=Result[object, object])
 
 INTERRUPTS = (KeyboardInterrupt, SystemExit)
 """What SIGINT and, by the command line's handler, SIGTERM raise."""
@@ -107,7 +109,7 @@ def unfinished() -> str:
     return stop.sentence if stop is not None and stop.code else RAN_OUT
 
 
-def with_stop(fit: Result[Any, Any]) -> Result[Any, Any]:
+def with_stop(fit: Fit) -> Fit:
     """The fit, with the stop among its problems where there was one."""
     stop = _STOP.get()
     if stop is None or not stop.code:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -116,7 +116,7 @@ class StateSpaceDetails:
         """Whether a reduction was asked for, and every parameter was within its targets already."""
         return self.reduced and not self.reduction
 
-    def lines(self, result: Result[Any, Any]) -> list[str]:
+    def lines(self, result: Result[object, object]) -> list[str]:
         """What a printed result says of it."""
         lines = [f"  J = {cost:7.1f}  {t.name}" for t, cost in zip(result.targets, result.costs, strict=True)]
         lines += [_mode_words(mode) for mode in self.modes]

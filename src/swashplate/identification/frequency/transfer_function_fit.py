@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 import tomli_w
@@ -57,7 +57,7 @@ class TransferFunctionDetails:
     kind: ClassVar[str] = "transfer functions"
     form: Form
 
-    def lines(self, result: Result[Any, Any]) -> list[str]:
+    def lines(self, result: TransferFunctionFit) -> list[str]:
         """What a printed result says of it."""
         return [f"  {model!r}   J = {cost:.1f}" for model, cost in zip(result.solution, result.costs, strict=True)]
 
@@ -339,8 +339,12 @@ def as_state_space(fit: TransferFunctionFit, *, name: str = "transfer_function")
     return parse(tomli_w.dumps(document), path=name)
 
 
-def vehicle_of(result: Result[Any, Any]) -> Vehicle:
+def vehicle_of(result: Result[object, object]) -> Vehicle:
     """What `Result.vehicle` is, for any kind of model."""
     if isinstance(result.solution, Vehicle):
         return result.solution
-    return linear_vehicle(result.solution if isinstance(result.solution, StateSpaceModel) else as_state_space(result))
+    return linear_vehicle(
+        result.solution
+        if isinstance(result.solution, StateSpaceModel)
+        else as_state_space(cast(TransferFunctionFit, result))
+    )

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.extras import library
+
+if TYPE_CHECKING:
+    from control import StateSpace, TransferFunction
 
 _HIGHEST = 12
 """Order of a Padé polynomial beyond which its coefficients lose their meaning in double precision."""
@@ -23,7 +26,7 @@ def state_space(
     delays: Mapping[str, float],
     pade: int | None,
     name: str,
-) -> Any:
+) -> StateSpace:
     """A `control.StateSpace` with named signals, its delays as Padé polynomials.
 
     Args:
@@ -56,7 +59,7 @@ def state_space(
     return control.ss(delayed.A, delayed.B, delayed.C, delayed.D, inputs=list(inputs), outputs=list(outputs))
 
 
-def joined(wide: Any, shares: Array, *, inputs: Sequence[str]) -> Any:
+def joined(wide: StateSpace, shares: Array, *, inputs: Sequence[str]) -> StateSpace:
     """A `control.StateSpace` some of whose inputs are one, by which input drives which (n_wide, n_inputs)."""
     control = library("control", what="to_control")
     return control.ss(
@@ -65,7 +68,9 @@ def joined(wide: Any, shares: Array, *, inputs: Sequence[str]) -> Any:
     )  # fmt: skip
 
 
-def transfer_function(numerator: Array, denominator: Array, *, delay: float, pade: int | None, name: str) -> Any:
+def transfer_function(
+    numerator: Array, denominator: Array, *, delay: float, pade: int | None, name: str
+) -> TransferFunction:
     """A `control.TransferFunction`, its delay [s] as a Padé polynomial; see `state_space` for `pade`."""
     control = library("control", what="to_control")
     undelayed = control.tf(list(numerator), list(denominator))
@@ -91,12 +96,12 @@ def asked(pade: int | None, delays: Mapping[str, float], *, name: str) -> bool:
     return bool(delays and pade)
 
 
-def _delay(seconds: float, order: int | None) -> Any:
+def _delay(seconds: float, order: int | None) -> StateSpace:
     """A delay as a system of one input and one output."""
     control = library("control", what="to_control")
     return control.ss(control.tf(*control.pade(seconds, order))) if seconds > 0.0 else control.ss([], [], [], [[1.0]])
 
 
-def _summed(rows: Any, outputs: int) -> Any:
+def _summed(rows: Array, outputs: int) -> Array:
     """Rows of several models' outputs, one model after the other, added up by output."""
     return rows.reshape(-1, outputs, rows.shape[1]).sum(axis=0)

@@ -18,7 +18,18 @@ from swashplate.identification.responses.frequency_response import (
     unwrapped_degrees,
 )
 from swashplate.reporting.structure import Figure, Key
-from swashplate.reporting.theme import BLACK, FLIGHT, GREY, MODEL, axis, base_layout, line, phase_ticks, shade
+from swashplate.reporting.theme import (
+    BLACK,
+    FLIGHT,
+    GREY,
+    MODEL,
+    FigurePart,
+    axis,
+    base_layout,
+    line,
+    phase_ticks,
+    shade,
+)
 from swashplate.reporting.words import counted
 
 _ERROR = "rgba(0,0,0,0.15)"
@@ -116,7 +127,7 @@ def bode_matrix(rows: Sequence[Sequence[Pair | None]], *, identifier: str = "bod
     width = (1.0 - _ACROSS * (across - 1) * (0.5 if across > 2 else 1.0)) / across
     gap = (1.0 - width * across) / max(across - 1, 1)
     inner = total - _FOOT - 4
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     number = 0
     for r, row in enumerate(rows):
         for c, pair in enumerate(row):
@@ -163,7 +174,7 @@ def bode_matrix(rows: Sequence[Sequence[Pair | None]], *, identifier: str = "bod
     )
 
 
-def _heading(text: str, left: float, upper: float) -> dict[str, Any]:
+def _heading(text: str, left: float, upper: float) -> FigurePart:
     """What stands over a cell."""
     return {
         "text": f"<b>{text}</b>",
@@ -217,7 +228,7 @@ def _phase(pair: Pair) -> Array:
     return beside_model(phase, pair.omega, pair.model.omega, unwrapped_degrees(pair.model.response))
 
 
-def _traces(pair: Pair, numbers: Sequence[str]) -> list[dict[str, Any]]:
+def _traces(pair: Pair, numbers: Sequence[str]) -> list[FigurePart]:
     hertz = pair.omega / TWO_PI
     gain, phase = np.asarray(decibel(pair.response)), _phase(pair)
     good = pair.coherence >= LEAST_COHERENCE

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from swashplate.reporting.theme import (
     PURPLE,
     SKY,
     VERMILION,
+    FigurePart,
     axis,
     axis_number,
     base_layout,
@@ -102,7 +102,7 @@ def over_time(
     )
 
 
-def _beside(name: str, panel: int, place: int) -> dict[str, Any]:
+def _beside(name: str, panel: int, place: int) -> FigurePart:
     """A line's name in its colour, to the right of its panel."""
     return {
         "text": name,
@@ -226,7 +226,7 @@ def of_spectrograms(panels: Sequence[spectra.Spectrogram]) -> Figure:
     names = [measured.channel for measured in panels]
     layout = stacked([f"{name}: frequency [Hz]" for name in names], height=_PANEL + 60)
     layout["margin"] = {**layout["margin"], "r": 70}
-    traces: list[dict[str, Any]] = []
+    traces: list[FigurePart] = []
     for i, (name, measured) in enumerate(zip(names, panels, strict=True)):
         thin = max(1, -(-measured.frequency.size // _ROWS))
         rows = [measured.density[k : k + thin].max(axis=0) for k in range(0, measured.frequency.size, thin)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from swashplate.reporting.theme import (
     BLUE,
     GREY,
     VERMILION,
+    FigurePart,
     axis,
     axis_number,
     base_layout,
@@ -128,7 +129,7 @@ def section_of_harmonics(harmonics: Harmonics) -> Section:
         line([h.frequency, h.frequency], ends, name=f"{h.number} x", color=VERMILION, dash="dot", width=1.0)
         for h in harmonics.harmonics
     ]
-    spec: dict[str, Any] = {**drawn.spec, "data": [*marks, *drawn.spec["data"]]}
+    spec: FigurePart = {**drawn.spec, "data": [*marks, *drawn.spec["data"]]}
     keys = (Key(harmonics.spectrum.channel, BLUE), Key(f"multiples of {harmonics.rotor}", VERMILION, "dot"))
     caption = f"{drawn.caption} {harmonics.summary}"
     figure = Figure("harmonics", spec, caption, drawn.alt, keys=keys)

@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.extras import library
-from swashplate.reporting.figures.themes import Theme, checked, coloured, in_unit, unpacked
-from swashplate.reporting.structure import Figure, Key
+from swashplate.reporting.figures.themes import Row, Theme, checked, coloured, in_unit, unpacked
+from swashplate.reporting.structure import Figure, Key, Spec
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Still
+    from matplotlib.figure import SubFigure
 
 _PX = 1.0 / 100.0
 """Inches of a report's pixel in height."""
@@ -82,7 +86,7 @@ def still(figures: Sequence[Figure], *, theme: str = "paper", frequency: str = "
         )
         heights = np.add(shares, legends)
         apart = len(shares) > 1 or (bool(title) and look != "paper")  # a title and a legend share no place
-        parts: Sequence[Any] = (drawing,)
+        parts: Sequence[Still | SubFigure] = (drawing,)
         if apart:
             parts = list(drawing.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0])
         for part, figure in zip(parts, figures, strict=True):
@@ -96,10 +100,10 @@ def still(figures: Sequence[Figure], *, theme: str = "paper", frequency: str = "
 class _Sheet:
     """One figure on its part of the page."""
 
-    def __init__(self, part: Any, spec: Mapping[str, Any], theme: Theme) -> None:
+    def __init__(self, part: Still | SubFigure, spec: Spec, theme: Theme) -> None:
         self.part, self.spec, self.theme = part, spec, theme
-        self.layout: Mapping[str, Any] = spec["layout"]
-        self.panels: dict[str, Any] = {}
+        self.layout: Spec = spec["layout"]
+        self.panels: dict[str, Axes] = {}
 
     def draw(self, keys: Sequence[Key]) -> None:
         self._make_panels()
@@ -138,7 +142,7 @@ class _Sheet:
             self.panels[n] = self.part.add_subplot(place, sharex=shared)
 
     # ---- what is drawn -----------------------------------------------------------------------------------------
-    def _scatter(self, panel: Any, trace: Mapping[str, Any]) -> None:
+    def _scatter(self, panel: Axes, trace: Spec) -> None:
         x, y = (_values(trace[side], self._categories(side, trace)) for side in "xy")
         if trace.get("fill") == "toself":
             _fill(panel, x, y, trace)
@@ -166,21 +170,21 @@ class _Sheet:
                 )
                 panel.scatter(x[here], y[here], s=area, marker=shape, linewidths=1.2, zorder=3, clip_on=False, **fill)
 
-    def _by_colour(self, panel: Any, x: Any, y: Any, marker: Mapping[str, Any]) -> None:
+    def _by_colour(self, panel: Axes, x: Array, y: Array, marker: Spec) -> None:
         """Markers whose colour is a number."""
         area, scale = (0.75 * marker.get("size", 6)) ** 2, str(marker.get("colorscale", "Viridis")).lower()
         drawn = panel.scatter(x, y, c=unpacked(marker["color"]), s=area, cmap=scale, zorder=3)
         label = _without_markup(marker.get("colorbar", {}).get("title", {}).get("text", ""))
         self.part.colorbar(drawn, ax=panel, label=label, fraction=0.05, pad=0.02)
 
-    def _bars(self, panel: Any, trace: Mapping[str, Any]) -> None:
+    def _bars(self, panel: Axes, trace: Spec) -> None:
         x, y = unpacked(trace["x"]), unpacked(trace["y"])
         step = float(np.median(np.diff(x))) if x.size > 1 else 1.0
         marker = trace.get("marker", {})
         width = step * (1.0 - self.layout.get("bargap", 0.2))
         panel.bar(x, y, width=width, color=_rgba(marker.get("color")), alpha=marker.get("opacity", 1.0))
 
-    def _matrix(self, panel: Any, trace: Mapping[str, Any]) -> None:
+    def _matrix(self, panel: Axes, trace: Spec) -> None:
         from matplotlib.colors import LinearSegmentedColormap
 
         scale = trace.get("colorscale")
@@ -207,12 +211,12 @@ class _Sheet:
         self.part.colorbar(drawn, ax=panel, label=label, ticks=bar.get("tickvals"), fraction=0.05, pad=0.02)
 
     # ---- around it ---------------------------------------------------------------------------------------------
-    def _categories(self, side: str, trace: Mapping[str, Any]) -> Sequence[str] | None:
+    def _categories(self, side: str, trace: Spec) -> Sequence[str] | None:
         axis = self.layout.get(f"{side}axis{trace.get(f'{side}axis', side)[1:]}", {})
         names: Sequence[str] | None = axis.get("categoryarray")
         return names
 
-    def _axis(self, panel: Any, side: str, axis: Mapping[str, Any]) -> None:
+    def _axis(self, panel: Axes, side: str, axis: Spec) -> None:
         from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
         its = panel.xaxis if side == "x" else panel.yaxis
@@ -269,7 +273,7 @@ class _Sheet:
                 continue
             panel.text(note["x"], note["y"], text, ha="center", va="center", fontsize=7)
 
-    def _below(self, x: float, y: float) -> Any:
+    def _below(self, x: float, y: float) -> Axes | None:
         """The panel whose upper left corner is there."""
         for number, panel in self.panels.items():
             left = self.layout.get(f"xaxis{number}", {}).get("domain", (0.0, 1.0))[0]
@@ -288,7 +292,7 @@ def _without_markup(text: str) -> str:
     return _TAG.sub("", text.replace("<br>", " ")).replace("$", r"\$")
 
 
-def _rgba(color: str | None) -> Any:
+def _rgba(color: str | None) -> str | tuple[float, ...] | None:
     """matplotlib's form of a colour; plotly writes a translucent one as rgba(r,g,b,a)."""
     if color is None or not color.startswith("rgb"):
         return color
@@ -296,7 +300,7 @@ def _rgba(color: str | None) -> Any:
     return (*(part / 255.0 for part in parts[:3]), *(parts[3:] or [1.0]))
 
 
-def _values(row: Any, categories: Sequence[str] | None) -> Any:
+def _values(row: Row, categories: Sequence[str] | None) -> Array:
     """A trace's numbers; names become places along their axis."""
     if not isinstance(row, Mapping) and len(row) and isinstance(row[0], str):
         order = list(categories or dict.fromkeys(row))
@@ -304,7 +308,7 @@ def _values(row: Any, categories: Sequence[str] | None) -> Any:
     return unpacked(row)
 
 
-def _fill(panel: Any, x: Any, y: Any, trace: Mapping[str, Any]) -> None:
+def _fill(panel: Axes, x: Array, y: Array, trace: Spec) -> None:
     """Closed shapes, parted by gaps."""
     cuts = np.flatnonzero(~(np.isfinite(x) & np.isfinite(y)))
     color = _rgba(trace.get("fillcolor"))
@@ -317,7 +321,7 @@ def _fill(panel: Any, x: Any, y: Any, trace: Mapping[str, Any]) -> None:
         panel.plot(x, y, color=_rgba(pen.get("color")), lw=0.75 * pen["width"])
 
 
-def _handle(key: Key, theme: Theme) -> Any:
+def _handle(key: Key, theme: Theme) -> Artist:
     """An entry of the legend."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

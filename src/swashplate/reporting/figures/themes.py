@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
+from swashplate.reporting.structure import Spec
 from swashplate.reporting.theme import BAND, BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 
 Theme = Literal["paper", "light", "dark"]
 Frequency = Literal["Hz", "rad/s"]
+Row = Sequence[Any] | Mapping[str, str]
+"""Numbers of a trace: a list (None is a gap) or plotly's binary form; names where the axis has categories."""
 
 DARK: Mapping[str, str] = {
     BLACK: "#e6e6e6",
@@ -67,14 +70,14 @@ def coloured(value: Any, theme: Theme) -> Any:
     return value
 
 
-def unpacked(row: Any) -> Array:
+def unpacked(row: Row) -> Array:
     """Numbers of a trace, whether they are a list (None is a gap) or in plotly's binary form."""
     if isinstance(row, Mapping):
         return np.frombuffer(base64.b64decode(row["bdata"]), dtype=f"<{row['dtype']}").astype(np.float64)
     return np.array([np.nan if value is None else value for value in row], dtype=np.float64)
 
 
-def in_unit(spec: Mapping[str, Any], frequency: str) -> Mapping[str, Any]:
+def in_unit(spec: Spec, frequency: str) -> Spec:
     """A figure over frequency with its axis in another unit; other figures stay as they are.
 
     A figure over frequency says in `layout.meta.frequency` which unit its x values have, "Hz" or "rad/s".

@@ -22,10 +22,13 @@ from swashplate.reporting.figures.themes import Frequency, Theme
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.sections_responses import gains_section
 from swashplate.reporting.structure import Figure, Report, Section, Text, tabulate
+from swashplate.reporting.theme import FigurePart
+from swashplate.shown import Shown
 from swashplate.validation.validation import Validation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Still
+    from plotly.graph_objects import Figure as Drawn
 
 
 from swashplate.extras import library
@@ -35,7 +38,7 @@ from swashplate.reporting.structure import Key
 _PLAIN_MARKERS = {"line": "line-ns-open"}
 
 
-def interactive(figure: Figure, *, theme: str = "light", frequency: str = "Hz", title: str = "") -> Any:
+def interactive(figure: Figure, *, theme: str = "light", frequency: str = "Hz", title: str = "") -> Drawn:
     """The figure as a `plotly.graph_objects.Figure`.
 
     Args:
@@ -71,16 +74,16 @@ def interactive(figure: Figure, *, theme: str = "light", frequency: str = "Hz", 
     return objects.Figure(data=drawn["data"], layout=drawn["layout"], skip_invalid=False)
 
 
-def _entry(key: Key) -> dict[str, Any]:
+def _entry(key: Key) -> FigurePart:
     """A trace without points, whose entry in the legend is the key."""
-    entry: dict[str, Any] = {"type": "scatter", "x": [None], "y": [None], "name": key.words, "showlegend": True}
+    entry: FigurePart = {"type": "scatter", "x": [None], "y": [None], "name": key.words, "showlegend": True}
     if key.style in ("solid", "dash", "dot", "dashdot"):
         return entry | {"mode": "lines", "line": {"color": key.color, "dash": key.style, "width": 2}}
     symbol = "square" if key.style in ("band", "bar") else _PLAIN_MARKERS.get(key.style, key.style)
     return entry | {"mode": "markers", "marker": {"color": key.color, "symbol": symbol, "size": 11}}
 
 
-def section_of(shown: Any, **choice: Any) -> Section:
+def section_of(shown: Shown, **choice: Any) -> Section:
     """What an object shows; the first figure is the main one.
 
     Raises:
@@ -96,12 +99,12 @@ def section_of_gains(suggestion: Suggestion) -> Section:
     return gains_section([suggestion])
 
 
-def _has_modes(shown: Any) -> bool:
+def _has_modes(shown: Shown) -> bool:
     """Whether its report would look for modes at hover, which a figure does not wait for."""
     return isinstance(shown, Validation) or (isinstance(shown, Result) and hasattr(shown.solution, "card"))
 
 
-def _of_report(page: Report, shown: Any) -> Section:
+def _of_report(page: Report, shown: Shown) -> Section:
     """The figures of an object's report, and its words."""
     banners = tuple(Text(text, tone=tone) for tone, text in page.banners)
     picture = (page.picture,) if page.picture else ()
@@ -136,17 +139,17 @@ def section_of_responses(responses: FrequencyResponse, *, pairs: Sequence[tuple[
 
 
 # ---- the verbs behind the methods ------------------------------------------------------------------------------
-def figures_of(shown: Any, **choice: Any) -> dict[str, Figure]:
+def figures_of(shown: Shown, **choice: Any) -> dict[str, Figure]:
     """The figures that an object has, by name, the main one first."""
     return {block.identifier: block for block in section_of(shown, **choice).blocks if isinstance(block, Figure)}
 
 
-def figure_names(shown: Any) -> tuple[str, ...]:
+def figure_names(shown: Shown) -> tuple[str, ...]:
     """Names of the figures that an object has, the main one first."""
     return tuple(figures_of(shown))
 
 
-def _chosen(shown: Any, name: str | None, **choice: Any) -> Figure:
+def _chosen(shown: Shown, name: str | None, **choice: Any) -> Figure:
     """A figure by its name, the main one where None.
 
     Raises:
@@ -166,13 +169,13 @@ def _chosen(shown: Any, name: str | None, **choice: Any) -> Figure:
     return figures[name]
 
 
-def _title(shown: Any) -> str:
+def _title(shown: Shown) -> str:
     name = shown.provenance.source if isinstance(shown, Flight) else section_of(shown).title
     return str(name)
 
 
 def plot(
-    shown: Any, figure: str | None = None, *, theme: Theme = "paper", frequency: Frequency = "Hz", **choice: Any
+    shown: Shown, figure: str | None = None, *, theme: Theme = "paper", frequency: Frequency = "Hz", **choice: Any
 ) -> Still:
     """One figure of an object, with matplotlib; see `swashplate.shown.Shown.plot`."""
     title = "" if theme == "paper" and not isinstance(shown, Flight) else _title(shown)
@@ -180,7 +183,7 @@ def plot(
 
 
 def explore(
-    shown: Any, figure: str | None = None, *, theme: Theme = "light", frequency: Frequency = "Hz", **choice: Any
-) -> Any:
+    shown: Shown, figure: str | None = None, *, theme: Theme = "light", frequency: Frequency = "Hz", **choice: Any
+) -> Drawn:
     """One figure of an object, with plotly; see `swashplate.shown.Shown.explore`."""
     return interactive(_chosen(shown, figure, **choice), theme=theme, frequency=frequency, title=_title(shown))

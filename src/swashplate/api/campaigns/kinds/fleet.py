@@ -76,7 +76,7 @@ class FleetKind(CampaignKind):
         row: dict[str, Any] = {"log": path.name, "verdict": verdict, **facts, **numbers}
         return {name: np.array([value]) for name, value in row.items()}
 
-    def replay(self, settings: Any, portion: Portion, files: Mapping[str, Path], row: int) -> Result[Any, Any]:
+    def replay(self, settings: Any, portion: Portion, files: Mapping[str, Path], row: int) -> Result[object, object]:
         return self._fit(settings, logged(self.asked(settings, files), Path(portion.of)), files, {})
 
     def findings(self, settings: Any, table: Columns) -> CampaignFindings:
@@ -126,7 +126,7 @@ class FleetKind(CampaignKind):
 
     def _fit(
         self, settings: Any, raw: Flight, files: Mapping[str, Path], numbers: dict[str, float]
-    ) -> Result[Any, Any]:
+    ) -> Result[object, object]:
         asked: FitTransferFunctions = self.asked(settings, files)
         renamed: Any = asked.rename or {}
         channels = {name: renamed.get(name, name) for name in (settings.input, *settings.others)}
