@@ -21,6 +21,7 @@ from swashplate.api.verbs.maneuver import design_maneuver as design_maneuver
 from swashplate.api.verbs.maneuver import needed_excitation as needed_excitation
 from swashplate.api.verbs.respond import respond as respond
 from swashplate.api.verbs.simulate import monte_carlo as monte_carlo
+from swashplate.api.verbs.steady import trim as trim
 from swashplate.api.verbs.track import track as track
 from swashplate.api.verbs.validate import compare as compare
 from swashplate.api.verbs.validate import validate as validate
@@ -56,7 +57,6 @@ from swashplate.simulation.linearize import linearize as linearize
 from swashplate.simulation.sensors import QUIET as QUIET
 from swashplate.simulation.sensors import Sensors as Sensors
 from swashplate.simulation.sensors import observe as observe
-from swashplate.simulation.trim import trim as trim
 from swashplate.validation.residuals import residuals as residuals
 from swashplate.validation.validation import Validation as Validation
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swashplate.api.languages import Aircraft, Speeds, Switches, Wind, Words
-from swashplate.api.question import Answer, VerbQuestion, argument, option, setting
+from swashplate.api.languages import Switches, Wind, Words
+from swashplate.api.question import Answer, VerbQuestion, option, setting
 from swashplate.api.saying import notice
 from swashplate.errors import SwashError
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from swashplate.flights.flight import Flight
     from swashplate.models.vehicle import Vehicle
     from swashplate.physics.environment import Environment
-    from swashplate.simulation.trim import Trim
-    from swashplate.simulation.trim_curve import TrimCurve
 
 FLIGHT = (
     "a log, or a data set's file as coax56/flight_2011-08-01_vertical; FILE@5-30 takes the seconds 5 to 30, "
@@ -234,43 +232,6 @@ class InAir(OfVehicle[Answer]):
         return around if self.altitude is None else around._replace(air_density=air_density(self.altitude))
 
 
-class Steady(InAir[Answer]):
-    """A vehicle in steady flight."""
-
-    vehicle: Aircraft = argument(
-        metavar="VEHICLE", help="A vehicle's name, or a card or model file.", complete="vehicle"
-    )
-    speed: Speeds = option(default=(0.0,), help='Speed ahead: "5", or a range "0-15" or "0-15/2.5".', unit="m/s")
-    wind: Wind = setting(default=(0.0, 0.0, 0.0), help="wind towards north, east and down", unit="m/s")
-    altitude: float | None = setting(
-        default=None, help="altitude in the standard atmosphere; else the card's air", unit="m"
-    )
-    climb: float = setting(default=0.0, help="climb rate, negative sinks.", unit="m/s")
-    lateral: float = setting(default=0.0, help="speed to the right", unit="m/s")
-    turn: float = setting(default=0.0, help="rate of turn to the right", unit="deg/s")
-
-    def speeds(self) -> tuple[float, ...]:
-        """All that are asked for [m/s]."""
-        return one_or_more(self.speed)
-
-    def curve(self, vehicle: Vehicle) -> TrimCurve:
-        """A trim at every speed."""
-        from swashplate.simulation.trim_curve import trim_curve
-
-        return trim_curve(
-            vehicle,
-            self.speeds(),
-            climb=self.climb,
-            lateral=self.lateral,
-            turn=math.radians(self.turn),
-            environment=self.around(vehicle),
-        )
-
-    def trim(self, vehicle: Vehicle) -> Trim:
-        """The trim at one speed."""
-        return self.curve(vehicle).trims[0]
-
-
 def drawn(vehicle: Vehicle, fit: Any, *, count: int, seed: int = 1) -> tuple[Vehicle, ...]:
     """Models that a fit cannot tell from the one that it found.
 
@@ -301,7 +262,7 @@ def drawn(vehicle: Vehicle, fit: Any, *, count: int, seed: int = 1) -> tuple[Veh
 
 def one_or_more(speed: Any) -> tuple[float, ...]:
     """Speeds, one or several [m/s]."""
-    return (float(speed),) if isinstance(speed, int | float) else tuple(map(float, speed))
+    return tuple(map(float, speed)) if isinstance(speed, Iterable) else (float(speed),)
 
 
 def strings(given: Iterable[Any] | str | None) -> tuple[str, ...]:

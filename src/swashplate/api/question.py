@@ -21,6 +21,7 @@ from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 Answer = TypeVar("Answer")
+Value = TypeVar("Value")
 Fields = ParamSpec("Fields")
 Place = Literal["argument", "option", "setting"]
 
@@ -146,22 +147,26 @@ class VerbQuestion(ABC, Generic[Answer]):
         return ()
 
 
-def verb(name: str, question: Callable[Fields, VerbQuestion[Answer]]) -> Callable[Fields, Answer]:
+def verb(
+    name: str, question: Callable[Fields, VerbQuestion[Answer]], *, value: Callable[[Answer], Value] | None = None
+) -> Callable[Fields, Value]:
     """A question as a function of `swashplate`: signature, help and checks are the question's.
 
     Args:
         name: of the function.
         question: its class; `question(...).answer(say)` does the same, and tells how far it is.
+        value: what of the answer the function returns, where that is not all.
     """
     kind = cast(type[VerbQuestion[Any]], question)
 
     def asked(*args: Any, **fields: Any) -> Any:
-        return kind(*args, **fields).answer()
+        answer = kind(*args, **fields).answer()
+        return answer if value is None else value(answer)
 
     asked.__name__ = asked.__qualname__ = name
     asked.__module__ = "swashplate"
     fields = inspect.signature(kind)
-    asked.__signature__ = fields.replace(return_annotation=kind.answer.__annotations__["return"])  # type: ignore[attr-defined]
+    asked.__signature__ = fields.replace(return_annotation=(value or kind.answer).__annotations__["return"])  # type: ignore[attr-defined]
     told, parts = entries(kind), (inspect.getdoc(kind) or "").partition("\nRaises:")
     lines = [parts[0].rstrip(), "", "Args:"]
     for field, (_, entry) in told.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -294,19 +294,9 @@ class Flight(Shown):
         """What is in it and what is wrong with it: see `swashplate.inspect`."""
         return resolve("inspect")(self)
 
-    def respond(
-        self,
-        *,
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        references: Sequence[str] = (),
-        band: tuple[float, float] | None = None,
-        windows: Sequence[float] | None = None,
-        direct: bool = False,
-    ) -> Any:
-        """Frequency responses of its outputs to its inputs: see `swashplate.respond`."""
-        channels = {"inputs": inputs, "outputs": outputs, "references": references}
-        return resolve("respond")(self, **channels, band=band, windows=windows, direct=direct)
+    def respond(self, **asked: Any) -> Any:
+        """Frequency responses of its outputs to its inputs: the arguments of `swashplate.respond`."""
+        return resolve("respond")(self, **asked)
 
     def __repr__(self) -> str:
         name = self.provenance.source or "(unnamed)"

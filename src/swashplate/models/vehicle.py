@@ -140,23 +140,9 @@ class Vehicle:
 
         return write_text(path, self.card.to_toml())
 
-    def trim(
-        self,
-        *,
-        speed: float = 0.0,
-        lateral: float = 0.0,
-        climb: float = 0.0,
-        turn: float = 0.0,
-        heading: float = 0.0,
-        height: float | None = None,
-        voltage: float | None = None,
-        environment: Any = None,
-        near: Any = None,
-    ) -> Any:
-        """Its steady flight at a ground velocity: see `swashplate.trim`."""
-        course = {"speed": speed, "lateral": lateral, "climb": climb, "turn": turn, "heading": heading}
-        around = {"height": height, "voltage": voltage, "environment": environment, "near": near}
-        return resolve("trim")(self, **course, **around)
+    def trim(self, **asked: Any) -> Any:
+        """Its steady flight: the arguments of `swashplate.trim`."""
+        return resolve("trim")(self, **asked)
 
     def linearize(self, trim: Any = None) -> Any:
         """Its linear model about a trim, hover where none is given: see `swashplate.linearize`."""

@@ -11,31 +11,20 @@ from typing import Any
 from swashplate.errors import SwashError, TrimError
 from swashplate.models.doubts import doubts, shaft_power
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import Environment
 from swashplate.public import resolve
 from swashplate.shown import Shown
 from swashplate.simulation.trim import Trim, trim
 
 
-def trims_over_speed(
-    vehicle: Vehicle,
-    speeds: Sequence[float],
-    *,
-    climb: float = 0.0,
-    turn: float = 0.0,
-    lateral: float = 0.0,
-    environment: Environment | None = None,
-) -> tuple[Trim, ...]:
-    """Trims at ascending speeds [m/s], each from the one before.
+def trims_over_speed(vehicle: Vehicle, speeds: Sequence[float], **course: Any) -> tuple[Trim, ...]:
+    """Trims at ascending speeds [m/s], each from the one before; `course` as of `trim`.
 
     Raises:
         TrimError: at the first speed that cannot be flown, with the limit that stops it.
     """
     trims: list[Trim] = []
     for speed in speeds:
-        at = partial(
-            trim, vehicle, speed=float(speed), lateral=lateral, climb=climb, turn=turn, environment=environment
-        )
+        at = partial(trim, vehicle, speed=float(speed), **course)
         try:
             trims.append(at(near=trims[-1] if trims else None))
         except TrimError:
@@ -149,22 +138,13 @@ class TrimCurve(Shown):
         return "\n".join([f"Trims of {self.vehicle.card.title}", *lines, *(f"! {remark}" for remark in self.remarks)])
 
 
-def trim_curve(
-    vehicle: Vehicle,
-    speeds: Sequence[float],
-    *,
-    climb: float = 0.0,
-    lateral: float = 0.0,
-    turn: float = 0.0,
-    environment: Environment | None = None,
-) -> TrimCurve:
+def trim_curve(vehicle: Vehicle, speeds: Sequence[float], **course: Any) -> TrimCurve:
     """Steady flight over a range of speeds.
 
     Args:
         vehicle: what flies.
         speeds: ahead, ascending [m/s].
-        climb: rate of climb [m/s]. lateral: speed to the right [m/s]. turn: rate of turn to the right [rad/s].
-        environment: wind, air and voltage.
+        course: the rest of it, and what is around, as of `trim`.
 
     Raises:
         SwashError: without any speed.
@@ -172,7 +152,4 @@ def trim_curve(
     """
     if not len(speeds):
         raise SwashError("a trim curve needs at least one speed.", channel="speeds")
-    return TrimCurve(
-        vehicle,
-        trims_over_speed(vehicle, speeds, climb=climb, lateral=lateral, turn=turn, environment=environment),
-    )
+    return TrimCurve(vehicle, trims_over_speed(vehicle, speeds, **course))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import OfVehicle
+from swashplate.api.asking import OfVehicle, name_of
 from swashplate.api.languages import Aircraft, Battery, Fitted, FlightLimits, Gusts, Motion, Pilot, Wind, Words
 from swashplate.api.question import option, setting, verb
 from swashplate.api.saying import Say, silent
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from swashplate.api.fly_maneuver import SimulatedFlight
     from swashplate.api.monte_carlo import MonteCarlo
 
-_WIND = ("wind_north", "wind_east", "wind_down")
 _COMPILING = "(compiling takes longest the first time)"
 
 
@@ -71,7 +70,7 @@ class Simulate(OfVehicle["SimulatedFlight"]):
         return careful(answer.remarks)
 
     def document(self, answer: SimulatedFlight) -> Any:
-        return answer.to_document() | {"vehicle": _called(self.vehicle)}
+        return answer.to_document() | {"vehicle": name_of(self.vehicle) or self.vehicle.name}
 
 
 class FlyMany(OfVehicle["MonteCarlo"]):
@@ -130,7 +129,7 @@ class FlyMany(OfVehicle["MonteCarlo"]):
         return fly_many(self, aircraft)
 
     def document(self, answer: MonteCarlo) -> Any:
-        return answer.to_document() | {"vehicle": _called(self.vehicle)}
+        return answer.to_document() | {"vehicle": name_of(self.vehicle) or self.vehicle.name}
 
     def remarks(self, answer: MonteCarlo) -> list[str]:
         return [f"late: {answer.late}", *careful(answer.remarks)]
@@ -142,10 +141,6 @@ class FlyMany(OfVehicle["MonteCarlo"]):
 def careful(remarks: Sequence[str]) -> list[str]:
     """Remarks as they are said."""
     return [f"Careful: {words}" for words in remarks]
-
-
-def _called(vehicle: Any) -> str:
-    return str(vehicle) if isinstance(vehicle, str | Path) else vehicle.name
 
 
 monte_carlo = verb("monte_carlo", FlyMany)

@@ -8,18 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import Steady
-from swashplate.api.question import option, setting
+from swashplate.api.asking import InAir, name_of, one_or_more
+from swashplate.api.languages import Air, Aircraft, Speeds, Wind
+from swashplate.api.question import argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from swashplate.models.vehicle import Vehicle
     from swashplate.simulation.linearize import LinearModel
     from swashplate.simulation.trim_curve import TrimCurve
-
-
-def _called(asked: Steady[Any], vehicle: Any) -> str:
-    return str(asked.vehicle) if isinstance(asked.vehicle, str | Path) else vehicle.name
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,16 +34,55 @@ class Flown:
     remarks: tuple[str, ...]
 
 
-class Steadily(Steady[Flown]):
-    """A verb about trims; --out FILE.html writes a page of plots over the range of speeds."""
+class Steadily(InAir[Flown]):
+    """A verb about a vehicle in steady flight; --out FILE.html writes a page of plots over the range of speeds."""
 
-    def begun(self) -> Any:
+    vehicle: Aircraft = argument(
+        metavar="VEHICLE", help="A vehicle's name, or a card or model file.", complete="vehicle"
+    )
+    speed: Speeds = option(default=(0.0,), help='Speed ahead: "5", or a range "0-15" or "0-15/2.5".', unit="m/s")
+    wind: Wind = setting(default=(0.0, 0.0, 0.0), help="wind towards north, east and down", unit="m/s")
+    altitude: float | None = setting(
+        default=None, help="altitude in the standard atmosphere; else the card's air", unit="m"
+    )
+    climb: float = setting(default=0.0, help="climb rate, negative sinks.", unit="m/s")
+    lateral: float = setting(default=0.0, help="speed to the right", unit="m/s")
+    turn: float = setting(default=0.0, help="rate of turn to the right", unit="deg/s")
+    heading: float = setting(default=0.0, help="direction of flight, from north to east", unit="deg")
+    height: float | None = setting(default=None, help="height above the ground; clear of it if not given", unit="m")
+    voltage: float | None = setting(default=None, help="battery voltage; the card's if not given", unit="V")
+    environment: Air | None = setting(default=None, help="air_density and gravity, where the card's are not meant")
+
+    def begun(self) -> Vehicle:
         """The vehicle, with its changes."""
         return self.flying(self.vehicle)
 
-    def flown(self, vehicle: Any, curve: TrimCurve, result: Any) -> Flown:
+    def speeds(self) -> tuple[float, ...]:
+        """All that are asked for [m/s]."""
+        return one_or_more(self.speed)
+
+    def curve(self, vehicle: Vehicle) -> TrimCurve:
+        """A trim at every speed."""
+        from swashplate.physics.environment import Environment
+        from swashplate.simulation.trim_curve import trim_curve
+
+        usual, given = Environment(), self.environment or Environment()
+        said = {name: value for name, value in given._asdict().items() if value != getattr(usual, name)}
+        return trim_curve(
+            vehicle,
+            self.speeds(),
+            climb=self.climb,
+            lateral=self.lateral,
+            turn=math.radians(self.turn),
+            heading=math.radians(self.heading),
+            height=self.height,
+            voltage=self.voltage,
+            environment=self.around(vehicle)._replace(**said),
+        )
+
+    def flown(self, vehicle: Vehicle, curve: TrimCurve, result: Any) -> Flown:
         """The result, with its remarks."""
-        return Flown(_called(self, vehicle), curve, result, tuple(curve.remarks))
+        return Flown(name_of(self.vehicle) or vehicle.name, curve, result, tuple(curve.remarks))
 
     def remarks(self, answer: Flown) -> list[str]:
         return [f"Careful: {words}" for words in answer.remarks]
@@ -54,7 +91,10 @@ class Steadily(Steady[Flown]):
 class TrimVehicle(Steadily):
     """Find the steady flight of a vehicle: attitude and controls, at one speed or over a range.
 
-    --out FILE.html writes a page of plots over the range of speeds.
+    --out FILE.html writes a page of plots over the range of speeds. In Python it is a `Trim`, or a `TrimCurve` of them.
+
+    Raises:
+        TrimError: no steady flight at a speed, with the input whose limit prevents it or the state that does not rest.
     """
 
     files: ClassVar[tuple[str, ...]] = ("report.html",)
@@ -82,6 +122,14 @@ class TrimVehicle(Steadily):
         if "power [W]" in columns:
             columns["power [W]"] = [f"{v:.1f}" for v in curve.columns()["power [W]"]]
         return [text_columns(list(columns), list(zip(*columns.values(), strict=True)), left=0)]
+
+
+def _steady_flight(answer: Flown) -> Any:
+    """The trim at one speed, or the curve over several."""
+    return answer.curve if len(answer.curve.trims) > 1 else answer.curve.trims[0]
+
+
+trim = verb("trim", TrimVehicle, value=_steady_flight)
 
 
 def _report(made: Any, folder: Path, names: tuple[str, ...]) -> None:
