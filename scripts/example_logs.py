@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.flights.readers import dataflash
+from swashplate.flights.readers import dataflash, dataflash_index
 
 OUT = Path(__file__).resolve().parents[1] / "src" / "swashplate" / "flights" / "examples"
 ALL = 1e9
@@ -85,11 +85,11 @@ def cut(content: bytes, chosen: Cut) -> bytes:
 
 def _described(content: bytes, number: int) -> list[int]:
     """Where the first FMT message of a type stands."""
-    at = content.find(dataflash.HEAD + bytes([dataflash.FMT, number]))
+    at = content.find(dataflash_index.HEAD + bytes([dataflash_index.FMT, number]))
     return [at] if at >= 0 else []
 
 
-def _units(content: bytes, kinds: Sequence[dataflash.MessageKind], number: int) -> list[bytes]:
+def _units(content: bytes, kinds: Sequence[dataflash_index.MessageKind], number: int) -> list[bytes]:
     """The FMTU message that gives a type its units."""
     kind = next((k for k in kinds if k.name == "FMTU"), None)
     if kind is None:
@@ -203,13 +203,13 @@ def _c(letters: str) -> str:
 
 def _fmt(kind: int, length: int, name: str, letters: str, columns: str) -> bytes:
     packed = struct.pack("<BB4s16s64s", kind, length, name.encode(), letters.encode(), columns.encode())
-    return dataflash.HEAD + bytes([dataflash.FMT]) + packed
+    return dataflash_index.HEAD + bytes([dataflash_index.FMT]) + packed
 
 
 def _row(name: str, *values: float | str) -> bytes:
     kind, letters, _ = _FORMATS[name]
     packed: Sequence[object] = [v.encode() if isinstance(v, str) else v for v in values]
-    return dataflash.HEAD + bytes([kind]) + struct.pack(_c(letters), *packed)
+    return dataflash_index.HEAD + bytes([kind]) + struct.pack(_c(letters), *packed)
 
 
 def main() -> None:

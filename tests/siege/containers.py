@@ -26,7 +26,15 @@ from swashplate.api.campaigns.result_files import ENDING, unpacked
 from swashplate.errors import FlightError
 from swashplate.flights import growing
 from swashplate.flights.foreign_process import JOBS
-from swashplate.flights.readers import blackbox_header, dataflash, dataflash_text, mat, tlog, ulog_messages
+from swashplate.flights.readers import (
+    blackbox_header,
+    dataflash,
+    dataflash_index,
+    dataflash_text,
+    mat,
+    tlog,
+    ulog_messages,
+)
 from swashplate.flights.readers.blackbox_frames import find_frames
 from swashplate.flights.readers.blackbox_header import read_header
 from swashplate.flights.readers.blackbox_values import main_frames
@@ -75,7 +83,7 @@ def _refuse_unknown(known: bool) -> None:
 
 
 def _dataflash(content: bytes, path: Path) -> object:
-    _refuse_unknown(dataflash.is_dataflash(content))
+    _refuse_unknown(dataflash_index.is_dataflash(content))
     return _messages(dataflash.messages(content))
 
 

@@ -26,8 +26,12 @@ if TYPE_CHECKING:  # a quarter of a second to import, and designs and trims have
     import pandas as pd
     import xarray as xr
 
+    from swashplate.flights.stored_column import StoredColumn
 
-def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[str, str] | None = None) -> xr.Dataset:
+
+def stream(
+    time: ArrayLike, channels: Mapping[str, ArrayLike | StoredColumn], units: Mapping[str, str] | None = None
+) -> xr.Dataset:
     """A set of channels that share one time base.
 
     Args:
@@ -35,6 +39,8 @@ def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[st
         channels: arrays of shape (n,) by channel name.
         units: units of channels that the schema does not know; a unit that contradicts the schema is an error.
     """
+    from swashplate.flights.stored_column import StoredColumn
+
     stamps = np.asarray(time, dtype=np.float64)
     if np.any(np.abs(stamps) > LATEST):
         raise FlightError(f"reaches {np.max(np.abs(stamps)):g} s: no clock does.", channel="time")
@@ -48,11 +54,11 @@ def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[st
         unit = (units or {}).get(name, known.unit)
         if known.unit and unit != known.unit:
             raise UnitError(f"unit is '{unit}', expected '{known.unit}'.", channel=name, hint="Convert it first.")
-        data = np.asarray(values)
+        data = values if isinstance(values, StoredColumn) else np.asarray(values)
         if data.shape != stamps.shape:
             raise FlightError(f"has {data.shape} values for {stamps.shape} time stamps.", channel=name)
         labels = {"units": unit, "frame": known.frame, "long_name": known.description}
-        variables[name] = storage.timed(data, labels)
+        variables[name] = data.timed(labels) if isinstance(data, StoredColumn) else storage.timed(data, labels)
     return storage.over_time(storage.timed(stamps, {"units": "s"}), variables)
 
 

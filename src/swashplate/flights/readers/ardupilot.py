@@ -10,11 +10,12 @@ Source: ArduPilot's documentation of its log messages; units as given there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -24,9 +25,11 @@ from swashplate.flights.provenance import Event
 from swashplate.flights.readers import checks, clocked, dataflash, dataflash_text
 from swashplate.flights.readers.ardupilot_events import seconds, story
 from swashplate.flights.readers.dataflash import Messages, MessageTable
+from swashplate.flights.readers.dataflash_index import HEAD, is_dataflash
 from swashplate.flights.readers.options import Options, refuse_mapping
-from swashplate.flights.readers.source import Source
+from swashplate.flights.readers.source import Places, Source, Stored
 from swashplate.flights.schema import is_known
+from swashplate.flights.stored_column import StoredColumn
 
 NAME = "ardupilot"
 VERSION = "1"
@@ -118,20 +121,30 @@ _MESSAGES = (
 _STORIES = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "MODE", "EV", "ERR", "ARM", "SIDS")
 
 
-_LONG = 1_000_000
+_AT_HAND = {
+    "": ("TimeUS", "TimeMS"),
+    **{
+        name: {"Time", *(f for m in _MESSAGES if m.name == name for f in (*m.fields, *(m.instance or ((), 0))[0]))}
+        for name in {message.name for message in _MESSAGES}
+    },
+}
+_LONG = 200_000
 """Messages."""
+_NEARLY_ALL = 0.999
+"""Of the stamps: the largest of many may be a damaged one."""
 
 
 def recognises(source: Source) -> bool:
     """A DataFlash file, binary or text, with ArduPilot's stamps (each message carries its own)."""
-    if source.content[:2] == dataflash.HEAD or source.path.suffix.lower() == ".bin":
-        return dataflash.is_dataflash(source.content) and not is_px4(source.content)
+    if source.stored[:2] == HEAD or source.path.suffix.lower() == ".bin":
+        return is_dataflash(source.stored) and not is_px4(source.stored)
     return dataflash_text.is_dataflash_text(source.text)
 
 
-def is_px4(content: bytes) -> bool:
+def is_px4(content: Stored) -> bool:
     """Whether a DataFlash file is one of PX4: its messages carry no time, a message TIME does."""
-    return b"TIMEQ" in content[: 1 << 16] and b"StartTime" in content[: 1 << 16]
+    head = content[: 1 << 16]
+    return b"TIMEQ" in head and b"StartTime" in head
 
 
 def read(source: Source, options: Options) -> Flight:
@@ -144,8 +157,8 @@ def read(source: Source, options: Options) -> Flight:
         FlightError: where nothing in the log can be used, or a mapping is given.
     """
     refuse_mapping(options, "an ArduPilot log", where=source.name)
-    text = source.text
-    log = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
+    text, _ = source.text, source.hashing
+    log = dataflash.messages(source.stored, _AT_HAND) if text is None else dataflash_text.messages(text)
     log, coarse = _stamped(log, source)
     log, end, said = _one_run(log)
     logged = story(log, end=end)
@@ -212,12 +225,14 @@ def _stamped(log: Messages, source: Source) -> tuple[Messages, tuple[str, ...]]:
 
 def _one_run(log: Messages) -> tuple[Messages, float, str]:
     """The messages of the longest run between clock resets, its last stamp [s], and what was left out."""
-    timed = [(table.place, seconds(table)) for table in log.tables.values()]
-    timed = [(place, t) if (good := np.isfinite(t)).all() else (place[good], t[good]) for place, t in timed]
     # Of a long log every kind has many messages: where no clock of one falls back nothing needs one row of all.
-    if sum(t.size for _, t in timed) > _LONG and all((t[1:] >= t[:-1]).all() for _, t in timed):
-        return log, _last_stamp(np.concatenate([t for _, t in timed]) if timed else np.zeros(0)), ""
-    place = np.concatenate([p for p, _ in timed]) if timed else np.zeros(0, np.int64)
+    if sum(map(len, log.tables.values())) > _LONG and all(map(_rises, log.tables.values())):
+        return log, _last_of_rising([table for table in log.tables.values() if _stamps(table) is not None]), ""
+    timed = list[tuple[Places, Array]]()
+    for table in log.tables.values():
+        good = np.isfinite(stamps := seconds(table))
+        timed.append((table.place[good], stamps[good]))
+    place = np.concatenate([p.astype(np.int64) for p, _ in timed]) if timed else np.zeros(0, np.int64)
     time = np.concatenate([t for _, t in timed]) if timed else np.zeros(0)
     order = np.argsort(place, kind="stable")
     (first, last), said = clocked.longest_run([(place[order], time[order])])
@@ -228,8 +243,26 @@ def _one_run(log: Messages) -> tuple[Messages, float, str]:
 
 
 def _last_stamp(time: Array) -> float:
-    """The largest of many stamps may be a damaged one."""
-    return float(np.quantile(time, 0.999)) if time.size > 2000 else float(time.max(initial=0.0))
+    return float(np.quantile(time, _NEARLY_ALL)) if time.size > 2000 else float(time.max(initial=0.0))
+
+
+def _stamps(table: MessageTable) -> NDArray[np.generic] | None:
+    return next((table.columns[name] for name in ("TimeUS", "TimeMS") if name in table.columns), None)
+
+
+def _rises(table: MessageTable) -> bool:
+    """Whether no stamp of a table is less than the one before it, or missing; it may have none."""
+    stamps = _stamps(table)
+    return stamps is None or bool(np.all(np.greater_equal(stamps[1:], stamps[:-1])))
+
+
+def _last_of_rising(tables: Sequence[MessageTable]) -> float:
+    """The last stamp of tables whose clocks never fall: what `_last_stamp` says, from their ends alone."""
+    count = sum(map(len, tables))
+    rank = _NEARLY_ALL * (count - 1)
+    most = count - int(rank)
+    ends = [seconds(table.rows(np.arange(max(0, len(table) - most), len(table)))) for table in tables]
+    return float(np.interp(rank - (count - most), np.arange(most), np.sort(np.concatenate(ends))[-most:]))
 
 
 def _chosen(table: MessageTable, wanted: tuple[tuple[str, ...], int] | None) -> MessageTable:
@@ -254,17 +287,18 @@ def _streams(log: Messages, events: tuple[Event, ...], remarks: clocked.Remarks)
         if table is None or message.stream in streams:
             continue
         table = _chosen(table, message.instance)
-        columns = {}
+        columns = dict[str, tuple[Array | StoredColumn, str]]()
         for field, (channel, unit) in message.fields.items():
             name = channel if channel not in taken else _with_suffix(channel, message.suffix)
-            values = table.number(field)
             if name is None or name in taken or field not in table.columns:
                 continue
-            if channel.startswith(("rcin", "rcout")) and not values.any():
+            values = table.stored(field)
+            if channel.startswith(("rcin", "rcout")) and not np.any(clocked.numbers_of(values)):
                 continue  # a channel that nothing is connected to
             columns[name] = (values, target_unit if channel == "sid_target" else unit)
         if message.total and columns:
-            columns[message.total] = (np.sum([values for values, _ in columns.values()], axis=0), "1")
+            terms = [clocked.numbers_of(values) for values, _ in columns.values()]
+            columns[message.total] = (np.sum(terms, axis=0), "1")
         data = clocked.made_stream(message.stream, seconds(table), columns, remarks=remarks)
         if data is not None:
             streams[message.stream] = data
@@ -298,13 +332,9 @@ def _remarks(log: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
     remarks = []
     if "system_identification" in streams:
         remarks.append("sid_target acts one loop of the controller after its stamp")
-    inputs = {
-        str(name): np.asarray(values.values, dtype=np.float64)
-        for data in streams.values()
-        for name, values in data.data_vars.items()
-        if str(name).startswith("mixer_")
-    }
-    remarks += checks.constant_notes(inputs)
+    for data in streams.values():
+        for name in filter(lambda name: name.startswith("mixer_"), map(str, data.data_vars)):
+            remarks += checks.constant_notes({name: np.asarray(data[name].values, dtype=np.float64)})
     counts = {name: len(table) for name, table in log.tables.items()}
     if "rates" not in streams:
         remarks.append("no RATE message, so no commands to the mixer: set ATTITUDE_MED or _FAST in LOG_BITMASK")

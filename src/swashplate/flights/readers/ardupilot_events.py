@@ -144,7 +144,7 @@ def _arming(messages: Messages) -> list[Event]:
     if (table := messages.get("ARM")) is not None:
         changes += list(zip(seconds(table).tolist(), (table.number("ArmState") == 1).tolist(), strict=True))
     if raised and not any(time <= raised[0] for time, _ in changes):  # it was armed before the log began
-        first = (seconds(table)[:1] for table in messages.tables.values())
+        first = (seconds(table.rows(np.arange(1))) for table in messages.tables.values())
         changes.append((min(time.item() for time in first if np.isfinite(time).any()), True))
     events: list[Event] = []
     for time, armed in sorted((time, armed) for time, armed in changes if math.isfinite(time)):
@@ -187,6 +187,7 @@ def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
     damage: list[str] = []
     if settings is None:
         return events, damage
+    clocks = (np.zeros(0), np.zeros(0)) if data is None else (seconds(data), data.number("Time"))
     begins = seconds(settings)
     last = np.append(begins[1:], math.inf)
     for i, axis in enumerate(settings.number("Ax").tolist()):
@@ -196,12 +197,12 @@ def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
         if not all(map(math.isfinite, (axis, begins[i], *numbers.values()))) or numbers["start_hz"] <= 0.0:
             continue
         chirp = Chirp(axis=int(axis), **numbers)
-        start, stop = _on_the_clock(data, chirp, begins[i], last[i])
+        start, stop = _on_the_clock(clocks, chirp, begins[i], last[i])
         details: dict[str, Any] = {**chirp.as_details(), "start": start, "stop": stop, "seen": min(stop, end)}
         details |= {"channel": MOVED[chirp.axis]} if chirp.axis in MOVED else {}
         text = f"{chirp.axis_name}, {chirp.start_hz:g}-{chirp.stop_hz:g} Hz in {chirp.record:g} s"
         events.append(Event(float(begins[i]), "sweep", text, details))
-        reached = _reached(data, begins[i], last[i])
+        reached = _reached(clocks, begins[i], last[i])
         if reached is not None and reached < START_DELAY + chirp.record - 0.1:
             details["seen"] = start + max(0.0, reached - START_DELAY)
             why = "the log is cut off" if last[i] == math.inf and end - details["seen"] < 1.0 else "it was stopped"
@@ -211,18 +212,16 @@ def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
     return events, damage
 
 
-def _between(data: MessageTable | None, start: float, stop: float) -> tuple[Array, Array]:
-    """Stamps and the mode's own time [s] of the SIDD messages of one sweep."""
-    if data is None:
-        return np.zeros(0), np.zeros(0)
-    stamps, elapsed = seconds(data), data.number("Time")
+def _between(clocks: tuple[Array, Array], start: float, stop: float) -> tuple[Array, Array]:
+    """Stamps and the mode's elapsed time [s] of the SIDD messages of one sweep, out of those of all."""
+    stamps, elapsed = clocks
     chosen = (stamps >= start) & (stamps < stop) & np.isfinite(elapsed)
     return stamps[chosen], elapsed[chosen]
 
 
-def _on_the_clock(data: MessageTable | None, chirp: Chirp, begin: float, until: float) -> tuple[float, float]:
+def _on_the_clock(clocks: tuple[Array, Array], chirp: Chirp, begin: float, until: float) -> tuple[float, float]:
     """Start and stop of the chirp on the log's clock: the mode's own time runs by loop counts, a little off it."""
-    stamps, elapsed = _between(data, begin, until)
+    stamps, elapsed = _between(clocks, begin, until)
     start, stop = begin + START_DELAY, begin + START_DELAY + chirp.record
     if elapsed.size > 1 and np.all(np.diff(elapsed) > 0.0) and elapsed[0] <= START_DELAY <= elapsed[-1]:
         start = float(np.interp(START_DELAY, elapsed, stamps))
@@ -231,9 +230,9 @@ def _on_the_clock(data: MessageTable | None, chirp: Chirp, begin: float, until: 
     return start, stop
 
 
-def _reached(data: MessageTable | None, begin: float, until: float) -> float | None:
+def _reached(clocks: tuple[Array, Array], begin: float, until: float) -> float | None:
     """How far the mode's own time came [s]; None where it is not logged."""
-    _, elapsed = _between(data, begin, until)
+    _, elapsed = _between(clocks, begin, until)
     return float(elapsed.max()) if elapsed.size else None
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 import xarray as xr
@@ -23,9 +24,12 @@ from swashplate.errors import FlightError
 from swashplate.flights import units
 from swashplate.flights.flight import stream
 from swashplate.flights.readers import checks
+from swashplate.flights.readers.source import Places
 from swashplate.flights.schema import channel
+from swashplate.flights.stored_column import StoredColumn
 
 Mask = NDArray[np.bool_]
+Number = TypeVar("Number", bound=np.generic)
 
 TURN = 1 << 32  # ticks: where a counter of 32 bits begins anew, after 71.6 minutes of microseconds
 DAY = 86400.0  # s: where a time of day begins anew
@@ -107,7 +111,7 @@ def unturned(time: Array, turns: Iterable[float]) -> tuple[Array, int]:
     return time, 0
 
 
-def copies(time: Array, columns: Iterable[Array]) -> Mask:
+def copies(time: Array, columns: Iterable[NDArray[np.generic]]) -> Mask:
     """Which samples are the one before them once more: the same stamp and the same numbers, shape (n,).
 
     Args:
@@ -192,7 +196,7 @@ def _first_bad(time: Array, twice: Mask) -> tuple[int, str]:
 
 
 # ---- the stamps of a whole log ---------------------------------------------------------------------------------------
-def resets(place: NDArray[np.int64], time: Array) -> NDArray[np.int64]:
+def resets(place: Places, time: Array) -> NDArray[np.int64]:
     """Places in the file at which the clock of the log started anew, in order.
 
     Args:
@@ -212,7 +216,7 @@ def resets(place: NDArray[np.int64], time: Array) -> NDArray[np.int64]:
     return np.unique(np.asarray(places, dtype=np.int64))
 
 
-def longest_run(clocks: Sequence[tuple[NDArray[np.int64], Array]]) -> tuple[tuple[int, int], str]:
+def longest_run(clocks: Sequence[tuple[Places, Array]]) -> tuple[tuple[int, int], str]:
     """The part of a file (first place, place after its last) with the most messages between clock resets.
 
     Args:
@@ -240,13 +244,26 @@ def longest_run(clocks: Sequence[tuple[NDArray[np.int64], Array]]) -> tuple[tupl
     return (first, last), said
 
 
-def converted(values: Array, unit: str) -> tuple[Array, str]:
+def converted(values: Array | StoredColumn, unit: str) -> tuple[Array | StoredColumn, str]:
     """Values in the unit inside, and that unit."""
-    return (units.to_inside(values, unit), units.inside_unit(unit)) if unit else (values, "")
+    if isinstance(values, StoredColumn):
+        factor = float(units.to_inside(1.0, unit)) if unit else 1.0
+        return StoredColumn(values.stored, *values.factors, factor), units.inside_unit(unit) if unit else ""
+    numbers = np.asarray(values, dtype=np.float64)
+    return (units.to_inside(numbers, unit), units.inside_unit(unit)) if unit else (numbers, "")
+
+
+def numbers_of(values: Array | StoredColumn) -> Array:
+    """What a column stands for."""
+    return values.numbers if isinstance(values, StoredColumn) else values
+
+
+def _stored(values: Array | StoredColumn) -> NDArray[np.generic]:
+    return values.stored if isinstance(values, StoredColumn) else values
 
 
 def made_stream(
-    name: str, time: Array, columns: Mapping[str, tuple[Array, str]], *, remarks: Remarks
+    name: str, time: Array, columns: Mapping[str, tuple[Array | StoredColumn, str]], *, remarks: Remarks
 ) -> xr.Dataset | None:
     """A stream from what a log holds; None where fewer than two samples can be used.
 
@@ -256,21 +273,19 @@ def made_stream(
         columns: values and their unit in the log, by channel.
         remarks: takes a line for what was left out.
     """
-    channels = {
-        channel_name: converted(np.asarray(v, dtype=np.float64), unit) for channel_name, (v, unit) in columns.items()
-    }
-    empty = [key for key, (values, _) in channels.items() if not np.isfinite(values).any()]
+    channels = {channel_name: converted(*column) for channel_name, column in columns.items()}
+    empty = [key for key, (values, _) in channels.items() if not _finite(values).any()]
     for key in empty:
         del channels[key]
     if not channels or time.size < 2:
         return None
     good = np.isfinite(time)
     for values, _ in channels.values():
-        good &= np.isfinite(values)
+        good &= _finite(values)
     if not good.all():
         lost = share(int(good.size - good.sum()), good.size)
         remarks.damage.append(f"{name}: {lost} are lost because a number is missing or not finite")
-    twice = copies(_rows(time, good), (_rows(values, good) for values, _ in channels.values()))
+    twice = copies(_rows(time, good), (_rows(_stored(values), good) for values, _ in channels.values()))
     if twice.any():
         remarks.notes.append(
             f"{name}: {share(int(twice.sum()), good.size)} are copies of the one before them: left out"
@@ -285,10 +300,20 @@ def made_stream(
         return None
     known = {key: channel(key).unit for key in channels}
     labels = {key: unit for key, (_, unit) in channels.items() if not known[key]}
-    return stream(_rows(time, good), {key: _rows(values, good) for key, (values, _) in channels.items()}, labels)
+    return stream(_rows(time, good), {key: _chosen(values, good) for key, (values, _) in channels.items()}, labels)
 
 
-def _rows(values: Array, chosen: Mask) -> Array:
+def _finite(values: Array | StoredColumn) -> Mask:
+    return np.asarray(np.isfinite(_stored(values).astype(np.float64, copy=False)))
+
+
+def _chosen(values: Array | StoredColumn, chosen: Mask) -> Array | StoredColumn:
+    if isinstance(values, StoredColumn):
+        return StoredColumn(_rows(values.stored, chosen), *values.factors)
+    return _rows(values, chosen)
+
+
+def _rows(values: NDArray[Number], chosen: Mask) -> NDArray[Number]:
     """What is chosen; the values themselves where all are, for a log of a gigabyte has no room for copies."""
     return np.ascontiguousarray(values) if chosen.all() else values[chosen]
 

@@ -9,21 +9,23 @@ from __future__ import annotations
 import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.readers import clocked, dataflash, dataflash_text, rosbag, tlog, ulog
 from swashplate.flights.readers.ardupilot_events import seconds
-from swashplate.flights.readers.dataflash import MessageKind, MessageTable
-from swashplate.flights.readers.source import open_source
+from swashplate.flights.readers.dataflash import MessageTable, Wanted
+from swashplate.flights.readers.dataflash_index import MessageKind, is_dataflash
+from swashplate.flights.readers.source import Places, Stored, open_source
 
 _INSTANCES = ("I", "C", "Inst", "Instance", "IMU")
 _MOST_INSTANCES, _INSTANCE = 16, "instance"
+_FOR_RATE = 1 << 16
+"""Messages of which a rate is the median."""
 _STAMPS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 _DESCRIBE = frozenset(("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "FILE"))
 _FACTORED = frozenset("cCeEL")
@@ -54,7 +56,7 @@ class LogFields(ABC):
     listed: Mapping[str, LogField]
 
     @abstractmethod
-    def _samples(self, field: LogField) -> tuple[NDArray[np.int64], Array, Array]:
+    def _samples(self, field: LogField) -> tuple[Places, Array, Array]:
         """Places in the file, times [s] and values."""
 
     def read(self, name: str) -> tuple[Array, Array]:
@@ -79,8 +81,8 @@ def log_fields(path: Path) -> LogFields | None:
     """The fields of a log; None for a kind of file whose every column is a channel already, or that cannot be read."""
     with contextlib.suppress(SwashError):
         source = open_source(path)
-        if dataflash.is_dataflash(source.content):
-            return _Binary(path, source.content)
+        if is_dataflash(source.stored):
+            return _Binary(path, source.stored)
         if source.content.startswith(ulog.MAGIC):
             return _Decoded(_topics(source.content, source.name))
         if rosbag.recognises(source):
@@ -103,49 +105,82 @@ def _rate(time: Array) -> float:
 # ---- DataFlash: what stands where is kept, the numbers stay in the file ----------------------------------------------
 @dataclass(frozen=True)
 class _Part:
-    """The messages of one kind, or of one instance of it: places in the file, times [s], units and factors."""
+    """The messages of one kind, or of one instance of it: places in the file, stamp and factor of it, units, factors.
+
+    A message without a stamp has that of the last message TIME before it (PX4 of old).
+    """
 
     kind: MessageKind
-    at: NDArray[np.int64]
-    time: Array
+    at: Places
+    stamp: str
     units: Mapping[str, tuple[str, float]]
 
 
 class _Binary(LogFields):
-    def __init__(self, path: Path, content: bytes) -> None:
+    def __init__(self, path: Path, content: Stored) -> None:
         kinds = {kind.name: kind for kind in reversed(dataflash.kinds(content)) if kind.at.size}
         self._path, self._state = path, _state(path)
-        self._parts: dict[str, _Part] = {}
-        bytes_ = np.frombuffer(content, np.uint8)
         units = _units(content, kinds)
-        clock = _clock(bytes_, kinds)
-        for name, kind in kinds.items():
-            if name in _DESCRIBE:
+        shown = {name: kind for name, kind in kinds.items() if name not in _DESCRIBE}
+        sensors = _sensors(content, shown, units)
+        clock = kinds.get("TIME")
+        self._clock = clock if clock is not None and "StartTime" in clock.factors else None
+        self._parts: dict[str, _Part] = {}
+        for name, kind in shown.items():
+            stamp = next((stamp for stamp in _STAMPS if stamp in kind.factors), "")
+            if not stamp and self._clock is None:
                 continue
-            at = kind.at
-            time = _stamped(bytes_, kind, at, clock)
-            if time is None:
-                continue
-            for which, chosen in _instances(bytes_, kind, at, units.get(name, {})):
+            for which, at in sensors[name]:
                 called = name if which is None else f"{name}[{which}]"
-                self._parts[called] = _Part(kind, at[chosen], time[chosen], units.get(name, {}))
+                self._parts[called] = _Part(kind, at, stamp, units.get(name, {}))
+        rates = self._rates(content)
         fields = [
-            LogField(name, field, part.units.get(field, ("", 1.0))[0], part.at.size, _rate(part.time))
+            LogField(name, field, part.units.get(field, ("", 1.0))[0], part.at.size, rates[name])
             for name, part in self._parts.items()
             for field in part.kind.factors
-            if _place(part.kind, field)[0].kind in "fiu"
+            if part.kind.place(field)[0].kind in "fiu"
             and field not in _STAMPS
             and part.units.get(field, ("",))[0] != _INSTANCE
         ]
         self.listed = {field.name: field for field in fields}
 
-    def _samples(self, field: LogField) -> tuple[NDArray[np.int64], Array, Array]:
+    def _rates(self, content: Stored) -> dict[str, float]:
+        """Rate of each part [Hz], from messages in the middle of it."""
+        middle = {}
+        for name, part in self._parts.items():
+            begin = max(0, part.at.size - _FOR_RATE) // 2
+            middle[name] = replace(part, at=part.at[begin : begin + _FOR_RATE])
+        return {name: _rate(time) for name, time in zip(middle, self._times(content, [*middle.values()]), strict=True)}
+
+    def _times(self, content: Stored, parts: Sequence[_Part]) -> list[Array]:
+        """Times of the messages of parts [s]."""
+        wanted = [Wanted(part.kind, part.at, [part.stamp] if part.stamp else []) for part in parts]
+        clock = self._clock
+        if clock is not None:
+            wanted.append(Wanted(clock, clock.at, ["StartTime"]))
+        stamps = dataflash.decoded(content, wanted)
+        times = []
+        for part, stored in zip(parts, stamps, strict=False):
+            if part.stamp:
+                times.append(np.asarray(stored[part.stamp], dtype=np.float64) * _STAMPS[part.stamp])
+                continue
+            assert clock is not None
+            before = np.searchsorted(clock.at, part.at) - 1
+            start = np.asarray(stamps[-1]["StartTime"], dtype=np.float64) * 1e-6
+            # Messages between two of TIME share a stamp: each but the first of its kind is left out by `read`.
+            times.append(np.where(before >= 0, start[np.maximum(before, 0)], np.nan))
+        return times
+
+    def _samples(self, field: LogField) -> tuple[Places, Array, Array]:
         if _state(self._path) != self._state:
             raise FlightError("has changed since it was opened.", where=self._path, hint="Open it again.")
         part = self._parts[field.message]
-        content = np.memmap(self._path, np.uint8, mode="r")
-        values = _column(content, part.kind, part.at, field.field)
-        return part.at, part.time, values * part.units.get(field.field, ("", 1.0))[1]
+        content = open_source(self._path).stored
+        (time,) = self._times(content, [part])
+        (values,) = dataflash.decoded(content, [Wanted(part.kind, part.at, [field.field])])
+        with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+            numbers = np.asarray(values[field.field], dtype=np.float64) * part.kind.factors[field.field]
+        return part.at, time, numbers * part.units.get(field.field, ("", 1.0))[1]
 
 
 def _state(path: Path) -> tuple[int, int]:
@@ -156,60 +191,26 @@ def _state(path: Path) -> tuple[int, int]:
     return state.st_size, state.st_mtime_ns
 
 
-def _column(content: NDArray[np.uint8], kind: MessageKind, at: NDArray[np.int64], field: str) -> Array:
-    """One field of many messages, without the others."""
-    dtype, offset = _place(kind, field)
-    cells = content[(at + 3 + offset)[:, None] + np.arange(dtype.itemsize)]
-    with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
-        return np.ascontiguousarray(cells).view(dtype)[:, 0].astype(np.float64) * kind.factors[field]
+def _sensors(
+    content: Stored, kinds: Mapping[str, MessageKind], units: Mapping[str, Mapping[str, tuple[str, float]]]
+) -> dict[str, list[tuple[int | None, Places]]]:
+    """The messages of each sensor or core by kind, where the log tells several apart; else all of them."""
+    telling = {}
+    for name, kind in kinds.items():
+        instances = [field for field, (unit, _) in units.get(name, {}).items() if unit == _INSTANCE]
+        telling[name] = (instances or [field for field in _INSTANCES if field in kind.factors])[:1]
+    numbers = dataflash.decoded(content, [Wanted(kind, kind.at, telling[name]) for name, kind in kinds.items()])
+    sensors_of: dict[str, list[tuple[int | None, Places]]] = {}
+    for (name, kind), fields in zip(kinds.items(), numbers, strict=True):
+        sensors_of[name] = [(None, kind.at)]
+        for stored in fields.values():
+            sensors = np.unique(stored)
+            if 1 < sensors.size <= _MOST_INSTANCES:
+                sensors_of[name] = [(int(which), kind.at[stored == which]) for which in sensors.tolist()]
+    return sensors_of
 
 
-def _place(kind: MessageKind, field: str) -> tuple[np.dtype[np.generic], int]:
-    """A field's type, and the bytes before it in the payload."""
-    dtype, offset, *_ = dict(kind.dtype.fields or {})[field]
-    return dtype, int(offset)
-
-
-def _stamped(
-    content: NDArray[np.uint8], kind: MessageKind, at: NDArray[np.int64], clock: tuple[NDArray[np.int64], Array]
-) -> Array | None:
-    """Times [s]: the messages' own, or of the last message TIME before each (PX4 of old)."""
-    stamp = next((name for name in _STAMPS if name in kind.factors), None)
-    if stamp is not None:
-        return _column(content, kind, at, stamp) * _STAMPS[stamp]
-    place, time = clock
-    if not place.size:
-        return None
-    before = np.searchsorted(place, at) - 1
-    # Messages between two of TIME share a stamp: each but the first of its kind is left out by `read`.
-    return np.where(before >= 0, time[np.maximum(before, 0)], np.nan)
-
-
-def _clock(content: NDArray[np.uint8], kinds: Mapping[str, MessageKind]) -> tuple[NDArray[np.int64], Array]:
-    kind = kinds.get("TIME")
-    if kind is None or "StartTime" not in kind.factors:
-        return np.zeros(0, np.int64), np.zeros(0)
-    at = kind.at
-    return at, _column(content, kind, at, "StartTime") * 1e-6
-
-
-def _instances(
-    content: NDArray[np.uint8], kind: MessageKind, at: NDArray[np.int64], units: Mapping[str, tuple[str, float]]
-) -> Sequence[tuple[int | None, NDArray[np.int64]]]:
-    """Which messages are of which sensor or core, where the log tells several apart."""
-    every = np.arange(at.size)
-    instances = [field for field, (unit, _) in units.items() if unit == _INSTANCE]
-    names = instances or [field for field in _INSTANCES if field in kind.factors][:1]
-    if not names:
-        return [(None, every)]
-    number = _column(content, kind, at, names[0])
-    sensors = np.unique(number)
-    if not 1 < sensors.size <= _MOST_INSTANCES:
-        return [(None, every)]
-    return [(int(which), np.flatnonzero(number == which)) for which in sensors.tolist()]
-
-
-def _units(content: bytes, kinds: Mapping[str, MessageKind]) -> dict[str, dict[str, tuple[str, float]]]:
+def _units(content: Stored, kinds: Mapping[str, MessageKind]) -> dict[str, dict[str, tuple[str, float]]]:
     """Unit and factor by message and field, as the log's own messages FMTU, UNIT and MULT give them."""
     if not {"FMT", "FMTU", "UNIT", "MULT"} <= kinds.keys() | {"FMT"} or "FMTU" not in kinds:
         return {}
@@ -246,7 +247,7 @@ def _number(text: str) -> float:
 
 
 # ---- logs that are decoded as a whole --------------------------------------------------------------------------------
-Columns = tuple[NDArray[np.int64], Array, Mapping[str, Array]]
+Columns = tuple[Places, Array, Mapping[str, Array]]
 
 
 class _Decoded(LogFields):
@@ -259,7 +260,7 @@ class _Decoded(LogFields):
         ]
         self.listed = {field.name: field for field in fields}
 
-    def _samples(self, field: LogField) -> tuple[NDArray[np.int64], Array, Array]:
+    def _samples(self, field: LogField) -> tuple[Places, Array, Array]:
         place, time, columns = self._messages[field.message]
         return place, time, np.asarray(columns[field.field], dtype=np.float64)
 

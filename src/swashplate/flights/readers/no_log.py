@@ -17,8 +17,9 @@ _TITLE = re.compile(r"<title[^>]*>\s*(.*?)\s*</title>", re.IGNORECASE | re.DOTAL
 
 def refuse(source: Source) -> None:
     """Raises a FlightError where the file is a pointer of Git LFS, a page of the web, or JSON."""
-    if source.content.startswith(_POINTER):
-        size = re.search(rb"size (\d+)", source.content[:1024])
+    head = source.stored[:1024]
+    if head.startswith(_POINTER):
+        size = re.search(rb"size (\d+)", head)
         of = f" of a file of {int(size[1]):,} bytes" if size else ""
         raise FlightError(
             f"is a pointer of Git LFS{of}, and not that file.",

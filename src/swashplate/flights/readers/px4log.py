@@ -18,6 +18,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event
 from swashplate.flights.readers import ardupilot, checks, clocked, dataflash
 from swashplate.flights.readers.dataflash import Messages, MessageTable
+from swashplate.flights.readers.dataflash_index import is_dataflash
 from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 
@@ -60,7 +61,7 @@ _MESSAGES: Mapping[str, tuple[str, Mapping[str, tuple[str, str]]]] = {
 
 def recognises(source: Source) -> bool:
     """A DataFlash file whose stamps are messages of their own."""
-    return dataflash.is_dataflash(source.content) and ardupilot.is_px4(source.content)
+    return is_dataflash(source.stored) and ardupilot.is_px4(source.stored)
 
 
 def read(source: Source, options: Options) -> Flight:
@@ -70,7 +71,7 @@ def read(source: Source, options: Options) -> Flight:
         FlightError: where nothing in the log can be used, or a mapping is given.
     """
     refuse_mapping(options, "a PX4 log", where=source.name)
-    log = dataflash.messages(source.content)
+    log = dataflash.messages(source.stored)
     clock = log.get("TIME") or MessageTable({}, np.zeros(0, np.int64))
     (first, last), said = clocked.longest_run([(clock.place, clock.number("StartTime") / 1e6)])
     remarks = clocked.Remarks(list(log.notes), [*log.damage, *filter(None, (said,))])

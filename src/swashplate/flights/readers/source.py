@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import codecs
 import hashlib
+import mmap
 import os
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from swashplate.errors import FlightError
-from swashplate.files import read_bytes
+from swashplate.files import map_bytes, read_bytes
 from swashplate.flights.provenance import Provenance
 
 # The largest file that is read and the largest content it may unpack to: an hour at 400 Hz of 100 channels is 1.2 GB.
@@ -22,6 +27,29 @@ LARGEST_CONTENT = 2 << 30
 _FREE_CONTENT = 16 << 20
 _LARGEST_RATIO = 40
 _FOLDER_MARK = "metadata.yaml"  # of a rosbag2 folder
+_MAPPED = 16 << 20  # bytes from which a file is mapped: a reader that can looks at it where it lies
+RELEASED = 1 << 24
+"""Bytes of a mapped file that are looked at before its pages are given back."""
+
+Stored = bytes | mmap.mmap
+"""The bytes of a log, in memory or where they lie on disk."""
+Places = NDArray[np.uint32] | NDArray[np.int64]
+"""Where messages stand: increasing numbers. Bytes from a file's begin fit into 32 bits (`LARGEST_FILE`)."""
+
+
+def release(stored: Stored) -> None:
+    """Gives the pages of a mapped file that were looked at back to the system, which may keep them in its cache."""
+    if isinstance(stored, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+        stored.madvise(mmap.MADV_DONTNEED)
+
+
+def _hashed(stored: Stored) -> str:
+    digest = hashlib.sha256()
+    with memoryview(stored) as cells:
+        for begin in range(0, len(stored), RELEASED):
+            digest.update(cells[begin : begin + RELEASED])
+            release(stored)
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True)
@@ -30,11 +58,11 @@ class Source:
 
     Attributes:
         path: where it lies.
-        content: its bytes.
+        stored: its bytes, mapped where they are many.
     """
 
     path: Path
-    content: bytes
+    stored: Stored
 
     @property
     def name(self) -> str:
@@ -42,21 +70,34 @@ class Source:
 
     @property
     def size(self) -> int:
-        return len(self.content)
+        return len(self.stored)
 
     @cached_property
+    def content(self) -> bytes:
+        """Its bytes in memory."""
+        return self.stored if isinstance(self.stored, bytes) else self.stored[:]
+
+    @cached_property
+    def hashing(self) -> Future[str]:
+        """Its hash, from a thread: whoever asks early waits for nothing later."""
+        hasher = ThreadPoolExecutor(1)
+        hashed = hasher.submit(_hashed, self.stored)
+        hasher.shutdown(wait=False)
+        return hashed
+
+    @property
     def sha256(self) -> str:
-        return hashlib.sha256(self.content).hexdigest()
+        return self.hashing.result()
 
     @cached_property
     def text(self) -> str | None:
         """The content as text, None where it is binary."""
-        if self.content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):  # a spreadsheet's "Unicode text"
+        if self.stored[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):  # a spreadsheet's "Unicode text"
             try:
                 return self.content.decode("utf-16")
             except UnicodeDecodeError:
                 return None
-        if b"\0" in self.content:
+        if self.stored.find(b"\0") >= 0:
             return None
         try:
             return self.content.decode("utf-8-sig")
@@ -115,7 +156,7 @@ def _files(place: Path) -> list[Path]:
 
 
 def open_source(path: str | os.PathLike[str]) -> Source:
-    """Reads a log's bytes: those of a file, or of all files of a rosbag2 folder.
+    """A log's bytes: those of a file, or of all files of a rosbag2 folder.
 
     Raises:
         FlightError: where it is missing, a folder, unreadable, empty or too large.
@@ -130,12 +171,16 @@ def open_source(path: str | os.PathLike[str]) -> Source:
                 where=place,
                 hint="Split it into shorter flights.",
             )
-        content = b"".join(read_bytes(file, most=LARGEST_FILE) for file in files)
+        stored: Stored = (
+            map_bytes(place, most=LARGEST_FILE)
+            if files == [place] and size >= _MAPPED
+            else b"".join(read_bytes(file, most=LARGEST_FILE) for file in files)
+        )
     except FileNotFoundError:
         raise FlightError("there is no such file.", where=place, hint="Check the path.") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         reason = getattr(error, "strerror", None) or str(error)
         raise FlightError(f"cannot be read: {reason}.", where=place) from None
-    if not content:
+    if not stored:
         raise FlightError("the file is empty.", where=place, hint="Export or copy it again.")
-    return Source(place, content)
+    return Source(place, stored)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import made_autopilot_logs as made
-from swashplate.flights.readers import dataflash
+from swashplate.flights.readers import dataflash_index
 
 KNOWN = made.dataflash(made.ardupilot_rows(until=24.0))
 HEAD_INSIDE = made.dataflash([("MSG", (k, "\xa3\x95 is no head"[:12])) for k in range(40)])
@@ -14,7 +14,7 @@ DESCRIBED_LATE = KNOWN[89 * 4 :] + KNOWN
 
 
 def scanned(content: bytes) -> tuple[object, ...]:
-    scan = dataflash._Scan(content)
+    scan = dataflash_index.Scan(content)
     there = {number: (kind.name, kind.at.tolist()) for number, kind in scan.kinds.items() if kind.at.size}
     return there, scan.lost, scan.unfinished
 
@@ -22,7 +22,8 @@ def scanned(content: bytes) -> tuple[object, ...]:
 def walked(content: bytes) -> tuple[object, ...]:
     """Without the chain: types are learned on the way."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dataflash, "_heads", lambda _: np.zeros(0, dtype=np.int64))
+        nothing = (np.zeros(0, dtype=np.uint32), np.zeros(0, dtype=np.uint8))
+        patch.setattr(dataflash_index, "_heads", lambda _: nothing)
         return scanned(content)
 
 
@@ -43,7 +44,7 @@ def test_damage_by_chance(seed: int) -> None:
         elif kind == 1:
             content[at : at + length] = random.bytes(len(content[at : at + length]))
         elif kind == 2:
-            content[at:at] = dataflash.HEAD + bytes([int(random.integers(0, 256))])
+            content[at:at] = dataflash_index.HEAD + bytes([int(random.integers(0, 256))])
         else:
             content[at:] = b"\xff" * len(content[at:]) if random.random() < 0.3 else content[at : len(content) - length]
     assert scanned(bytes(content)) == walked(bytes(content))
