@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from swashplate.atomic import scratch_folder
+from swashplate.atomic import scratch_folder, write_text
 from swashplate.compiler import ran, web_compiler
 from swashplate.engine.emit import fill_template, print_graph
 from swashplate.engine.equations import equations_of
@@ -108,6 +108,7 @@ def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS, ready: bool =
     Raises:
         MissingLibraryError: without a compiler that makes it: ziglang (the extra `compiler`), or clang with wasm-ld.
         ExportError: where it refuses the source.
+        WriteError: where the folder for temporary files is full.
     """
     ships = READY / module_name(source, exports)
     if ready and ships.is_file():
@@ -118,7 +119,7 @@ def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS, ready: bool =
     bare = fill_template("bare.h", {}) + re.sub(r"#include <(?:math|string)\.h>\n", "", source)
     with scratch_folder() as folder:
         text, made = folder / "frame.c", folder / "frame.wasm"
-        text.write_text(bare, encoding="utf-8")
+        write_text(text, bare)
         shown = [f"-Wl,--export={name}" for name in exports]
         command = [*program, *_TARGET, f"-Wl,-z,stack-size={_STACK}", *_OPTIONS, *shown]
         code, _, said = ran([*command, "-o", str(made), str(text)], where="WebAssembly")

@@ -7,6 +7,8 @@ import gzip
 import json
 import re
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -127,20 +129,32 @@ def test_what_cannot_be_compiled_leaves_no_file(tmp_path: Path, monkeypatch: pyt
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.usefixtures("uncompiled")
-def test_a_full_disk_leaves_no_half_of_a_page(tmp_path: Path) -> None:
+@contextmanager
+def full_disk() -> Iterator[None]:
     """A limit on the size of files stands for it: what is written ends in the middle."""
     resource = pytest.importorskip("resource")
-    made = sp.export_model("coax", "web")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
     try:
-        with pytest.raises(WriteError, match=r"coax\.html"):
-            made.save(tmp_path / "out")
+        yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, before)
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_a_full_disk_leaves_no_half_of_a_page(tmp_path: Path) -> None:
+    made = sp.export_model("coax", "web")
+    with full_disk(), pytest.raises(WriteError, match=r"coax\.html"):
+        made.save(tmp_path / "out")
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
     (file,) = made.save(tmp_path / "out")
     assert file.stat().st_size > 100_000
+
+
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="the extra 'compiler' is not installed")
+def test_a_full_folder_for_temporary_files_is_named() -> None:
+    source = "double one(double x) { return x; }" + "/* long */" * 12_000
+    with full_disk(), pytest.raises(WriteError, match=r"frame\.c: cannot be written"):
+        frame_code.web_assembly(source, exports=["one"])
