@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from swashplate.engine.graph import Expression, Graph
 from swashplate.extras import library
-from swashplate.physics.backend import CasadiBackend
+from swashplate.physics.backend import CasadiBackend, Residual
 
 
 def require_casadi() -> Any:
@@ -59,9 +59,7 @@ class Looping(CasadiBackend):
         self.roots: list[Root] = []
         self._casadi = casadi
 
-    def newton(
-        self, residual: Callable[[Expression], tuple[Expression, Expression]], start: Expression, *, steps: int
-    ) -> Expression:
+    def newton(self, residual: Residual, start: Expression, *, steps: int) -> Expression:
         guess, root = (self._casadi.SX.sym(f"{name}{len(self.roots)}") for name in ("guess", "root"))
         value, slope = residual(guess)
         self.roots.append(Root(start, guess, value, slope, root, steps))

@@ -12,7 +12,7 @@ from swashplate.engine.equations import Equations, unpack_rows
 from swashplate.engine.graph import Expression, Graph
 from swashplate.engine.roots import Looping, require_casadi
 from swashplate.engine.untraced import untraced
-from swashplate.physics.backend import Backend, CasadiBackend, newton
+from swashplate.physics.backend import Backend, CasadiBackend, Residual
 
 Scalars = Callable[[Sequence[Expression], Sequence[Expression], Sequence[Expression], Backend], Sequence[Expression]]
 """`f(x, w, p, xp)`: a row of scalars of a state row, a driving row and a row of numbers."""
@@ -86,12 +86,9 @@ class _Recording(CasadiBackend):
     def __init__(self) -> None:
         super().__init__()
         self.roots: list[Expression] = []
-        self._plain = CasadiBackend()
 
-    def newton(
-        self, residual: Callable[[Expression], tuple[Expression, Expression]], start: Expression, *, steps: int
-    ) -> Graph:
-        self.roots.append(newton(residual, start, steps=steps, xp=self._plain))
+    def newton(self, residual: Residual, start: Expression, *, steps: int) -> Expression:
+        self.roots.append(super().newton(residual, start, steps=steps))
         return self.roots[-1]
 
 

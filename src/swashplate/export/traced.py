@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 
@@ -16,7 +16,7 @@ from swashplate.export.linear import Linear
 from swashplate.flights.schema import channel, is_known
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend, CasadiBackend, Scalar
+from swashplate.physics.backend import Backend, CasadiBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim
 
@@ -88,9 +88,8 @@ class _Remembering(CasadiBackend):
         super().__init__()
         self.hidden: list[tuple[Expression, Expression]] = []
         self._casadi = casadi
-        self.detached: Callable[[Scalar], Scalar] = self._hide
 
-    def _hide(self, x: Expression) -> Expression:
+    def detached(self, x: Expression) -> Expression:
         symbol = self._casadi.SX.sym(f"hidden_{len(self.hidden)}")
         self.hidden.append((symbol, x))
         return symbol

@@ -19,6 +19,10 @@ Named = Any
 """A named tuple of such numbers: parameters, inputs or outputs, with the names that its model has."""
 
 
+Residual = Callable[[Scalar], tuple[Scalar, Scalar]]
+"""What a root makes zero, and its derivative, at a point."""
+
+
 class Backend(Protocol):
     """The operations of an equation.
 
@@ -38,10 +42,41 @@ class Backend(Protocol):
     def where(self, condition: Scalar, x: Scalar, y: Scalar, /) -> Scalar: ...
     def minimum(self, x: Scalar, y: Scalar, /) -> Scalar: ...
     def maximum(self, x: Scalar, y: Scalar, /) -> Scalar: ...
-    def detached(self, x: Scalar, /) -> Scalar: ...
+    def newton(self, residual: Residual, start: Scalar, *, steps: int) -> Scalar: ...
 
 
-class FloatBackend:
+_DIFFERENTIATED = 2
+"""Newton steps that derivatives go through: one makes first derivatives exact, two second ones."""
+
+
+class UnrolledSearch:
+    """Newton's method in a fixed number of steps, for a back end that cannot leave a loop early."""
+
+    def detached(self, x: Scalar) -> Scalar:
+        """A value whose origin is hidden from differentiation, where there is any."""
+        return x
+
+    def newton(self, residual: Residual, start: Scalar, *, steps: int) -> Scalar:
+        """A root.
+
+        Automatic differentiation sees the last two steps only: at the solution they carry what the implicit function
+        theorem says, and the others nothing.
+
+        Args:
+            residual: what the root makes zero.
+            start: first guess.
+            steps: how many steps; choose it so that the last two no longer move the answer.
+        """
+        x = start
+        for step in range(steps):
+            if step == steps - _DIFFERENTIATED:
+                x = self.detached(x)
+            value, slope = residual(x)
+            x = x - value / slope
+        return x
+
+
+class FloatBackend(UnrolledSearch):
     """Plain Python floats: slow, and good for looking at one evaluation by hand."""
 
     arrays: Any = np
@@ -58,12 +93,8 @@ class FloatBackend:
     def where(condition: bool, x: float, y: float) -> float:
         return x if condition else y
 
-    @staticmethod
-    def detached(x: float) -> float:
-        return x
 
-
-class ArrayBackend:
+class ArrayBackend(UnrolledSearch):
     """Arrays: a whole record at once by NumPy, or by other functions of the same names."""
 
     def __init__(self, arrays: Any = np) -> None:
@@ -71,10 +102,9 @@ class ArrayBackend:
         self.sin, self.cos, self.tan, self.sqrt = arrays.sin, arrays.cos, arrays.tan, arrays.sqrt
         self.atan2, self.abs, self.where = arrays.arctan2, arrays.abs, arrays.where
         self.minimum, self.maximum = arrays.minimum, arrays.maximum
-        self.detached: Callable[[Scalar], Scalar] = _same
 
 
-class CasadiBackend:
+class CasadiBackend(UnrolledSearch):
     """CasADi expressions: export to C and FMU (needs the extra `model`)."""
 
     def __init__(self) -> None:
@@ -84,36 +114,3 @@ class CasadiBackend:
         self.sin, self.cos, self.tan, self.sqrt = casadi.sin, casadi.cos, casadi.tan, casadi.sqrt
         self.atan2, self.abs, self.where = casadi.atan2, casadi.fabs, casadi.if_else
         self.minimum, self.maximum = casadi.fmin, casadi.fmax
-        self.detached: Callable[[Scalar], Scalar] = _same
-
-
-def _same(x: Scalar) -> Scalar:
-    return x
-
-
-_DIFFERENTIATED = 2
-"""Newton steps that derivatives go through: one makes first derivatives exact, two second ones."""
-
-
-def newton(residual: Callable[[Scalar], tuple[Scalar, Scalar]], start: Scalar, *, steps: int, xp: Backend) -> Scalar:
-    """A fixed number of Newton steps, unrolled so that every backend can trace them.
-
-    Automatic differentiation sees the last two only: at the solution they carry what the implicit function theorem
-    says, and the others nothing (`xp.detached` hides a value's origin from differentiation).
-
-    Args:
-        residual: returns the residual and its derivative at a point.
-        start: first guess.
-        steps: how many steps; choose it so that the last two no longer move the answer.
-        xp: the operations.
-    """
-    solver = getattr(xp, "newton", None)  # a back end that can end a loop early may do so
-    if solver is not None:
-        return solver(residual, start, steps=steps)
-    x = start
-    for step in range(steps):
-        if step == steps - _DIFFERENTIATED:
-            x = xp.detached(x)
-        value, slope = residual(x)
-        x = x - value / slope
-    return x

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from swashplate.physics.backend import Backend, Scalar, newton
+from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.blade_element import FlapMoments
 
 RING = 0.125
@@ -59,7 +59,7 @@ def momentum_inflow(free: Scalar, loss: Scalar, mu_z: Scalar, mu2: Scalar, xp: B
         v, _, slope = mass_flow(lam0, mu_z, mu2, xp)
         return 2.0 * lam0 * v + loss * lam0 - free, 2.0 * v + lam0 * slope / v + loss
 
-    return newton(residual, start, steps=NEWTON_STEPS, xp=xp)
+    return xp.newton(residual, start, steps=NEWTON_STEPS)
 
 
 def wake_skew(lam0: Scalar, mu_x: Scalar, mu_y: Scalar, mu_z: Scalar, xp: Backend) -> tuple[Scalar, Scalar]:
