@@ -113,13 +113,13 @@ def unrest_of(card: Card) -> Unrest:
     noise = card.observer.get("noise", {})
     if not noise or noise.get("wind", 0.0) > 0.0:
         return Unrest()
-    own = {name: noise.get(name, 0.0) or noise[shared] for name, (shared, *_) in SEPARATE.items() if "tau" in name}
+    rates = {name: noise.get(name, 0.0) or noise[shared] for name, (shared, *_) in SEPARATE.items() if "tau" in name}
     force, moment = np.sqrt(0.5 * noise["tau_gust_force"]), np.sqrt(0.5 * noise["tau_gust_moment"])
     return Unrest(
         force=float(force * noise["gust_horizontal"]),
-        force_down=float(np.sqrt(0.5 * own["tau_gust_vertical"]) * noise["gust_vertical"]),
+        force_down=float(np.sqrt(0.5 * rates["tau_gust_vertical"]) * noise["gust_vertical"]),
         moment=float(moment * noise["gust_tilt"]),
-        moment_yaw=float(np.sqrt(0.5 * own["tau_gust_yaw"]) * noise["gust_yaw"]),
+        moment_yaw=float(np.sqrt(0.5 * rates["tau_gust_yaw"]) * noise["gust_yaw"]),
         force_time=noise["tau_gust_force"],
         moment_time=noise["tau_gust_moment"],
         jolt=max(noise["white_horizontal"], noise["white_vertical"]),

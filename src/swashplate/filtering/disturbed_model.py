@@ -80,8 +80,8 @@ class StochasticModel:
         here = {name: x[self.vehicle.index(name)] for name in (*POSITION, *ATTITUDE, *self.output_names)}
         place, attitude = Vector(*map(here.get, POSITION)), Euler(*map(here.get, ATTITUDE))
         shown = [part._asdict() for part in tracked_pose(place, attitude, nuisance, xp)]
-        seen = {**here, **shown[0], **shown[1]}
-        return xp.arrays.stack([seen[name] for name in self.output_names])
+        readings = {**here, **shown[0], **shown[1]}
+        return xp.arrays.stack([readings[name] for name in self.output_names])
 
     @property
     def disturbed(self) -> list[int]:

@@ -57,8 +57,8 @@ def filter_source(model: StochasticModel) -> str:
     sizes = (len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2, len(vehicle.state_names))
     given = [casadi.SX.sym(name, correct.size1_in(i)) for i, name in enumerate("syg")]
     beside = [casadi.SX.sym(name, size) for name, size in zip("wpk", sizes, strict=True)]
-    whole = casadi.Function("f", [*given, *beside], correct(*given), {"cse": True})
-    sample = Sample(whole, model.disturbed, windy=model.windy)
+    sampled = casadi.Function("f", [*given, *beside], correct(*given), {"cse": True})
+    sample = Sample(sampled, model.disturbed, windy=model.windy)
     return sample_source(model.equations, sample, partial(_following, model) if model.windy else None)
 
 
@@ -79,8 +79,8 @@ def sample_source(equations: Equations, sample: Sample, following: Following | N
     of_sample = Tangents({name: (f"d{name}", None) for name in ("s", "g", "p", "k")})
     correcting = [*of_sample.body(corrected.body), *of_sample.stores(corrected, dict(enumerate(_FOUND)))]
     rates = traced_rates(equations)
-    whole = statements(rates.function, precision="double", inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
-    of_card, rest = split(whole, moving=("x[", "w[", *ROOTS), fixed="cp")
+    source = statements(rates.function, precision="double", inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
+    of_card, rest = split(source, moving=("x[", "w[", *ROOTS), fixed="cp")
     follow = following(rest, rates.steps) if following else ""
     of_inputs, rest = split(rest)
     driven = frozenset(range(m + 3))  # not the voltage
@@ -157,8 +157,8 @@ def sensing(model: StochasticModel) -> Graph:
     casadi = require_casadi()
     xp, n = _Symbols(casadi), len(model.vehicle.state_names)
     s, g = casadi.SX.sym("s", n + model.n_gusts + N_DISTURBANCES), casadi.SX.sym("g", len(Nuisance._fields))
-    seen = model.measure(s[:n], Nuisance(*casadi.vertsplit(g)), xp)
-    return casadi.Function("sense", [s, g], [casadi.densify(seen), casadi.jacobian(seen, s)], {"cse": True})
+    readings = model.measure(s[:n], Nuisance(*casadi.vertsplit(g)), xp)
+    return casadi.Function("sense", [s, g], [casadi.densify(readings), casadi.jacobian(readings, s)], {"cse": True})
 
 
 def _indented(lines: list[str]) -> str:

@@ -63,9 +63,9 @@ class FilterLibrary:
 
     def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
         n = len(series.readings)
-        told = np.empty((n, self._outputs)), np.empty((n, fixed.start.size)), np.empty((n, 4, self._roots))
-        self._c.run_along(n, dt, *map(flat, fixed), *map(flat, series), *told)
-        return told
+        out = np.empty((n, self._outputs)), np.empty((n, fixed.start.size)), np.empty((n, 4, self._roots))
+        self._c.run_along(n, dt, *map(flat, fixed), *map(flat, series), *out)
+        return out
 
     def filter_slopes(
         self, dt: float, fixed: Fixed, series: RecordSeries, went: Array, along: Along
@@ -89,22 +89,22 @@ class FilterLibrary:
         self, dt: float, x: Array, pushed: Pushed, numbers: Array, directions: tuple[Array, Pushed, Array]
     ) -> tuple[Array, Array]:
         after, (dx, d_pushed, d_numbers) = np.array(x, dtype=np.float64, order="C"), directions
-        moved = np.array(dx, dtype=np.float64, order="C")
-        here = after, *map(flat, pushed), flat(numbers), moved, *map(flat, d_pushed), flat(d_numbers)
-        self._c.run_steps_moved(len(after), len(moved), dt, *here)
-        return after, moved
+        slope = np.array(dx, dtype=np.float64, order="C")
+        here = after, *map(flat, pushed), flat(numbers), slope, *map(flat, d_pushed), flat(d_numbers)
+        self._c.run_steps_moved(len(after), len(slope), dt, *here)
+        return after, slope
 
     def follow(self, dt: float, begin: Following, series: RecordSeries) -> Followed:
         rows, n, y, joined = len(begin.states), len(series.readings), self._outputs, begin.states.shape[1]
-        told = Followed(np.empty((rows, n, y)), np.empty((rows, n, y, y)), np.empty((rows, n, joined)))
+        out = Followed(np.empty((rows, n, y)), np.empty((rows, n, y, y)), np.empty((rows, n, joined)))
         here = flat(series.readings), flat(series.driving.swapaxes(0, 1))
-        self._c.run_following(rows, n, dt, *map(flat, begin), *here, *told)
-        return told
+        self._c.run_following(rows, n, dt, *map(flat, begin), *here, *out)
+        return out
 
     def rates(self, x: Array, w: Array, p: Array) -> Array:
-        told = np.empty(x.shape)
-        self._c.run_rates(math.prod(x.shape[:-1]), *map(flat, (x, w, p)), told)
-        return told
+        out = np.empty(x.shape)
+        self._c.run_rates(math.prod(x.shape[:-1]), *map(flat, (x, w, p)), out)
+        return out
 
     def rates_and_slopes(self, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
         """As `engine.slopes.rates_and_slopes`, with any axes in front; slopes by the voltage are left at zero."""

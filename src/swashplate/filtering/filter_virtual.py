@@ -49,8 +49,8 @@ class VirtualFilter:
     def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
         casadi, n = require_casadi(), len(series.readings)
         rows = (*(part.T for part in series), np.tile(fixed.given[:, None], n))
-        told = self._sample.mapaccum(n)(fixed.start, *rows, np.tile(fixed.numbers[:, None], n))
-        following, innovations, corrected = (np.asarray(casadi.DM(part).full()).T for part in told)
+        parts = self._sample.mapaccum(n)(fixed.start, *rows, np.tile(fixed.numbers[:, None], n))
+        following, innovations, corrected = (np.asarray(casadi.DM(part).full()).T for part in parts)
         return innovations, corrected, np.concatenate([fixed.start[None], following[:-1]])
 
     @cached_property
@@ -90,8 +90,8 @@ class VirtualFilter:
             pushed = Pushed(w, acting[:, :N_DISTURBANCES])
             planes, further = self._planes(dt, corrected[:, : self._n], pushed, fixed.numbers, directions.numbers)
             for k, i in enumerate(range(here.start, here.stop)):
-                told = by_state[k] @ ds + by_given[k]
-                d_nu, d_corrected, d_acting, d_rest = np.split(told, ends)
+                change = by_state[k] @ ds + by_given[k]
+                d_nu, d_corrected, d_acting, d_rest = np.split(change, ends)
                 slopes[:, i] = d_nu.T
                 states[:, marks == i] = d_corrected.T[:, None]
                 d_w = np.zeros((self._m + 4, count))
@@ -107,7 +107,7 @@ class VirtualFilter:
         """Slopes of a correction's results by the predicted state (rows, results, joined) and along the directions of
         what is given (rows, results, count); the corrected states and what acts."""
         _, corrected, acting, _, by_state = self._correction(states, readings, fixed.given)
-        by_given = [self._given_moved(states, readings, fixed.given, moved)[0] for moved in directions.given]
+        by_given = [self._given_moved(states, readings, fixed.given, given)[0] for given in directions.given]
         return by_state, np.stack(by_given, axis=2), (corrected, acting)
 
     @cached_property
@@ -123,8 +123,8 @@ class VirtualFilter:
         casadi, correct = require_casadi(), correction(self._model)
         s, y, g = (casadi.SX.sym(name, correct.size1_in(i)) for i, name in enumerate("syg"))
         dg = casadi.SX.sym("dg", g.size1())
-        moved = casadi.jtimes(casadi.vertcat(*correct(s, y, g)), g, dg)
-        return OnArrays(casadi.Function("given", [s, y, g, dg], [moved], {"cse": True}))
+        slopes = casadi.jtimes(casadi.vertcat(*correct(s, y, g)), g, dg)
+        return OnArrays(casadi.Function("given", [s, y, g, dg], [slopes], {"cse": True}))
 
     # ---- steps -------------------------------------------------------------------------------------------------
     def step(self, dt: float, x: Array, pushed: Pushed, numbers: Array) -> Array:
@@ -142,22 +142,22 @@ class VirtualFilter:
         at = np.concatenate([dx, d_pushed.driving, d_pushed.push], axis=2).transpose(1, 2, 0)
         return self.step(dt, x, pushed, numbers), (planes @ at + further).transpose(2, 0, 1)
 
-    def _planes(self, dt: float, x: Array, pushed: Pushed, numbers: Array, moved: Array) -> tuple[Array, Array]:
+    def _planes(self, dt: float, x: Array, pushed: Pushed, numbers: Array, along: Array) -> tuple[Array, Array]:
         """Slopes of a step by states, driving and push (rows, states, all three), and along directions of the numbers
         (rows, states, count)."""
-        n, w, count = self._n, pushed.driving.shape[1], len(moved)
+        n, w, count = self._n, pushed.driving.shape[1], len(along)
         unit = np.broadcast_to(np.eye(n, n + w + N_DISTURBANCES + count), (len(x), n, n + w + N_DISTURBANCES + count))
         k, by_k, total, push = np.zeros_like(x), np.zeros(unit.shape), unit.copy(), pushed.push @ self._pushed.T
-        own = np.flatnonzero(np.any(moved != 0.0, axis=0))
-        slopes = _slopes(self._model.equations, tuple(own.tolist()))
+        used = np.flatnonzero(np.any(along != 0.0, axis=0))
+        slopes = _slopes(self._model.equations, tuple(used.tolist()))
         for fraction, weight in zip(_FRACTIONS, _WEIGHTS, strict=True):
             rates, by_x, by_w, by_p = slopes(x + fraction * dt * k, pushed.driving, numbers)
             k = rates + push
             by_k = by_x @ (unit + fraction * dt * by_k)
             by_k[:, :, n : n + w] += by_w
             by_k[:, :, n + w : n + w + N_DISTURBANCES] += self._pushed
-            if own.size:
-                by_k[:, :, n + w + N_DISTURBANCES :] += by_p.reshape(len(x), n, own.size) @ moved[:, own].T
+            if used.size:
+                by_k[:, :, n + w + N_DISTURBANCES :] += by_p.reshape(len(x), n, used.size) @ along[:, used].T
             total += weight * dt * by_k
         return total[:, :, : n + w + N_DISTURBANCES], total[:, :, n + w + N_DISTURBANCES :]
 

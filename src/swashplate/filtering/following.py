@@ -67,21 +67,21 @@ class FollowingRows:
         C = np.zeros((len(nu), len(y), self._joined))
         C[:, :, :n] = measured_slopes(model, self.state.x, self._nuisance)
         C *= read[:, None]
-        seen = C @ P
-        S = seen @ np.swapaxes(C, 1, 2) + diagonal(self._given.sensors)
-        K = np.swapaxes(np.linalg.solve(S, seen), 1, 2)
+        cross = C @ P
+        S = cross @ np.swapaxes(C, 1, 2) + diagonal(self._given.sensors)
+        K = np.swapaxes(np.linalg.solve(S, cross), 1, 2)
         move = (K @ nu[:, :, None])[:, :, 0]
-        moved = zip(self.state, np.split(move, self._ends, axis=1), strict=True)
-        self.state = FilterState(*(part + added for part, added in moved))
-        self.covariance = P - K @ seen
+        parts = zip(self.state, np.split(move, self._ends, axis=1), strict=True)
+        self.state = FilterState(*(part + added for part, added in parts))
+        self.covariance = P - K @ cross
         return nu, S
 
     def predicted(self, w: Array) -> None:
         """One sample later, averaged over what is not known of the air speed (w: what drives, by row)."""
         model, n, g, d, P = self._model, self._n, self._model.n_gusts, N_DISTURBANCES, self.covariance
         air, m, numbers, given = self._air(), w.shape[1] - 4, self._given.numbers, self._given
-        whole = np.concatenate([np.broadcast_to(air.speeds, (len(w), 2, n)), air.wind], axis=2)
-        spread = np.sqrt(np.maximum(np.einsum("ris,rst,rit->ri", whole, P, whole, optimize=True), STILL))
+        total = np.concatenate([np.broadcast_to(air.speeds, (len(w), 2, n)), air.wind], axis=2)
+        spread = np.sqrt(np.maximum(np.einsum("ris,rst,rit->ri", total, P, total, optimize=True), STILL))
         acting = self.state.gust + np.pad(self.state.drift, ((0, 0), (0, g - d)))
         driving = w.copy()
         driving[:, m : m + g - d] += acting[:, d:]
@@ -108,25 +108,25 @@ class FollowingRows:
         # Disturbances go on by themselves: F is full in the states' rows alone.
         rows = np.concatenate([by_x, by_gust, by_gust[:, :, :d]], axis=2)
         led, kept = rows @ P, self._lasting
-        moved = np.empty_like(P)
-        moved[:, :n, :n] = led @ np.swapaxes(rows, 1, 2)
-        moved[:, :n, n:] = led[:, :, n:] @ np.swapaxes(kept, 1, 2)
-        moved[:, n:, :n] = np.swapaxes(moved[:, :n, n:], 1, 2)
-        moved[:, n:, n:] = kept @ P[:, n:, n:] @ np.swapaxes(kept, 1, 2)
+        ahead = np.empty_like(P)
+        ahead[:, :n, :n] = led @ np.swapaxes(rows, 1, 2)
+        ahead[:, :n, n:] = led[:, :, n:] @ np.swapaxes(kept, 1, 2)
+        ahead[:, n:, :n] = np.swapaxes(ahead[:, :n, n:], 1, 2)
+        ahead[:, n:, n:] = kept @ P[:, n:, n:] @ np.swapaxes(kept, 1, 2)
         push = by_gust[:, :, :d]
-        moved[:, :n, :n] += (push * given.white[:, None]) @ np.swapaxes(push, 1, 2) + np.diag(model.unexcited)
-        moved[:, n:, n:] += diagonal(given.added)
+        ahead[:, :n, :n] += (push * given.white[:, None]) @ np.swapaxes(push, 1, 2) + np.diag(model.unexcited)
+        ahead[:, n:, n:] += diagonal(given.added)
         state = self.state
         self.state = FilterState(after + model.dt * apart, given.fade * state.gust, state.drift)
-        self.covariance = 0.5 * (moved + np.swapaxes(moved, 1, 2))
+        self.covariance = 0.5 * (ahead + np.swapaxes(ahead, 1, 2))
 
     @cached_property
     def _lasting(self) -> Array:
         """How gusts and drifts go on (rows, both, both)."""
         given, g = self._given, self._model.n_gusts
-        whole = np.tile(np.eye(self._joined - self._n), (len(given.fade), 1, 1))
-        whole[:, range(g), range(g)] = given.fade
-        return whole
+        factor = np.tile(np.eye(self._joined - self._n), (len(given.fade), 1, 1))
+        factor[:, range(g), range(g)] = given.fade
+        return factor
 
     @cached_property
     def _pushed(self) -> Array:
@@ -144,12 +144,12 @@ class FollowingRows:
 
 def followed(model: StochasticModel, code: FilterCode, begin: Following, series: RecordSeries) -> Followed:
     """The rows along a record."""
-    beside, told = FollowingRows(model, code, begin), []
+    beside, samples = FollowingRows(model, code, begin), []
     for y, w in zip(*series, strict=True):
         nu, S = beside.corrected(y)
-        told.append((nu, S, np.concatenate(beside.state, axis=1)))
+        samples.append((nu, S, np.concatenate(beside.state, axis=1)))
         beside.predicted(w)
-    return Followed(*(np.stack(part, axis=1) for part in zip(*told, strict=True)))
+    return Followed(*(np.stack(part, axis=1) for part in zip(*samples, strict=True)))
 
 
 def measured_slopes(model: StochasticModel, x: Array, nuisance: Nuisance) -> Array:

@@ -58,8 +58,8 @@ class Matrices:
         if key not in self._made:
             xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
             values = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
-            told = [values, casadi.jacobian(values, xs)] if slopes else [values]
-            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], told)
+            outputs = [values, casadi.jacobian(values, xs)] if slopes else [values]
+            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], outputs)
         return self._made[key]
 
     def updated(
@@ -89,8 +89,8 @@ class Matrices:
             if i + 1 < m:
                 left = left[1:, 1:] - row[:, 1 : m - i].T @ row[:, 1:]
         known = self.stacked(rows)
-        told, news = known[:, : mean.shape[0]], known[:, mean.shape[0] :]
-        return mean + told.T @ news, covariance - told.T @ told, spread
+        scaled, news = known[:, : mean.shape[0]], known[:, mean.shape[0] :]
+        return mean + scaled.T @ news, covariance - scaled.T @ scaled, spread
 
     def propagated(
         self, A: Expression, J: Expression | None, P: Expression, process: Expression, dt: float, /
@@ -102,9 +102,9 @@ class Matrices:
             J: slopes (kept, N) of the readings put in store, the last of it; None for none.
             P: now. process: variance that a sample adds to each. dt: length of the sample [s].
         """
-        moves, own = A.shape[0], P.shape[0] - (0 if J is None else J.shape[0])
+        moves, fixed = A.shape[0], P.shape[0] - (0 if J is None else J.shape[0])
         F, _ = held_series(A, dt, np.eye(moves))
         for _ in range(2):  # rows of what moves, of offsets, of kept readings; then from the other side
             stored = [] if J is None else [J @ P]
-            P = self.stacked([F @ P[:moves, :], P[moves:own, :], *stored]).T
+            P = self.stacked([F @ P[:moves, :], P[moves:fixed, :], *stored]).T
         return 0.5 * (P + P.T) + self.diagonal(process)

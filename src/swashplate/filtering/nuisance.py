@@ -35,17 +35,17 @@ def commands_moved(vehicle: Vehicle, dt: float, inputs: Array, nuisance: Nuisanc
     return b + 0.5 * t * (first + t * (second + t * third)), np.where(wanted == place, -slope / dt, 0.0)
 
 
-def commands_by(vehicle: Vehicle, late: Array, names: Sequence[str]) -> Array:
+def commands_by(vehicle: Vehicle, slope: Array, names: Sequence[str]) -> Array:
     """Slopes of the arriving commands by some of a record's own numbers (names, n, n_inputs).
 
     Args:
-        late: slopes by each input's delay, of `commands_moved`. names: of `Nuisance`; most move no command.
+        slope: slopes by each input's delay, of `commands_moved`. names: of `Nuisance`; most move no command.
     """
     motor = np.array(motors(vehicle))
-    ways = {"delay_motor": late * motor, "delay_servo": late * ~motor}
+    ways = {"delay_motor": slope * motor, "delay_servo": slope * ~motor}
     for j, name in enumerate(vehicle.input_names):
-        ways[f"trim_{name}"] = np.tile(np.arange(len(motor)) == j, (len(late), 1)).astype(float)
-    return np.stack([ways.get(name, np.zeros_like(late)) for name in names])
+        ways[f"trim_{name}"] = np.tile(np.arange(len(motor)) == j, (len(slope), 1)).astype(float)
+    return np.stack([ways.get(name, np.zeros_like(slope)) for name in names])
 
 
 def motors(vehicle: Vehicle) -> list[bool]:

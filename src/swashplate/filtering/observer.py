@@ -37,15 +37,15 @@ class Sampling:
     """When a sensor is heard, in samples of the controller: every so many, so many late, with so many readings kept."""
 
     every: int
-    late: int
+    delay: int
 
     @property
     def kept(self) -> int:
-        return -(-self.late // self.every)
+        return -(-self.delay // self.every)
 
     @property
     def arrives(self) -> int:
-        return self.late % self.every
+        return self.delay % self.every
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class ObserverPlan:
     @property
     def names(self) -> tuple[str, ...]:
         """Everything that is estimated."""
-        late = [
+        delayed = [
             f"{sensor.kind}.{name} {i + 1} ago"
             for sensor, at in zip(self.sensors, self.sampling, strict=True)
             for i in range(at.kept)
@@ -114,7 +114,7 @@ class ObserverPlan:
             *(f"disturbance {name}" for name in DISTURBED),
             *(f"parameter {name}" for name in self.slow),
             *(f"bias {name}" for name in self.biases),
-            *late,
+            *delayed,
         )
 
     def checked(self) -> ObserverPlan:
@@ -170,9 +170,9 @@ def process_noise(plan: ObserverPlan, unrest: Unrest) -> tuple[Array, Array]:
     states = [white.get(n, inner[role]) ** 2 * dt for n, role in zip(vehicle.state_names, vehicle.roles, strict=True)]
     spread = u.spread**2 * (1.0 - np.exp(-2.0 * fade * dt))
     wander = [BIASED[name][1] ** 2 * dt for name in plan.biases]
-    late = len(plan.names) - plan.moves - len(wander)
+    waiting = len(plan.names) - plan.moves - len(wander)
     # A stored reading is not disturbed; the last digit keeps the covariance positive in rounding.
-    return fade, np.array([*states, *spread, *[0.0] * len(plan.slow), *wander, *[0.0] * late])
+    return fade, np.array([*states, *spread, *[0.0] * len(plan.slow), *wander, *[0.0] * waiting])
 
 
 def measurement_noise(plan: ObserverPlan) -> Array:
@@ -263,8 +263,8 @@ OfObserver = Callable[[ObserverPlan, Numbers, Row, Row, Backend], list[Scalar]]
 
 def linearised_at(of: OfObserver, plan: ObserverPlan, numbers: Numbers, e: Array, w: Array) -> tuple[Array, Array]:
     """Value (m,) and slopes by what is estimated (m, N) at estimates (N,) under a driving row."""
-    plain = Numbers(*(None if part is None else np.asarray(part).tolist() for part in numbers))
-    slopes = slopes_of(lambda e, w, _, xp: of(plan, plain, e, w, xp), (len(e), len(w), 0), where="the observer")
+    listed = Numbers(*(None if part is None else np.asarray(part).tolist() for part in numbers))
+    slopes = slopes_of(lambda e, w, _, xp: of(plan, listed, e, w, xp), (len(e), len(w), 0), where="the observer")
     return slopes(e, w, np.zeros(0))[:2]
 
 
@@ -324,19 +324,19 @@ def predicted(
     """
     xp, dt = M.xp, plan.dt
     begin, P = estimate
-    moves, own = plan.moves, plan.moves + len(plan.biases)
+    moves, fixed = plan.moves, plan.moves + len(plan.biases)
 
     def rates(e: Row, w: Row) -> list[Scalar]:
         return moving(plan, numbers, e, w, xp)
 
     x = begin[:moves, :]
-    moved = M.change(rates, x, w, dt)
-    _, A = M.linearised(rates, x + 0.5 * moved, w)
-    mean, J = [x + moved, begin[moves:own, :]], None
+    change = M.change(rates, x, w, dt)
+    _, A = M.linearised(rates, x + 0.5 * change, w)
+    mean, J = [x + change, begin[moves:fixed, :]], None
     if any(at.kept for at in plan.sampling):
 
         def kept(e: Row, w: Row) -> list[Scalar]:
-            return keeping(plan, numbers, e, w, xp)[own:]
+            return keeping(plan, numbers, e, w, xp)[fixed:]
 
         readings, J = M.linearised(kept, begin, M.column([*M.scalars(w), *taken]))
         mean.append(readings)

@@ -89,11 +89,11 @@ def steady_gains(plan: ObserverPlan, numbers: Numbers, model: LinearModel, perio
     for A, rows in steps:
         information = (rows * scale).T @ ((rows * scale) / noise[:, None])
         maps.append((A * scale / scale[:, None], information, Q / np.outer(scale, scale)))
-    whole = maps[0]
+    cycle = maps[0]
     for step in maps[1:]:
-        whole = followed(whole, step)
+        cycle = followed(cycle, step)
     try:
-        P = settled_covariance(whole)
+        P = settled_covariance(cycle)
     except np.linalg.LinAlgError:
         raise ControllerError(
             "the observer's covariance does not settle.",
@@ -128,8 +128,8 @@ def _cycle(plan: ObserverPlan, numbers: Numbers, model: LinearModel, period: int
 
 def _first(plan: ObserverPlan, N: int) -> Array:
     variances = np.full(N, 1e-4)
-    own = plan.n + 6 + len(plan.biases)
-    variances[:own] = observer.start_variance(plan, disturbances.Unrest())
+    first = plan.n + 6 + len(plan.biases)
+    variances[:first] = observer.start_variance(plan, disturbances.Unrest())
     return np.diag(variances)
 
 
@@ -179,13 +179,13 @@ def steady_sigmas(plan: ObserverPlan, numbers: Numbers, model: LinearModel) -> A
     steps = []
     for (A, rows), gain in zip(_cycle(plan, numbers, model, plan.period), np.asarray(numbers.steady), strict=True):
         steps.append((A @ (np.eye(N) - gain @ rows), A @ gain @ R @ gain.T @ A.T + Q))
-    whole, added = np.eye(N), np.zeros((N, N))
-    for moved, more in steps:
-        whole, added = moved @ whole, moved @ added @ moved.T + more
+    cycle, added = np.eye(N), np.zeros((N, N))
+    for step, more in steps:
+        cycle, added = step @ cycle, step @ added @ step.T + more
     for _ in range(_DOUBLINGS):
-        added, whole = added + whole @ added @ whole.T, whole @ whole
+        added, cycle = added + cycle @ added @ cycle.T, cycle @ cycle
     variances = []
-    for moved, more in steps:
+    for step, more in steps:
         variances.append(np.diag(added))
-        added = moved @ added @ moved.T + more
+        added = step @ added @ step.T + more
     return np.asarray(np.sqrt(np.mean(variances, axis=0)))

@@ -23,13 +23,13 @@ def diagonal(rows: Array) -> Array:
 def blocks(rows: Sequence[Sequence[Array | None]], sizes: tuple[int, ...]) -> Array:
     """Matrices of blocks of these sizes, with any axes in front; None is zeros."""
     front = np.broadcast_shapes(*(block.shape[:-2] for row in rows for block in row if block is not None))
-    whole = np.zeros((*front, sum(sizes), sum(sizes)))
+    joined = np.zeros((*front, sum(sizes), sum(sizes)))
     ends = np.concatenate([[0], np.cumsum(sizes)])
     for i, row in enumerate(rows):
         for j, block in enumerate(row):
             if block is not None:
-                whole[..., ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = block
-    return whole
+                joined[..., ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = block
+    return joined
 
 
 STEP = 1e-30
@@ -107,26 +107,26 @@ def followed(first: Map, second: Map) -> Map:
     return (A1.T @ by_A).T, G1 + A1.T @ by_G @ A1, H2 + A2 @ H1 @ by_A
 
 
-def settled_covariance(whole: Map) -> Array:
+def settled_covariance(cycle: Map) -> Array:
     """The covariance that a map leaves as it is, by doubling.
 
     Raises:
         numpy.linalg.LinAlgError: where it does not settle (something that lasts is not seen).
     """
-    P, change = _doubled(whole, _MOST_DOUBLINGS)
+    P, change = _doubled(cycle, _MOST_DOUBLINGS)
     if not np.all(np.isfinite(P)) or change > _NEARLY:
         raise np.linalg.LinAlgError("the covariance does not settle")
     return P
 
 
-def _doubled(whole: Map, most: int) -> tuple[Array, float]:
+def _doubled(cycle: Map, most: int) -> tuple[Array, float]:
     """The covariance after a map has doubled so many times or settled, and the share by which the last one moved it."""
-    P, change = whole[2], np.inf
+    P, change = cycle[2], np.inf
     for _ in range(most):
-        A, G, H = followed(whole, whole)
-        whole = A, 0.5 * (G + G.T), 0.5 * (H + H.T)
-        change = float(np.max(np.abs(whole[2] - P))) / max(float(np.max(np.abs(whole[2]))), 1e-300)
-        P = whole[2]
+        A, G, H = followed(cycle, cycle)
+        cycle = A, 0.5 * (G + G.T), 0.5 * (H + H.T)
+        change = float(np.max(np.abs(cycle[2] - P))) / max(float(np.max(np.abs(cycle[2]))), 1e-300)
+        P = cycle[2]
         if not np.all(np.isfinite(P)) or change < _SETTLED:
             break
     return P, change
@@ -137,7 +137,7 @@ def gain_at(P: Array, C: Array, R: Array) -> Array:
     return np.asarray(np.linalg.solve(C @ P @ C.T + R, C @ P).T, dtype=np.float64)
 
 
-def _pushed(P: Array, here: Matrices, moved: Matrices) -> tuple[Array, Array]:
+def _pushed(P: Array, here: Matrices, change: Matrices) -> tuple[Array, Array]:
     """F and W of the Lyapunov equation of a change; changes may come as stacks (..., n, n).
 
     With P+ = (P^-1 + C' R^-1 C)^-1, the covariance after a measurement, P = A P+ A' + Q. Hence dP = F dP F' + W with
@@ -145,7 +145,7 @@ def _pushed(P: Array, here: Matrices, moved: Matrices) -> tuple[Array, Array]:
     has settled within 2^16 samples.
     """
     A, C, _, R = here
-    dA, dC, dQ, dR = moved
+    dA, dC, dQ, dR = change
     K = gain_at(P, C, R)
     after = P - K @ C @ P
     AK = A @ K
@@ -176,15 +176,15 @@ def steady_gain(A: Array, C: Array, Q: Array, R: Array) -> tuple[Array, Array, A
         return np.full((n, m), np.nan), np.full((m, m), np.nan), np.full((n, n), np.nan)
 
 
-def steady_gain_moved(here: Matrices, P: Array, moved: Matrices) -> tuple[Array, Array]:
+def steady_gain_moved(here: Matrices, P: Array, change: Matrices) -> tuple[Array, Array]:
     """How `steady_gain` moves with its matrices: gains (k, n, m) and covariances of the innovations (k, m, m).
 
     Args:
         here: A, C, Q and R. P: of `steady_gain`.
-        moved: k changes of each, stacked.
+        change: k changes of each, stacked.
     """
-    (_, C, _, R), (_, dC, _, dR) = here, moved
-    F, W = _pushed(P, here, moved)
+    (_, C, _, R), (_, dC, _, dR) = here, change
+    F, W = _pushed(P, here, change)
     dP = _sums(F, W)
     S = C @ P @ C.T + R
     turned = np.swapaxes(dC, -1, -2)

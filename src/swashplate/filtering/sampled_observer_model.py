@@ -26,7 +26,7 @@ class SampledObserverModel:
         process, noise: covariances per sample; the noise of a sensor that is heard every k-th time is k times its own.
         names: of its states.
         vehicle: places of the vehicle's states in it; all but disturbances and biases follow the vehicle.
-        moved: places of what a truth without disturbances and biases has.
+        driven: places of what a truth without disturbances and biases has.
     """
 
     F: Array
@@ -36,7 +36,7 @@ class SampledObserverModel:
     noise: Array
     names: tuple[str, ...]
     vehicle: tuple[int, ...]
-    moved: tuple[int, ...]
+    driven: tuple[int, ...]
 
 
 def sampled_observer_model(
@@ -56,34 +56,34 @@ def sampled_observer_model(
         delays: of the inputs [s], where they are not the plan's whole samples.
     """
     n, nb = len(model.states), len(plan.biases)
-    own = n + 6 + nb
-    A = disturbed(numbers, model, own)
-    B = np.zeros((own, plan.inputs))
+    first = n + 6 + nb
+    A = disturbed(numbers, model, first)
+    B = np.zeros((first, plan.inputs))
     B[:n] = model.B
-    late = [d * plan.dt for d in plan.delays] if delays is None else delays
-    F, G, before, whole = held_late(A, B, plan.dt, late)
+    lags = [d * plan.dt for d in plan.delays] if delays is None else delays
+    F, G, before, steps = held_late(A, B, plan.dt, lags)
     slopes, more = outputs(plan, numbers, model.trim), n - plan.n
-    H = np.hstack([slopes[:, : plan.n], np.zeros((len(slopes), more)), slopes[:, plan.n : own - more]])
+    H = np.hstack([slopes[:, : plan.n], np.zeros((len(slopes), more)), slopes[:, plan.n : first - more]])
     names = [*model.states, *(f"disturbance {d}" for d in DISTURBED), *(f"bias {b}" for b in plan.biases)]
     noise_of = np.asarray(numbers.process)
-    process = np.concatenate([noise_of[: plan.n], np.full(more, 1e-8), noise_of[plan.n : own - more]])
+    process = np.concatenate([noise_of[: plan.n], np.full(more, 1e-8), noise_of[plan.n : first - more]])
     F, H, added = _late_readings(F, H, plan)
     G, before = (np.vstack([part, np.zeros((len(added), plan.inputs))]) for part in (G, before))
     names += added
-    F, G, waiting = with_late_inputs(F, G, whole, before)
+    F, G, waiting = with_late_inputs(F, G, steps, before)
     H = np.hstack([H, np.zeros((H.shape[0], len(waiting)))])
     names += [f"{model.inputs[j]} {ago} ago" for j, ago in waiting]
     every = [at.every for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
     noise = np.diag(np.asarray(numbers.measurement) * every)
     full = np.zeros(len(names))
-    full[:own] = process
+    full[:first] = process
     kept = [i for i, name in enumerate(names) if name not in without]
     names = [names[i] for i in kept]
     vehicle = tuple(names.index(name) for name in model.states if name not in without)
     unmoved = {f"disturbance {d}" for d in DISTURBED} | {f"bias {b}" for b in plan.biases}
-    moved = tuple(i for i, name in enumerate(names) if name not in unmoved)
+    driven = tuple(i for i, name in enumerate(names) if name not in unmoved)
     return SampledObserverModel(
-        F[np.ix_(kept, kept)], G[kept], H[:, kept], np.diag(full[kept]), noise, tuple(names), vehicle, moved
+        F[np.ix_(kept, kept)], G[kept], H[:, kept], np.diag(full[kept]), noise, tuple(names), vehicle, driven
     )
 
 
@@ -104,7 +104,7 @@ def _late_readings(F: Array, H: Array, plan: ObserverPlan) -> tuple[Array, Array
     for sensor, at in zip(plan.sensors, plan.sampling, strict=True):
         rows = slice(channel, channel + len(sensor.channels))
         channel = rows.stop
-        for step in range(at.late):
+        for step in range(at.delay):
             size, m = F.shape[0], len(sensor.channels)
             larger = np.zeros((size + m, size + m))
             larger[:size, :size], larger[size:, :size] = F, H[rows]

@@ -25,14 +25,14 @@ class Kind(NamedTuple):
         channels: what one reading holds.
         sigma: standard deviation of its white noise, channel by channel [the channel's unit].
         rate, delay: usual samples per second [Hz] and age of a reading when it arrives [s].
-        words: what it is.
+        summary: what it is.
     """
 
     channels: tuple[str, ...]
     sigma: tuple[float, ...]
     rate: float
     delay: float
-    words: str
+    summary: str
 
 
 KINDS: Mapping[str, Kind] = {
@@ -81,8 +81,8 @@ class Sensor:
         return KINDS[self.kind].channels
 
     def __str__(self) -> str:
-        late = f"+{1e3 * self.delay:g}ms" if self.delay else ""
-        return f"{self.kind}@{self.rate:g}{late}"
+        delay = f"+{1e3 * self.delay:g}ms" if self.delay else ""
+        return f"{self.kind}@{self.rate:g}{delay}"
 
 
 Suite = tuple[Sensor, ...]

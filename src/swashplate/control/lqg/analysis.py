@@ -138,7 +138,7 @@ def sensitivity(
     """
     plan = controller.plan
     parts = steady_loop_of(controller, at, on)
-    names = [parts.truth.names[i] for i in parts.truth.moved]
+    names = [parts.truth.names[i] for i in parts.truth.driven]
     if state not in names:
         return None
     (_, B, _), (_, Bc, _, Dc) = parts.plant, parts.compensator
@@ -166,7 +166,7 @@ def _channels(plan: ObserverPlan, model: SampledObserverModel) -> list[tuple[str
     if not plan.sensors:
         return [(model.names[i], 0) for i in model.vehicle]
     return [
-        (f"{s.kind}.{name}", at.late) for s, at in zip(plan.sensors, plan.sampling, strict=True) for name in s.channels
+        (f"{s.kind}.{name}", at.delay) for s, at in zip(plan.sensors, plan.sampling, strict=True) for name in s.channels
     ]
 
 
@@ -185,7 +185,7 @@ def _closed(
 def _spread(model: SampledObserverModel, closed: Array, entering: tuple[Array, Array]) -> dict[str, float]:
     """Standard deviations of the vehicle's states: white noise, and disturbing accelerations as they are coloured."""
     by_process, by_noise = entering
-    m = list(model.moved)
+    m = list(model.driven)
     d = [model.names.index(f"disturbance {name}") for name in DISTURBED]
     fade, push = model.F[np.ix_(d, d)], model.F[np.ix_(m, d)]
     size = closed.shape[0]

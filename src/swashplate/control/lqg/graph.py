@@ -138,7 +138,7 @@ def true_readings(plan: ObserverPlan, x: Readable, force: Readable, bias: Readab
 
 def readings_kept(plan: ObserverPlan) -> int:
     """Readings that simulated sensors keep until they arrive, in samples."""
-    return max((at.late for at in plan.sampling), default=0) + 1
+    return max((at.delay for at in plan.sampling), default=0) + 1
 
 
 def step_graph(
@@ -198,7 +198,7 @@ def sensed_graph(plan: ObserverPlan, numbers: Numbers, step: Any, memory: int) -
     now = casadi.vertcat(*true_readings(plan, x, felt, bias, CasadiBackend()))
     stored = casadi.vertcat(now, carried_here[nb + 1 : nb + 1 + (depth - 1) * channels])
     queue = casadi.if_else(count < 0.5, casadi.repmat(now, depth, 1), stored)
-    place = [at.late for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
+    place = [at.delay for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
     wander = np.asarray(numbers.process)[plan.n + 6 : plan.n + 6 + nb]
     noisy = [
         queue[lag * channels + i] + np.sqrt(variance) * noise[i]

@@ -137,7 +137,7 @@ def steady_loop(
         real = (truth or as_believed)(further)
         A, B, H = _plant(real)
         Ac, Bc, Cc, Dc = compensator
-        names = tuple(real.names[i] for i in real.moved)
+        names = tuple(real.names[i] for i in real.driven)
         blind = (np.zeros((plan.inputs, len(REFERENCES))), np.zeros((len(Ac), len(REFERENCES))))
         parts = (names, model.inputs, plan.rate, A, B, np.hstack([Dc @ H, Cc]), np.hstack([Bc @ H, Ac]), *blind)
         return real, SampledLoop(*parts, later=lambda extra: sampled_with(further + extra)[1])
@@ -223,7 +223,7 @@ def _gains(
 
 
 def _plant(model: SampledObserverModel) -> tuple[Array, Array, Array]:
-    m = list(model.moved)
+    m = list(model.driven)
     H = model.H[:, m] if model.H.size else np.eye(len(model.names))[list(model.vehicle)][:, m]
     return model.F[np.ix_(m, m)], model.G[m], H
 
