@@ -22,7 +22,7 @@ from swashplate.atomic import folder_when_complete
 from swashplate.cli.app import app
 from swashplate.cli.console import as_json
 from swashplate.cli.generate import checked_endings
-from swashplate.cli.run import told, written
+from swashplate.cli.run import written, written_text
 from swashplate.errors import IdentificationError, SwashError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
@@ -363,8 +363,8 @@ def test_the_last_line_names_what_was_written(tmp_path: Path) -> None:
     study = tmp_path / "study"
     study.mkdir()
     (study / "report.html").touch()
-    assert told([tmp_path / "mine.json"]) == f"Written: {tmp_path / 'mine.json'}"
-    assert told([study]) == f"Report: {study / 'report.html'}"
+    assert written_text([tmp_path / "mine.json"]) == f"Written: {tmp_path / 'mine.json'}"
+    assert written_text([study]) == f"Report: {study / 'report.html'}"
 
 
 def test_what_was_meant_comes_before_a_long_list(tmp_path: Path) -> None:

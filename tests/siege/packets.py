@@ -229,7 +229,7 @@ def _flown() -> _Link:
     def take(data: bytes, chance: random.Random) -> None:
         with suppress(MessageError), np.errstate(all="ignore"):
             session.fly(data)
-        json.dumps(session.told(), allow_nan=False)
+        json.dumps(session.report(), allow_nan=False)
 
     def look() -> str:
         going = session.recording

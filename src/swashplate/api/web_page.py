@@ -39,7 +39,7 @@ def web(request: ExportRequest) -> Export:
     at_once = model.structure is None and request.late is None and any(input_delays(model).values())  # as was asked for
     world = World(model, controller=request.controller, draws=request.draws, at_once=at_once)
     logged, left = (None, "") if request.flight is None else beside(request.flight)
-    page = single_page(world, name=request.name, made=request.origin, logged=logged)
+    page = single_page(world, name=request.name, origin=request.origin, logged=logged)
     drawn = f"; {len(request.draws)} models drawn from the fit" if request.draws else ""
     drawn += f"; {request.flight.provenance.source or 'the flight'}{left}" if request.flight is not None else ""
     inside = f"the equations and numbers of {model.name}, its card's sources, {world.pilot.title}{drawn}"

@@ -31,7 +31,7 @@ class _Verbs(dict[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if super().__getitem__(name) is None:
-            self[name] = _made(name, self._verbs[name])
+            self[name] = _command(name, self._verbs[name])
         return super().__getitem__(name)
 
     def get(self, name: str, default: Any = None) -> Any:
@@ -44,7 +44,7 @@ class _Verbs(dict[str, Any]):
         return [(name, self[name]) for name in self]
 
 
-def _made(name: str, verb: Verb) -> Any:
+def _command(name: str, verb: Verb) -> Any:
     """The command of a verb, or the group."""
     if verb.verbs:
         help = verb.help + (f" `{verb.usual}` need not be typed." if verb.usual else "")
@@ -53,10 +53,10 @@ def _made(name: str, verb: Verb) -> Any:
     from swashplate.cli.generate import command_of, question_at
     from swashplate.cli.run import carry_out
 
-    made = command_of(question_at(f"swashplate.api.verbs.{verb.question}"), name, carry_out)
-    made.context_settings = _HELP
-    made.short_help = verb.help
-    return made
+    command = command_of(question_at(f"swashplate.api.verbs.{verb.question}"), name, carry_out)
+    command.context_settings = _HELP
+    command.short_help = verb.help
+    return command
 
 
 _HELP = {"help_option_names": ["-h", "--help"]}
@@ -106,11 +106,11 @@ class AllVerbs(Guarded, VerbGroup):
         return super().resolve_command(ctx, args)
 
 
-def in_front(words: list[str]) -> list[str]:
+def in_front(line: list[str]) -> list[str]:
     """The line with the options of every verb before the verb."""
     front: list[str] = []
     rest: list[str] = []
-    waiting = iter(words)
+    waiting = iter(line)
     for word in waiting:
         if word == "--":
             return [*front, *rest, word, *waiting]
@@ -121,8 +121,8 @@ def in_front(words: list[str]) -> list[str]:
     return [*front, *rest]
 
 
-def _next(words: Iterator[str]) -> list[str]:
-    value = next(words, None)
+def _next(rest: Iterator[str]) -> list[str]:
+    value = next(rest, None)
     return [] if value is None else [value]
 
 
@@ -143,8 +143,8 @@ def _version(wanted: bool) -> None:
 
         from swashplate.extras import version_of
 
-        told = ", ".join(f"{name} {version_of(name)}" for name in ("casadi", "numpy", "scipy"))
-        typer.echo(f"swashplate {version_of('swashplate')} (Python {platform.python_version()}, {told})")
+        versions = ", ".join(f"{name} {version_of(name)}" for name in ("casadi", "numpy", "scipy"))
+        typer.echo(f"swashplate {version_of('swashplate')} (Python {platform.python_version()}, {versions})")
         raise typer.Exit
 
 

@@ -51,10 +51,10 @@ def command_of(
     command.__doc__ = inspect.getdoc(question)
     app = typer.Typer(rich_markup_mode=None, add_completion=False)
     app.command(name, help=_help(question), epilog=_settings_help(known))(command)
-    made = typer.main.get_command(app)
-    made.name = name
-    made.question = question  # of whom a page or a test asks what it takes  # pyrefly: ignore[missing-attribute]
-    return made
+    built = typer.main.get_command(app)
+    built.name = name
+    built.question = question  # of whom a page or a test asks what it takes  # pyrefly: ignore[missing-attribute]
+    return built
 
 
 def typer_context() -> Any:
@@ -125,13 +125,13 @@ def _parameter(question: type[VerbQuestion[Any]], name: str, language: Language,
         more: dict[str, Any] = {}
         if language.kind != "bool":
             more["metavar"] = entry.metavar or "|".join(entry.choices) or language.metavar or None
-        declared = typer.Option(*flags, help=_told(entry, default), show_default=False, autocompletion=complete, **more)
+        declared = typer.Option(*flags, help=_text(entry, default), show_default=False, autocompletion=complete, **more)
     return inspect.Parameter(
         name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[listed | None, declared]
     )
 
 
-def _told(entry: FieldText, default: Any) -> str:
+def _text(entry: FieldText, default: Any) -> str:
     """The help of an option, with unit and default."""
     parts = [help_of(entry)]
     if default is not dataclasses.MISSING and default not in (None, False, (), ""):
@@ -160,8 +160,8 @@ def _settings_help(known: Mapping[str, tuple[Language, FieldText]]) -> str | Non
     rare = [(name, entry) for name, (_, entry) in known.items() if entry.place == "setting"]
     if not rare:
         return None
-    told = [f"{name} ({entry.help.rstrip('.')}{f' [{entry.unit}]' if entry.unit else ''})" for name, entry in rare]
-    return f"Also by --settings NAME=VALUE or FILE.toml: {'; '.join(told)}."
+    listed = [f"{name} ({entry.help.rstrip('.')}{f' [{entry.unit}]' if entry.unit else ''})" for name, entry in rare]
+    return f"Also by --settings NAME=VALUE or FILE.toml: {'; '.join(listed)}."
 
 
 def _vehicles(incomplete: str) -> list[str]:

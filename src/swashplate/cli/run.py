@@ -32,30 +32,30 @@ def carry_out(question: VerbQuestion[Any], outs: tuple[Path, ...]) -> None:
     question.check_places(outs)
     if question.needs_out and not outs:
         raise_missing("'--out' / '-o'", "option")
-    made: list[Path] = []
+    paths: list[Path] = []
     with stoppable() as stop, progress(quiet=quiet or json, every=question.told_every) as line, ExitStack() as stack:
-        places = [stack.enter_context(written(question, out, made)) for out in outs]
+        places = [stack.enter_context(written(question, out, paths)) for out in outs]
         answer = question.answer(line.say)
         question.finish(answer)
         for place, names in places:
             line.say("writing")
             question.write(answer, place, names)
-    made.sort(key=lambda path: [out.with_suffix("") for out in outs].index(path.with_suffix("")))
-    for words in question.remarks(answer):
-        typer.echo(words, err=True)
+    paths.sort(key=lambda path: [out.with_suffix("") for out in outs].index(path.with_suffix("")))
+    for remark in question.remarks(answer):
+        typer.echo(remark, err=True)
     if json:
         document = question.document(answer)
-        files = {"written": list(map(str, made))} if made and isinstance(document, dict) else {}
+        files = {"written": list(map(str, paths))} if paths and isinstance(document, dict) else {}
         typer.echo(as_json({**document, **files} if files else document))
     elif not quiet:
-        _show(question, answer, made)
+        _show(question, answer, paths)
     problems = question.problems(answer)
     if problems or stop.code:
         complain(" ".join([*problems, *([stop.sentence] if stop.code and not problems else [])]))
         raise typer.Exit(stop.code or Exit.INPUT)
 
 
-def _show(question: VerbQuestion[Any], answer: Any, made: list[Path]) -> None:
+def _show(question: VerbQuestion[Any], answer: Any, paths: list[Path]) -> None:
     from swashplate.cli.console import console
 
     screen = console()
@@ -64,14 +64,14 @@ def _show(question: VerbQuestion[Any], answer: Any, made: list[Path]) -> None:
             typer.echo(part)
         else:
             screen.print(part)
-    if made:
-        typer.echo("\n" + told(made))
+    if paths:
+        typer.echo("\n" + written_text(paths))
 
 
-def told(made: list[Path]) -> str:
+def written_text(paths: list[Path]) -> str:
     """What was written, for the last line of a command: files, or the report in its folder."""
-    reports = [path for path in made if path.is_dir() and (path / "report.html").is_file()]
-    files = [path for path in made if path not in reports]
+    reports = [path for path in paths if path.is_dir() and (path / "report.html").is_file()]
+    files = [path for path in paths if path not in reports]
     lines = [f"Report: {path / 'report.html'}" for path in reports]
     return "\n".join(lines + ([f"Written: {', '.join(map(str, files))}"] if files else []))
 
@@ -83,21 +83,21 @@ def _is_file(question: VerbQuestion[Any], out: Path) -> bool:
 
 @contextmanager
 def written(
-    question: VerbQuestion[Any], out: Path, made: list[Path] | None = None
+    question: VerbQuestion[Any], out: Path, paths: list[Path] | None = None
 ) -> Iterator[tuple[Path, tuple[str, ...]]]:
     """A folder for what is written to `out`, and the names of it; it appears at `out` when all is complete.
 
     Args:
         question: says what it writes. out: a folder, or a file whose ending says which.
-        made: gets the folder, or the files.
+        paths: gets the folder, or the files.
     """
     from swashplate import atomic
 
     if not _is_file(question, out):
         with atomic.folder_when_complete(out, ours=question.ours(out)) as folder:
             yield folder, question.files
-        if made is not None:
-            made.append(out)
+        if paths is not None:
+            paths.append(out)
         return
     if not out.absolute().parent.is_dir():
         raise SwashError("the folder does not exist.", where=out.parent, channel="--out", hint="Make it first.")
@@ -113,5 +113,5 @@ def written(
             target = out if len(files) == 1 else out.parent / file.name
             with atomic.replaced_when_complete(target) as place:
                 shutil.copyfile(file, place)
-            if made is not None:
-                made.append(target)
+            if paths is not None:
+                paths.append(target)

@@ -17,29 +17,29 @@ def spelled(command: Any, given: Sequence[str]) -> list[str]:
         command: of click; of a group its own verb is looked for.
         given: what was typed after its name.
     """
-    words = list(given)
+    spelt = list(given)
     verbs = getattr(command, "commands", None)
     if verbs is not None:
-        return [words[0], *spelled(verbs[words[0]], words[1:])] if words and words[0] in verbs else words
+        return [spelt[0], *spelled(verbs[spelt[0]], spelt[1:])] if spelt and spelt[0] in verbs else spelt
     options = {name for parameter in command.params for name in parameter.opts if name.startswith("-")}
     named = _VEHICLE in options
-    _refuse_repeated(command, words)
+    _refuse_repeated(command, spelt)
     arguments = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
     takes_place = bool(arguments) and arguments[0].name in ("vehicle", "model")
     if takes_place and not named:
-        return _as_argument(words)
-    if named and not arguments and words and not words[0].startswith("-"):
-        return [_VEHICLE, *words]
-    return words
+        return _as_argument(spelt)
+    if named and not arguments and spelt and not spelt[0].startswith("-"):
+        return [_VEHICLE, *spelt]
+    return spelt
 
 
-def _refuse_repeated(command: Any, words: Sequence[str]) -> None:
+def _refuse_repeated(command: Any, spelt: Sequence[str]) -> None:
     """An option that takes one value and is given twice: only the last would count, and nobody would be told.
 
     Raises:
         typer.BadParameter: naming it.
     """
-    typed = [word.partition("=")[0] for word in words if word.startswith("-")]
+    typed = [word.partition("=")[0] for word in spelt if word.startswith("-")]
     for parameter in command.params:
         if parameter.param_type_name != "option" or parameter.multiple or parameter.is_flag or parameter.count:
             continue
@@ -49,11 +49,11 @@ def _refuse_repeated(command: Any, words: Sequence[str]) -> None:
             raise typer.BadParameter(f"is given more than once.{hint}", param_hint=parameter.opts[0])
 
 
-def _as_argument(words: list[str]) -> list[str]:
+def _as_argument(spelt: list[str]) -> list[str]:
     """`--vehicle NAME` in front, where the verb has its argument; the first one only."""
-    for k, word in enumerate(words):
-        if word == _VEHICLE and k + 1 < len(words):
-            return [words[k + 1], *words[:k], *words[k + 2 :]]
+    for k, word in enumerate(spelt):
+        if word == _VEHICLE and k + 1 < len(spelt):
+            return [spelt[k + 1], *spelt[:k], *spelt[k + 2 :]]
         if word.startswith(f"{_VEHICLE}="):
-            return [word.partition("=")[2], *words[:k], *words[k + 1 :]]
-    return words
+            return [word.partition("=")[2], *spelt[:k], *spelt[k + 1 :]]
+    return spelt

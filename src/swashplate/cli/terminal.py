@@ -47,9 +47,9 @@ def over(stream: TextIO) -> TextIO:
     stream.reconfigure(errors=_HANDLER)
     # Typer writes UTF-8 past a stream that says it is ASCII; a Latin one has the same bytes for the same characters.
     encoding = "latin-1" if codecs.lookup(stream.encoding).name == "ascii" else stream.encoding
-    made = Terminal(stream.buffer, encoding, line_buffering=stream.line_buffering, write_through=stream.write_through)
-    made.below = stream
-    return made
+    term = Terminal(stream.buffer, encoding, line_buffering=stream.line_buffering, write_through=stream.write_through)
+    term.below = stream
+    return term
 
 
 def below(stream: TextIO) -> TextIO:

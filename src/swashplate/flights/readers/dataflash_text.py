@@ -29,11 +29,11 @@ def _table(columns: Sequence[str], letters: str, rows: list[list[str]], places: 
         except ValueError:
             continue
         where.append(place)
-    made = {
+    arrays = {
         name: np.array([row[i] for row in kept], dtype=np.str_ if letters[i] in _TEXT_LETTERS else np.float64)
         for i, name in enumerate(columns)
     }
-    return MessageTable(made, np.asarray(where, dtype=np.int64)), len(rows) - len(kept)
+    return MessageTable(arrays, np.asarray(where, dtype=np.int64)), len(rows) - len(kept)
 
 
 def messages(text: str) -> Messages:

@@ -60,8 +60,8 @@ def axes_of(vehicle: Vehicle, model: LinearModel) -> Axes:
     """
     soon = zero_order_hold(model.A, model.B, _SOON)[1][[vehicle.index(name) for name in _MOVED]]
     directions, excited = _directions(vehicle, soon)
-    moved = soon @ directions
-    reached = np.diag(moved)
+    response = soon @ directions
+    reached = np.diag(response)
     if not np.all(reached):
         lost = ", ".join(out for out, value in zip(_MOVED, reached, strict=True) if not value)
         raise SwashError(
@@ -76,7 +76,7 @@ def axes_of(vehicle: Vehicle, model: LinearModel) -> Axes:
     # Axes to inputs: the rotors' senses decide about signs (nose down is ahead, thrust is up).
     matrix = None if vehicle.traits.linear else _at_once_decoupled(model, directions)
     if matrix is None:
-        matrix = _soon_decoupled(moved, vehicle)
+        matrix = _soon_decoupled(response, vehicle)
     mixing = {True: directions @ matrix @ np.diag(scale), False: directions @ np.diag(scale)}
     amplitude = dict(zip(STICKS, (_EXCITED / _SHARES * travel).tolist(), strict=True))
     return Axes(directions, 2.0 / _SHARES * travel, mixing, amplitude, excited)
@@ -95,13 +95,13 @@ def _at_once_decoupled(model: LinearModel, directions: Array) -> Array | None:
         return None
 
 
-def _soon_decoupled(moved: Array, vehicle: Vehicle) -> Array:
+def _soon_decoupled(response: Array, vehicle: Vehicle) -> Array:
     """Axes whose steps have not turned or lifted each other after `_SOON`, shape (4, 4).
 
     Identified inputs often reach a rate by several ways (pitch at once by a small Mcol, by flapping a moment later), of
     which the first says little.
     """
-    ratio = moved / np.diag(moved)[:, None]
+    ratio = response / np.diag(response)[:, None]
     if np.linalg.cond(ratio) * _SINGULAR > 1.0:
         raise SwashError("has inputs that move two axes alike: four sticks cannot fly it.", where=vehicle.card.where)
     return np.asarray(np.linalg.inv(ratio), dtype=np.float64)

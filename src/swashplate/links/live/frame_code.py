@@ -43,8 +43,8 @@ def frame_code(world: World) -> str:
     """
     require_casadi()
     equations = equations_of(world.vehicle)
-    told = len(world.vehicle.state_names) + len(FELT) + 1
-    law = world.pilot.decide.graph(told, world.pilot.memory.size, world.pilot.gain_count)
+    readings = len(world.vehicle.state_names) + len(FELT) + 1
+    law = world.pilot.decide.graph(readings, world.pilot.memory.size, world.pilot.gain_count)
     printed, _ = print_function(law.function, "double")
     force = placing = ""
     if world.pilot.feels:
@@ -118,12 +118,12 @@ def web_assembly(source: str, *, exports: Sequence[str] = EXPORTS, ready: bool =
         raise missing("ziglang", what="a page in which a model flies")
     bare = fill_template("bare.h", {}) + re.sub(r"#include <(?:math|string)\.h>\n", "", source)
     with scratch_folder() as folder:
-        text, made = folder / "frame.c", folder / "frame.wasm"
+        text, module = folder / "frame.c", folder / "frame.wasm"
         write_text(text, bare)
         shown = [f"-Wl,--export={name}" for name in exports]
         command = [*program, *_TARGET, f"-Wl,-z,stack-size={_STACK}", *_OPTIONS, *shown]
-        code, _, said = ran([*command, "-o", str(made), str(text)], where="WebAssembly")
-        if code != 0 or not made.is_file():
+        code, _, said = ran([*command, "-o", str(module), str(text)], where="WebAssembly")
+        if code != 0 or not module.is_file():
             name = "ziglang" if len(program) > 1 else program[0]
             raise ExportError(f"{name} refused the model's C: {said.strip()[:300]}", where="WebAssembly")
-        return made.read_bytes()
+        return module.read_bytes()

@@ -34,7 +34,7 @@ class Job:
     Attributes:
         recording: which one is identified.
         state: "running", "done" or "failed".
-        words: what the command said, where it failed.
+        outcome: what the command said, where it failed.
         seconds: since it began.
         doing: what the command is at.
         share: of the fit that is done, 0 to 1; None where that is not known.
@@ -43,7 +43,7 @@ class Job:
 
     recording: int
     state: str
-    words: str = ""
+    outcome: str = ""
     seconds: float = 0.0
     doing: str = ""
     share: float | None = None
@@ -76,8 +76,8 @@ def commands(
     return (_swash(*identify, "--flight", part, *fitted.options), respond)
 
 
-def _swash(*words: str) -> list[str]:
-    return own_python("swashplate.__main__", *words)
+def _swash(*arguments: str) -> list[str]:
+    return own_python("swashplate.__main__", *arguments)
 
 
 def busiest(inputs: NDArray[np.float64], *, period: float, seconds: float) -> Window | None:
@@ -131,17 +131,17 @@ class Identifying:
         self._stopped = False
         ways = commands(vehicle, flight, card=card, out=out, how=how, window=window)
         for tried in ways:
-            code, words = await self._run(tried)
+            code, outcome = await self._run(tried)
             finished = (out / REPORT).is_file()
             if finished or self._stopped:
                 break
         if finished and tried is not ways[0]:
-            words = "No model could be fitted to it; the report shows its frequency responses."
+            outcome = "No model could be fitted to it; the report shows its frequency responses."
         elif finished and code not in (0, None):
-            words = words or "The fit failed; the report says why."
+            outcome = outcome or "The fit failed; the report says why."
         elif code == 0:
-            words = ""
-        self._job = Job(recording, "done" if finished else "failed", words, time.monotonic() - self._begun)
+            outcome = ""
+        self._job = Job(recording, "done" if finished else "failed", outcome, time.monotonic() - self._begun)
 
     async def _run(self, arguments: list[str]) -> tuple[int | None, str]:
         """Exit code of a command and the end of what it said."""
@@ -157,27 +157,27 @@ class Identifying:
         assert stream is not None
         while heard := await stream.readline():
             text = heard.decode("utf-8", "replace").rstrip()
-            told = progress_lines.parse(text)
-            if told is None:
+            line = progress_lines.parse(text)
+            if line is None:
                 said = f"{said} {text}"[-4 * _LONGEST_WORD :]
                 continue
             now = time.monotonic()
-            if begun is None and told.done:
-                begun = (now, told.done)
-            self._advance(told, begun, now)
+            if begun is None and line.done:
+                begun = (now, line.done)
+            self._advance(line, begun, now)
         code = await self._process.wait()
         self._process = None
         return code, " ".join(said.split())[-_LONGEST_WORD:]
 
-    def _advance(self, told: progress_lines.Told, begun: tuple[float, float] | None, now: float) -> None:
+    def _advance(self, line: progress_lines.Told, begun: tuple[float, float] | None, now: float) -> None:
         """How far the command is; `begun` are the time and number of the first iteration that it told."""
         assert self._job is not None
         share = left = None
-        if told.total and told.done:
-            share = min(0.95, told.done / USUAL)
-            if begun is not None and begun[1] < told.done < USUAL:
-                left = (USUAL - told.done) * (now - begun[0]) / (told.done - begun[1])
-        self._job = replace(self._job, doing=told.what, share=share, left=left)
+        if line.total and line.done:
+            share = min(0.95, line.done / USUAL)
+            if begun is not None and begun[1] < line.done < USUAL:
+                left = (USUAL - line.done) * (now - begun[0]) / (line.done - begun[1])
+        self._job = replace(self._job, doing=line.what, share=share, left=left)
 
     def stop(self) -> None:
         """End the job; its files appear only when it is complete, so nothing is left half-written."""

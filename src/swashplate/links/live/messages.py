@@ -16,7 +16,7 @@ LONGEST = 2048
 Check = Callable[[Any], bool]
 
 
-def _whole(low: int, high: int) -> Check:
+def _integer(low: int, high: int) -> Check:
     return lambda value: isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
 
 
@@ -31,7 +31,7 @@ def _switch(value: Any) -> bool:
 SCHEMA: Mapping[str, Mapping[str, Check]] = {
     "bar": {"value": _switch},
     "record": {"value": _switch},
-    "identify": {"recording": _whole(1, 10_000), "how": _one_of(*HOWS)},
+    "identify": {"recording": _integer(1, 10_000), "how": _one_of(*HOWS)},
     "stop_identifying": {},
     "learn": {},
 }

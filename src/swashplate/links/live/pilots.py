@@ -46,8 +46,8 @@ class DecisionGraph(NamedTuple):
     """A decision of the page's pilot as a graph.
 
     Attributes:
-        function: of CasADi, of (memory, told, wanted, gains) to memory and commands in one column; `told` has what the
-            law's own sensors draw at its end.
+        function: of CasADi, of (memory, readings, wanted, gains) to memory and commands in one column; `readings` has
+            what the law's own sensors draw at its end.
         memory: how many numbers it carries. draws: how many its sensors draw.
     """
 
@@ -59,9 +59,9 @@ class DecisionGraph(NamedTuple):
 class Decide(Protocol):
     """What a pilot decides, by numbers and as a graph."""
 
-    def __call__(self, memory: Array, told: Array, wanted: Array, gains: Array) -> tuple[Array, Array]: ...
+    def __call__(self, memory: Array, readings: Array, wanted: Array, gains: Array) -> tuple[Array, Array]: ...
 
-    def graph(self, told: int, memory: int, gains: int) -> DecisionGraph:
+    def graph(self, readings: int, memory: int, gains: int) -> DecisionGraph:
         """The same as a graph, for rows of so many numbers."""
 
 
@@ -75,16 +75,16 @@ class SteppedDecision:
 
     step: Step
 
-    def __call__(self, memory: Array, told: Array, wanted: Array, gains: Array) -> tuple[Array, Array]:
-        measured = np.concatenate([told[:-4], told[-1:]])
+    def __call__(self, memory: Array, readings: Array, wanted: Array, gains: Array) -> tuple[Array, Array]:
+        measured = np.concatenate([readings[:-4], readings[-1:]])
         after, commands = self.step(memory, measured, wanted, gains, np)
         return np.asarray(after), np.asarray(commands)
 
-    def graph(self, told: int, memory: int, gains: int) -> DecisionGraph:
+    def graph(self, readings: int, memory: int, gains: int) -> DecisionGraph:
         casadi = require_casadi()
         carried, heard, asked, row = (
             casadi.SX.sym(name, size)
-            for name, size in (("memory", memory), ("told", told), ("wanted", len(WANTED)), ("gains", gains))
+            for name, size in (("memory", memory), ("told", readings), ("wanted", len(WANTED)), ("gains", gains))
         )
         measured = np.concatenate([symbols(heard)[:-4], symbols(heard)[-1:]])
         after, commands = self.step(symbols(carried), measured, symbols(asked), symbols(row), SymbolArrays())
@@ -99,8 +99,8 @@ class Pilot:
     """A control law for the live loop.
 
     Attributes:
-        decide: `(memory, told, wanted, gains) -> (memory, inputs)`; `told` is the state row, the specific force and the
-            voltage, `wanted` the row of `WANTED`.
+        decide: `(memory, readings, wanted, gains) -> (memory, inputs)`; `readings` is the state row, the specific force
+            and the voltage, `wanted` the row of `WANTED`.
         memory: at the start.
         gains: rows by mode and decoupling.
         amplitude: of maneuvers by axis [unit of the inputs].
@@ -157,8 +157,8 @@ def pilot(vehicle: Vehicle, trim: Trim, *, controller: Controller | None = None)
     """
     if controller is not None:
         kind = kind_of(controller)
-        flown = kind.about(controller, vehicle, trim)
-        return (_coaxial if kind.every_mode else _designed)(vehicle, trim, flown)
+        trimmed = kind.about(controller, vehicle, trim)
+        return (_coaxial if kind.every_mode else _designed)(vehicle, trim, trimmed)
     return _coaxial(vehicle, trim, None) if vehicle.traits.coaxial else _state_feedback(vehicle, trim)
 
 
@@ -169,7 +169,7 @@ _COAX_HEAD = 3 + len(STICKS)
 
 def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilot:
     base = controller or autopilot(vehicle, trim)
-    plain = autopilot(vehicle, trim, decoupled=False).numbers.law
+    coupled = autopilot(vehicle, trim, decoupled=False).numbers.law
     commands, gains = trim.commands(), {}
     names: dict[Mode, Any] = {
         "raw": "manual",
@@ -182,7 +182,7 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
         for decoupled in (True, False):
             chosen = base.in_mode(name)
             if not decoupled:
-                chosen = chosen.with_gains(**plain._asdict())
+                chosen = chosen.with_gains(**coupled._asdict())
             head = [commands["motor_lower"], commands["motor_upper"], float(mode == "raw")]
             travel = [_COAX_TRAVEL[axis] for axis in STICKS]
             if mode == "attitude":  # speed is free; the lean that is kept is where the stick balances its feedback
@@ -230,16 +230,16 @@ class DesignedLaw:
         self.law = controller.law(vehicle)
         self._random = np.random.default_rng()
 
-    def __call__(self, memory: Array, told: Array, wanted: Array, gains: Array) -> tuple[Array, Array]:
+    def __call__(self, memory: Array, readings: Array, wanted: Array, gains: Array) -> tuple[Array, Array]:
         """As `Pilot.decide`."""
-        everything = np.concatenate([told, self._random.standard_normal(self.law.draws)])
+        everything = np.concatenate([readings, self._random.standard_normal(self.law.draws)])
         after = np.asarray(self.law.function(memory, everything[self.law.places], wanted[: len(REFERENCES)]))[:, 0]
         return after[: self.law.memory], after[self.law.memory :]
 
-    def graph(self, told: int, memory: int, gains: int) -> DecisionGraph:
+    def graph(self, readings: int, memory: int, gains: int) -> DecisionGraph:
         """As `Decide.graph`."""
         casadi, law = require_casadi(), self.law
-        sizes = {"memory": memory, "told": told + law.draws, "wanted": len(WANTED), "gains": gains}
+        sizes = {"memory": memory, "told": readings + law.draws, "wanted": len(WANTED), "gains": gains}
         carried, heard, asked, row = (casadi.MX.sym(name, size) for name, size in sizes.items())
         results = law.function(carried, heard[law.places.tolist()], asked[: len(REFERENCES)])
         return DecisionGraph(casadi.Function("decide", [carried, heard, asked, row], [results]), memory, law.draws)
@@ -339,6 +339,6 @@ def state_feedback_step(
     held = xp.concatenate([xp.stack([x, y]), wanted[2 : len(REFERENCES)]])
     # The hold works on deviations: what is asked for is taken from what is measured.
     asked = xp.stack([wanted[4], wanted[5], 0.0 * wanted[4], gains[1] * wanted[6], -gains[2] * wanted[7]])
-    seen = xp.concatenate([measured[:3], measured[3:8] - asked, measured[8:]])
-    memory, commands = state_hold_step(memory, seen, held, gains[3 + 4 * inputs :], xp, inputs=inputs, states=states)
+    off = xp.concatenate([measured[:3], measured[3:8] - asked, measured[8:]])
+    memory, commands = state_hold_step(memory, off, held, gains[3 + 4 * inputs :], xp, inputs=inputs, states=states)
     return memory, commands + mixing @ wanted[6:10]

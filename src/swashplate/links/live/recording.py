@@ -106,9 +106,9 @@ class LiveRecording:
             _card(self.path).unlink(missing_ok=True)
             raise FlightError(problem)
         try:
-            flown = read_grown(self.path)
-            assert flown is not None
-            saved = _save(flown, self.vehicle, self.path)
+            flight = read_grown(self.path)
+            assert flight is not None
+            saved = _save(flight, self.vehicle, self.path)
         except BaseException as error:
             self._growing.close()
             if not isinstance(error, SwashError):
@@ -122,25 +122,25 @@ class LiveRecording:
 def recover(folder: Path, say: Say) -> tuple[Path, ...]:
     """Make flights of what sessions that were killed have left in a folder; returns the logs."""
 
-    def keep(left: Path, flown: Flight) -> Path:
-        return _save(flown, load_vehicle(str(_card(left))), left).path
+    def keep(left: Path, flight: Flight) -> Path:
+        return _save(flight, load_vehicle(str(_card(left))), left).path
 
     grown = [left for left in folder.glob(f"recording-*{SUFFIX}") if left.stem.removeprefix("recording-").isdecimal()]
     return salvage(sorted(grown), keep, say, shortest=SHORTEST)
 
 
-def _save(flown: Flight, vehicle: Vehicle, growing: Path) -> SavedRecording:
+def _save(flight: Flight, vehicle: Vehicle, growing: Path) -> SavedRecording:
     """The flights of a growing file, under its number, or under the first free one where that was taken since.
 
     The number seeds the noise. Nothing is overwritten, whatever other programs do meanwhile.
     """
     from swashplate.simulation.sensors import QUIET, observe
 
-    truth = monitored(flown, vehicle)
-    own = _number(growing)
-    for number in count(own):
+    truth = monitored(flight, vehicle)
+    first = _number(growing)
+    for number in count(first):
         log = growing.with_name(f"recording-{number}.nc")
-        if number != own and (_taken(log) or log.with_suffix(SUFFIX).exists()):
+        if number != first and (_taken(log) or log.with_suffix(SUFFIX).exists()):
             continue
         try:
             with added_when_complete(_truth(log)) as one, added_when_complete(log) as other:
@@ -148,7 +148,7 @@ def _save(flown: Flight, vehicle: Vehicle, growing: Path) -> SavedRecording:
                 observe(truth, vehicle, sensors=QUIET, seed=number).save(other)
         except FileExistsError:  # somebody put one there who does not know of claims
             continue
-        if number != own:
+        if number != first:
             vehicle.save(_card(log))
         inputs = truth.array(vehicle.input_names)
         return SavedRecording(number, log, vehicle, truth.duration, truth.duration / (len(inputs) - 1), inputs)
@@ -168,5 +168,5 @@ def _card(log: Path) -> Path:
 
 
 def _taken(log: Path) -> bool:
-    made = (log, _truth(log), log.with_name(f"identified-{_number(log)}"), _card(log))
-    return any(path.exists() for path in made)
+    places = (log, _truth(log), log.with_name(f"identified-{_number(log)}"), _card(log))
+    return any(path.exists() for path in places)

@@ -144,8 +144,8 @@ def replay(
         predicted, begun = _predicted(flight, (model, *draws), ahead, time)
     elif model is not None:
         around = {n: np.interp(time, flight.time(n), flight.values(n)) for n in SURROUNDINGS if n in flight}
-        flown = [_flown(one, time, states, inputs, around, ahead) for one in (model, *draws)]
-        predicted, begun = np.array([rows for rows, _ in flown]), flown[0][1]
+        runs = [_simulated(one, time, states, inputs, around, ahead) for one in (model, *draws)]
+        predicted, begun = np.array([rows for rows, _ in runs]), runs[0][1]
         if unknown:
             notes.append(f"The log has no {', '.join(unknown)}: every prediction starts with them as at hover.")
     if unknown and (model is None or model.traits.observed):
@@ -232,15 +232,15 @@ def _predicted(flight: Flight, models: Sequence[Vehicle], ahead: float, time: Ar
         nearest = np.clip(np.searchsorted(piece.time, time[inside] - 1e-6), 0, piece.time.size - 1)
         # The prediction is of the centre of gravity; the log shows the tracked point.
         carried = flight_at(flight, piece.time) - measured_states(piece, nuisance)
-        for one, own in zip(models, states, strict=True):
-            made = predict(one, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=ahead, settling=settling)
+        for one, body in zip(models, states, strict=True):
+            runs = predict(one, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=ahead, settling=settling)
             rows = np.full((piece.time.size, len(PREDICTED)), np.nan)
-            start = made.starts[0]
-            chain = made.states.reshape(-1, len(PREDICTED))[: piece.time.size - start - 1]
+            start = runs.starts[0]
+            chain = runs.states.reshape(-1, len(PREDICTED))[: piece.time.size - start - 1]
             rows[start + 1 : start + 1 + len(chain)] = chain
-            own[inside] = (rows + carried)[nearest]
-        place = np.searchsorted(made.starts, nearest) - 1  # a start itself belongs to the prediction before it
-        begun[inside] = np.where(place >= 0, piece.time[made.starts[place]], np.nan)
+            body[inside] = (rows + carried)[nearest]
+        place = np.searchsorted(runs.starts, nearest) - 1  # a start itself belongs to the prediction before it
+        begun[inside] = np.where(place >= 0, piece.time[runs.starts[place]], np.nan)
     if not np.any(np.isfinite(states)):
         raise FlightError(
             f"the longest unbroken piece has {longest:.1f} s, expected at least {SHORTEST_CALIBRATION + 1:g} s for a "
@@ -250,7 +250,7 @@ def _predicted(flight: Flight, models: Sequence[Vehicle], ahead: float, time: Ar
     return states, begun
 
 
-def _flown(
+def _simulated(
     model: Vehicle, time: Array, states: Array, inputs: Array, around: Mapping[str, Array], ahead: float
 ) -> tuple[Array, Array]:
     """The model from the logged state on, anew every `ahead` seconds, on the logged inputs, voltage and wind; and when
@@ -259,8 +259,8 @@ def _flown(
     For vehicles that the observer of the validation is not made for; delays and trims of the log are not looked for. A
     linear model's own delays are flown.
     """
-    late = input_delays(model)
-    waits = (late.get(name, 0.0) for name in model.input_names)
+    delays = input_delays(model)
+    waits = (delays.get(name, 0.0) for name in model.input_names)
     inputs = np.stack([np.interp(time - d, time, u) for d, u in zip(waits, inputs.T, strict=True)], axis=1)
     step = float(np.median(np.diff(time)))
     length, predicted = max(2, round(ahead / step)), np.full((time.size, len(PREDICTED)), np.nan)
@@ -270,7 +270,7 @@ def _flown(
         if time[first + length] - time[first] > (length + 0.5) * step:
             continue  # a gap in the log
         try:
-            flown = simulate(
+            flight = simulate(
                 model,
                 {n: u[part] for n, u in (*zip(model.input_names, inputs.T, strict=True), *around.items())},
                 start=dict(zip(model.state_names, states[first].tolist(), strict=True)),
@@ -280,7 +280,7 @@ def _flown(
             )
         except DivergenceError:
             continue  # where the model leaves what it is good for, nothing is shown
-        predicted[first + 1 : first + length + 1] = flown.array(PREDICTED)[1:]
+        predicted[first + 1 : first + length + 1] = flight.array(PREDICTED)[1:]
         begun[first + 1 : first + length + 1] = time[first]
     return predicted, begun
 

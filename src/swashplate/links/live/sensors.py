@@ -38,8 +38,8 @@ class Sensors(NamedTuple):
         """A state row as they show it, without noise."""
         if not any(self.placed):
             return x
-        told = tracked_body(RigidBody(*x[:BODY].tolist()), _of_record(self.placed), FloatBackend())
-        return np.concatenate([told, x[BODY:]])
+        tracked = tracked_body(RigidBody(*x[:BODY].tolist()), _of_record(self.placed), FloatBackend())
+        return np.concatenate([tracked, x[BODY:]])
 
     def __str__(self) -> str:
         if not any((*self.placed, *self.sigma)):
@@ -79,8 +79,8 @@ def traced_sensors() -> Graph:
     """`tracked_body` as a CasADi function of the body's states and the numbers of `PLACED`."""
     casadi = require_casadi()
     x, s = casadi.SX.sym("x", BODY), casadi.SX.sym("s", len(PLACED))
-    told = tracked_body(RigidBody(*casadi.vertsplit(x)), _of_record(casadi.vertsplit(s)), CasadiBackend())
-    return casadi.Function("sensors", [x, s], [casadi.densify(casadi.vertcat(*told))], {"cse": True})
+    tracked = tracked_body(RigidBody(*casadi.vertsplit(x)), _of_record(casadi.vertsplit(s)), CasadiBackend())
+    return casadi.Function("sensors", [x, s], [casadi.densify(casadi.vertcat(*tracked))], {"cse": True})
 
 
 def _of_record(placed: Sequence[Scalar]) -> Nuisance:

@@ -109,10 +109,10 @@ async def _tell(socket_: WebSocket, session: LiveSession, flying: list[WebSocket
         if session.version != version:
             version, last = session.version, ""
             await socket_.send_text(json.dumps(session.hello()))
-        told = session.told()
+        report = session.report()
         if flying and flying != [socket_]:
-            told |= {"recording": None, "estimates": [[None] * 3 for _ in told["estimates"]], "doubts": ELSEWHERE}
-        if (text := json.dumps(told, separators=(",", ":"))) != last:
+            report |= {"recording": None, "estimates": [[None] * 3 for _ in report["estimates"]], "doubts": ELSEWHERE}
+        if (text := json.dumps(report, separators=(",", ":"))) != last:
             last = text
             await socket_.send_text(text)
         await asyncio.sleep(1.0 / UPDATES)

@@ -88,15 +88,15 @@ class LiveSession:
     def _estimator(self, vehicle: Vehicle, world: World) -> Estimating:
         from swashplate.links.estimating import Estimating
 
-        late = dict(zip(vehicle.input_names, world.delays.tolist(), strict=True))
-        return Estimating(self._believed(vehicle), self._estimate, rate=1.0 / world.period, delays=late)
+        delays = dict(zip(vehicle.input_names, world.delays.tolist(), strict=True))
+        return Estimating(self._believed(vehicle), self._estimate, rate=1.0 / world.period, delays=delays)
 
     def _believed(self, vehicle: Vehicle) -> Vehicle:
         """The pilot's model of a vehicle, with the options that the page has switched since."""
         return vehicle if self._model is None else _switched(self._model, vehicle)
 
     # ---- what a page has flown ---------------------------------------------------------------------------------
-    def fly(self, told: bytes) -> None:
+    def fly(self, data: bytes) -> None:
         """Take in what was flown: numbers of 8 bytes, each period's `version` and number, its states, inputs and
         surroundings. What another version flew is let go.
 
@@ -105,9 +105,9 @@ class LiveSession:
         """
         vehicle, period = self.world.vehicle, self.world.period
         n, m = len(vehicle.state_names), len(vehicle.input_names)
-        if len(told) % 8 or len(told) < 16:
+        if len(data) % 8 or len(data) < 16:
             raise MessageError("bad rows")
-        numbers = np.frombuffer(told, "<f8")
+        numbers = np.frombuffer(data, "<f8")
         if numbers[0] != self.version:
             return
         if numbers.size % (2 + n + m + len(SURROUNDINGS)) or not np.all(np.isfinite(numbers)):
@@ -132,7 +132,7 @@ class LiveSession:
             self._looked = self._tick
             around = self.world.environment._replace(**dict(zip(SURROUNDINGS, row[n + m :].tolist(), strict=True)))
             said = doubts(vehicle, row[:n], row[n : n + m], around)
-            self._doubts = " ".join(f"{words[:1].upper()}{words[1:]}." for words in said)
+            self._doubts = " ".join(f"{text[:1].upper()}{text[1:]}." for text in said)
 
     # ---- life --------------------------------------------------------------------------------------------------
     def let_go(self) -> None:
@@ -143,13 +143,13 @@ class LiveSession:
         try:
             saved = going.finish()
             self.recordings.append(saved)
-            words = f"Recording {going.number} is saved: {saved.path}."
+            text = f"Recording {going.number} is saved: {saved.path}."
         except SwashError as error:
-            words = f"Recording {going.number}: {error}"
+            text = f"Recording {going.number}: {error}"
         except BaseException:  # a second interrupt while it is written
             self._tell(f"Recording {going.number} stays in {going.path}: the next `swash live` there saves it.")
             raise
-        self._tell(words)
+        self._tell(text)
 
     def close(self) -> None:
         """End what runs beside it, and save what is being recorded."""
@@ -180,14 +180,14 @@ class LiveSession:
         """Fly on by a law for the parameters as they are estimated now."""
         estimating = self.estimating
         known = () if estimating is None else estimating.known
-        told = {k.name: k.value for k in known if k.model is not None and k.value is not None}
-        if estimating is None or not told:
+        values = {k.name: k.value for k in known if k.model is not None and k.value is not None}
+        if estimating is None or not values:
             raise SwashError("No parameter is estimated yet: start with --estimate, and fly.")
-        law = await asyncio.to_thread(self.world.law_for, estimating.model.with_values(told))
+        law = await asyncio.to_thread(self.world.law_for, estimating.model.with_values(values))
         self.world.pilot = law
         self.code = await asyncio.to_thread(lambda: web_assembly(frame_code(self.world)))
         self.version, self._goes_on = self.version + 1, True
-        self.notice = f"The law now takes {', '.join(f'{name} = {value:.4g}' for name, value in told.items())}."
+        self.notice = f"The law now takes {', '.join(f'{name} = {value:.4g}' for name, value in values.items())}."
 
     async def _set_bar(self, on: bool) -> None:
         if "bar" not in self.world.vehicle.traits.switches:
@@ -244,7 +244,7 @@ class LiveSession:
         code = base64.b64encode(self.code).decode()
         return {"type": "model", "version": self.version, "goes_on": self._goes_on, "model": model, "code": code}
 
-    def told(self) -> dict[str, Any]:
+    def report(self) -> dict[str, Any]:
         """What the server knows of the flight, for one update of the page."""
         going, estimating, job = self.recording, self.estimating, self.identifying.job
         return {
@@ -253,7 +253,7 @@ class LiveSession:
             "doubts": self._doubts,
             "recording": None if going is None else round(going.seconds, 1),
             "recordings": [[r.number, round(r.seconds, 1)] for r in self.recordings],
-            "job": None if job is None else _told(job),
+            "job": None if job is None else _job_row(job),
             "frozen": "" if estimating is None else estimating.frozen,
             "estimates": [] if estimating is None else [_short([k.value, k.sigma, k.model]) for k in estimating.known],
         }
@@ -265,11 +265,11 @@ def _switched(model: Vehicle, vehicle: Vehicle) -> Vehicle:
     return model if model.card.options == options else from_card(replace(model.card, options=options))
 
 
-def _told(job: Job) -> list[Any]:
+def _job_row(job: Job) -> list[Any]:
     """A job as the page reads it."""
     left = None if job.left is None else round(job.left)
     share = None if job.share is None else round(job.share, 2)
-    return [job.recording, job.state, job.words, round(job.seconds), job.doing, share, left]
+    return [job.recording, job.state, job.outcome, round(job.seconds), job.doing, share, left]
 
 
 def _has_bar(vehicle: Vehicle) -> bool:

@@ -27,13 +27,13 @@ LOGGED_RATE = 20.0
 _CARD_HEAD = ("name", "value", "unit", "±", "source")
 
 
-def single_page(world: World, *, name: str, made: Sequence[str] = (), logged: Array | None = None) -> str:
+def single_page(world: World, *, name: str, origin: Sequence[str] = (), logged: Array | None = None) -> str:
     """The text of the page.
 
     Args:
         world: what flies, at its start.
         name: of the model, for what is recorded.
-        made: what it was made from, a line each: commit, card, data.
+        origin: what it was made from, a line each: commit, card, data.
         logged: body states of the flight that it was learnt from, `LOGGED_RATE` rows a second, shape (n, 12).
 
     Raises:
@@ -48,7 +48,7 @@ def single_page(world: World, *, name: str, made: Sequence[str] = (), logged: Ar
             **({} if logged is None else {"log": np.ascontiguousarray(logged, dtype="<f4").tobytes()}),
         },
         instead={"/page/connection.js": "/page/alone.js"},
-        within={'<p id="folder"></p>': f'<p id="folder"></p>\n{_card(world.vehicle)}\n{_origin(made)}'},
+        within={'<p id="folder"></p>': f'<p id="folder"></p>\n{_card(world.vehicle)}\n{_origin(origin)}'},
     )
 
 
@@ -65,7 +65,7 @@ def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
     nominal = world.nominal_voltage
     around = world.environment
     law = pilot.decide.graph(len(vehicle.state_names) + 4, pilot.memory.size, pilot.gain_count)
-    own = {"bar": False, "barred": False, "hows": [], "folder": "", "estimates": [], "learns": False, "logged": False}
+    off = {"bar": False, "barred": False, "hows": [], "folder": "", "estimates": [], "learns": False, "logged": False}
     return {
         "name": name,
         "hello": {
@@ -83,7 +83,7 @@ def page_model(world: World, *, name: str, **more: Any) -> dict[str, Any]:
             "rate": 1.0 / world.period,
             "fan": len(world.draws),
             "fan_seconds": FAN_SECONDS,
-            **own,
+            **off,
             **more,
         },
         "states": [list(pair) for pair in zip(vehicle.state_names, vehicle.state_units, strict=True)],
@@ -145,12 +145,12 @@ def _pose(world: World) -> dict[str, Any]:
     x, u = np.array(world.trim.state, dtype=float), np.array(world.trim.inputs, dtype=float)
 
     def flat(row: Array) -> tuple[Array, dict[str, Any]]:
-        told = pose(row[: x.size].tolist(), row[x.size :].tolist(), around)
-        parts = [*told["rotors"], told["bar"] or [], told["tail"] or []]
-        return np.concatenate([np.asarray(part, dtype=float) for part in parts]), told
+        parts_of = pose(row[: x.size].tolist(), row[x.size :].tolist(), around)
+        parts = [*parts_of["rotors"], parts_of["bar"] or [], parts_of["tail"] or []]
+        return np.concatenate([np.asarray(part, dtype=float) for part in parts]), parts_of
 
     row = np.concatenate([x, u])
-    at, told = flat(row)
+    at, drawn = flat(row)
     slopes = np.empty((at.size, row.size))
     for k in range(row.size):
         step = 1e-5 * max(1.0, abs(row[k]))
@@ -160,9 +160,9 @@ def _pose(world: World) -> dict[str, Any]:
     return {
         "at": np.round(at, 7).tolist(),
         "slopes": [[float(f"{v:.6g}") for v in line] for line in slopes],
-        "rotors": len(told["rotors"]),
-        "bar": told["bar"] is not None,
-        "tail": told["tail"] is not None,
+        "rotors": len(drawn["rotors"]),
+        "bar": drawn["bar"] is not None,
+        "tail": drawn["tail"] is not None,
     }
 
 
@@ -177,5 +177,5 @@ def _card(vehicle: Vehicle) -> str:
     return f"<details><summary>Numbers of the card</summary><table><tr>{head}</tr>{''.join(rows)}</table></details>"
 
 
-def _origin(made: Sequence[str]) -> str:
-    return "".join(f"<p>{html.escape(line)}</p>" for line in made)
+def _origin(lines: Sequence[str]) -> str:
+    return "".join(f"<p>{html.escape(line)}</p>" for line in lines)

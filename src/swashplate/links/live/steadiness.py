@@ -38,8 +38,8 @@ def _feedback(pilot: Pilot, mode: Mode, model: LinearModel, sensors: Sensors) ->
     voltage, gains = float(model.trim.environment.voltage or 0.0), pilot.gains[mode, True]
 
     def decided(row: Array) -> Array:
-        told = np.concatenate([sensors.read(row[size:]), np.zeros(3), [voltage]])
-        return np.concatenate(pilot.decide(row[:size], told, wanted, gains))
+        readings = np.concatenate([sensors.read(row[size:]), np.zeros(3), [voltage]])
+        return np.concatenate(pilot.decide(row[:size], readings, wanted, gains))
 
     steps = _STEP * np.eye(at.size)
     return np.stack([(decided(at + one) - decided(at - one)) / (2.0 * _STEP) for one in steps], axis=1)
@@ -52,12 +52,12 @@ def _growth(pilot: Pilot, fed: Array, model: LinearModel, back: NDArray[np.int_]
     held = expm(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) / rate)
     carried, past = pilot.memory.size, 1 + int(np.max(back))
     size = n + carried + past * m
-    told = np.zeros((carried + m, size))
-    told[:, n : n + carried], told[:, :n] = fed[:, :carried], fed[:, carried:]
+    measured = np.zeros((carried + m, size))
+    measured[:, n : n + carried], measured[:, :n] = fed[:, :carried], fed[:, carried:]
     commands = np.zeros(((past + 1) * m, size))
-    commands[:m], commands[m:, n + carried :] = told[carried:], np.eye(past * m)
+    commands[:m], commands[m:, n + carried :] = measured[carried:], np.eye(past * m)
     state = np.eye(n, size)
     for row in back:
         state = held[:n, :n] @ state + held[:n, n:] @ commands[row * m + np.arange(m)]
-    after = np.concatenate([state, told[:carried], commands[: past * m]])
+    after = np.concatenate([state, measured[:carried], commands[: past * m]])
     return float(np.abs(np.linalg.eigvals(after)).max())

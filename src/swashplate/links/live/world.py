@@ -85,9 +85,9 @@ class World:
         self.substeps = round(rate / self.pilot.rate)
         self.period = self.substeps / rate
         flying = (vehicle, *draws)
-        late = [np.zeros(len(vehicle.input_names)) if at_once else self._delays_of(one) for one in flying]
-        self.delays = late[0]
-        self.steps_back = np.stack([steps_back(one, self.substeps, rate) for one in late])
+        delays = [np.zeros(len(vehicle.input_names)) if at_once else self._delays_of(one) for one in flying]
+        self.delays = delays[0]
+        self.steps_back = np.stack([steps_back(one, self.substeps, rate) for one in delays])
         self.sensors = [sensors_of(one) if self.pilot.reads else Sensors() for one in flying]
         self.depth = 1 + max(int(np.max(self.steps_back)), round(REMEMBERED / self.period))
         self.not_held = self._not_held() if controller is None else ""
@@ -106,12 +106,12 @@ class World:
         if not (back.any() or any(read.placed)):
             return ""
         model, modes = linearize(self.vehicle, self.trim), set(HELD) & set(self.pilot.modes)
-        for cause, late, shown in (
+        for cause, delays, shown in (
             ("delays", back, Sensors()),
             ("sensors", 0 * back, read),
             ("delays and sensors", back, read),
         ):
-            if not all(holds(self.pilot, mode, model, late, shown) for mode in modes):
+            if not all(holds(self.pilot, mode, model, delays, shown) for mode in modes):
                 return NOT_HELD.format(cause=cause)
         return ""
 

@@ -66,7 +66,7 @@ def test_a_full_disk_ends_the_recording_with_what_is_written(tmp_path: Path, mon
     with monkeypatch.context() as during:
         during.setattr(os, "write", full)
         fly(session, 50)
-    notice = session.told()["notice"]
+    notice = session.report()["notice"]
     assert notice.startswith("The recording has stopped after 2.5 s: ")
     assert "No space left on device" in notice
     asyncio.run(session.obey({"type": "record", "value": False}))
@@ -130,9 +130,9 @@ def test_a_second_press_on_record_loses_nothing_and_half_an_hour_is_the_end(
     for _ in range(2):
         asyncio.run(session.obey({"type": "record", "value": True}))
         fly(session, 150)
-    assert session.told()["recording"] == 3.0
+    assert session.report()["recording"] == 3.0
     monkeypatch.setattr(module, "LONGEST", 3.5)
     fly(session, 100)
-    assert session.told()["notice"] == "The recording ends here: it has 3.5 s. Save it, and begin another one."
+    assert session.report()["notice"] == "The recording ends here: it has 3.5 s. Save it, and begin another one."
     session.close()
     assert Flight.load(tmp_path / "recording-1-truth.nc").values("x").size == 350

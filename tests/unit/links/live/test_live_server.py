@@ -175,7 +175,7 @@ def test_estimates_follow_the_flight_and_begin_anew_after_a_reset(tmp_path: Path
     flown = World(model.with_values({"mass": 0.36}), believed=model)
     session = LiveSession(flown.vehicle, controller=None, folder=tmp_path, estimate=["mass"], model=model)
     assert session.hello()["model"]["hello"]["estimates"] == [["mass", "kg"]]
-    assert session.told()["estimates"] == [[None, None, 0.302]]
+    assert session.report()["estimates"] == [[None, None, 0.302]]
 
     def fly(count: int, *, first: int) -> None:
         for k in range(count):
@@ -183,21 +183,21 @@ def test_estimates_follow_the_flight_and_begin_anew_after_a_reset(tmp_path: Path
             session.fly(np.array([session.version, first + k, *flown.latest], dtype="<f8").tobytes())
 
     fly(300, first=1)
-    ((value, sigma, said),) = session.told()["estimates"]
+    ((value, sigma, said),) = session.report()["estimates"]
     assert abs(value - 0.36) < 3.0 * sigma < 0.02
     assert said == 0.302
     unlearnt, version = session.world.pilot, session.version
     asyncio.run(session.obey({"type": "learn"}))
     learnt = session.world.pilot
-    assert session.told()["notice"].startswith("The law now takes mass = 0.3")
+    assert session.report()["notice"].startswith("The law now takes mass = 0.3")
     assert not np.array_equal(learnt.gains["attitude", True], unlearnt.gains["attitude", True])
     assert (session.version, session.hello()["goes_on"]) == (version + 1, True)
     assert session.hello()["model"]["gains"]["attitude"][0] == learnt.gains["attitude", True].tolist()
     flown.reset()
     fly(1, first=1)
-    assert session.told()["frozen"] == "a clock that jumped"
+    assert session.report()["frozen"] == "a clock that jumped"
     fly(1, first=2)
-    assert session.told()["frozen"] == ""
+    assert session.report()["frozen"] == ""
     session.close()
 
 
@@ -230,12 +230,12 @@ def test_rows_that_are_none_are_refused_and_those_of_another_version_let_go(tmp_
 def test_what_the_equations_do_not_hold_for_is_told(tmp_path: Path) -> None:
     session = LiveSession(sp.vehicle("coax"), controller=None, folder=tmp_path)
     session.fly(told(session.version, 1, 60))
-    assert session.told()["doubts"] == ""
+    assert session.report()["doubts"] == ""
     fast = rows(60)
     fast[:, 3] = 30.0
     numbered = np.column_stack([np.full(60, session.version), np.arange(61, 121), fast])
     session.fly(numbered.astype("<f8").tobytes())
-    assert "Its air speed is 30.0 m/s" in session.told()["doubts"]
+    assert "Its air speed is 30.0 m/s" in session.report()["doubts"]
     session.close()
 
 
@@ -330,8 +330,8 @@ def test_the_second_way_is_taken_where_the_first_leaves_no_report(
     asyncio.run(job.run(sp.vehicle("raptor50"), 1))
     assert job.job is not None
     assert job.job.state == state
-    assert job.job.words.startswith(words)
-    assert bool(job.job.words) == bool(words)
+    assert job.job.outcome.startswith(words)
+    assert bool(job.job.outcome) == bool(words)
 
 
 def test_a_long_recording_is_identified_from_where_its_sticks_move() -> None:
@@ -369,7 +369,7 @@ def test_an_identification_tells_how_far_it_is(tmp_path: Path, monkeypatch: pyte
     assert told.left is not None
     assert 0.5 * 0.2 * 22 < told.left < 5.0 * 0.2 * 22
     assert job.job is not None
-    assert job.job.words == "other words", "progress is no part of what went wrong"
+    assert job.job.outcome == "other words", "progress is no part of what went wrong"
 
 
 def test_lines_of_progress_are_read_back_and_others_are_left() -> None:

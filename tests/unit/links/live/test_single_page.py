@@ -45,7 +45,7 @@ def content(page: str, name: str) -> str:
 
 @pytest.mark.usefixtures("uncompiled")
 def test_all_of_it_lies_in_the_file_and_nothing_is_fetched() -> None:
-    page = single_page(World(sp.vehicle("coax")), name="coax", made=["card 1234"])
+    page = single_page(World(sp.vehicle("coax")), name="coax", origin=["card 1234"])
     assert len(page) < 1_000_000
     assert not re.search(r"(?:src|href)=\"(?!data:)", page)
     policy = re.search(r'Content-Security-Policy" content="([^"]+)"', page)
@@ -71,7 +71,7 @@ def test_a_hostile_card_is_text() -> None:
     coax = sp.vehicle("coax")
     mass = replace(coax.card.parameters["mass"], source=HOSTILE)
     card = replace(coax.card, title=HOSTILE, parameters={**coax.card.parameters, "mass": mass})
-    page = single_page(World(coax.with_card(card)), name="coax", made=[HOSTILE])
+    page = single_page(World(coax.with_card(card)), name="coax", origin=[HOSTILE])
     assert "alert(1)</script>" not in page
     assert "<b title" not in page
     assert json.loads(content(page, "model"))["hello"]["title"] == HOSTILE
