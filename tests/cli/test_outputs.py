@@ -18,6 +18,7 @@ import swashplate as sp
 from swashplate.api import identification
 from swashplate.api.question import VerbQuestion
 from swashplate.api.saying import Say, silent
+from swashplate.api.verbs.identify import FitVehicle
 from swashplate.atomic import folder_when_complete
 from swashplate.cli.app import app
 from swashplate.cli.console import as_json
@@ -214,6 +215,17 @@ def test_what_the_user_said_reaches_the_identification(work: Work, simulated: Pa
     (flight,) = work.asked["flights"]
     assert flight.rate("phi") == pytest.approx(50.0)
     assert not any(step.operation == "lowpass" for step in flight.history)
+
+
+def test_a_fit_says_how_far_it_is(work: Work, simulated: Path) -> None:
+    """The live page shows the share that is done, and what is left of the usual iterations."""
+    said: list[tuple[str, float, float | None]] = []
+
+    def say(what: str, *, done: float = 0.0, total: float | None = None, note: str = "") -> None:
+        said.append((what, done, total))
+
+    FitVehicle("coax", str(simulated)).answer(say)
+    assert ("fitting", 1, 60) in said
 
 
 def test_a_failed_fit_leaves_a_report_that_says_so_and_no_model(work: Work, simulated: Path, tmp_path: Path) -> None:

@@ -5,28 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swashplate.api.asking import turbulence
-from swashplate.api.design_controller import margins_document
+from swashplate.api.design_controller import WithController, margins_document
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.analysis.stability import loop_margins, loop_modes, require_stable
 from swashplate.control.analysis.straightness import DURATION, StepRun, command_for_speed, nearer, step_run
 from swashplate.control.draws.variations import draw_models
-from swashplate.control.kinds import save_controller
 from swashplate.control.lateness import lateness
 from swashplate.control.laws.autopilot import Autopilot, autopilot
 from swashplate.control.laws.decoupling import estimated_lag
 from swashplate.control.laws.learning import corrected_by_step, straightened
 from swashplate.errors import SwashError
-from swashplate.export.controller_c import ControllerCode, Precision, controller_code
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.straightness import compose_straightness
 from swashplate.reporting.structure import Report
-from swashplate.shown import Shown
 from swashplate.simulation.trim import Trim, trim
 from swashplate.simulation.wind import Gusts, dryden
 from swashplate.text_table import text_table
@@ -93,7 +89,7 @@ class FlownStep:
 
 
 @dataclass(frozen=True, repr=False)
-class DecouplingDesign(Shown):
+class DecouplingDesign(WithController):
     """The controller of a coaxial helicopter: height and yaw held, roll and pitch decoupled.
 
     Attributes:
@@ -127,15 +123,6 @@ class DecouplingDesign(Shown):
     def mixing(self) -> str:
         """Form of the equations that are inverted."""
         return "rotation" if self.controller.numbers.law.mixing > 0 else "as_printed"
-
-    def save(self, path: str | Path) -> Path:
-        """Write the controller's file (.toml)."""
-        save_controller(self.controller, path)
-        return Path(path)
-
-    def code(self, *, precision: Precision = "double") -> ControllerCode:
-        """One step as C99; needs the extra `model`."""
-        return controller_code(self.controller, precision=precision)
 
     def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""

@@ -23,6 +23,7 @@ from swashplate.filtering.sensor_suite import suite
 from swashplate.reporting.controller_design import compose_design
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
+from swashplate.simulation.controller import Controller
 from swashplate.text_table import text_table
 
 if TYPE_CHECKING:
@@ -32,8 +33,26 @@ _NEARLY = 1.05
 """Of a limit: closer is none."""
 
 
+class WithController(Shown):
+    """A design whose controller has a file, and a step in C."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def controller(self) -> Controller: ...
+
+    def save(self, path: str | Path) -> Path:
+        """Write the controller's file (.toml)."""
+        save_controller(self.controller, path)
+        return Path(path)
+
+    def code(self, *, precision: Precision = "double") -> ControllerCode:
+        """One step as C99; needs the extra `model`."""
+        return controller_code(self.controller, precision=precision)
+
+
 @dataclass(frozen=True, repr=False)
-class ControllerDesign(Shown):
+class ControllerDesign(WithController):
     """A designed controller, and what linear algebra promises of it.
 
     Attributes:
@@ -51,15 +70,6 @@ class ControllerDesign(Shown):
     late: str
     fast: str = ""
     premise: str = ""
-
-    def save(self, path: str | Path) -> Path:
-        """Write the controller's file (.toml)."""
-        save_controller(self.controller, path)
-        return Path(path)
-
-    def code(self, *, precision: Precision = "double") -> ControllerCode:
-        """One step as C99; needs the extra `model`."""
-        return controller_code(self.controller, precision=precision)
 
     def to_document(self) -> dict[str, object]:
         """All of it as what becomes JSON."""

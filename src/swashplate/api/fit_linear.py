@@ -183,14 +183,8 @@ def in_time(asked: FitInTime, say: Say) -> LinearStudy:
         result = identify(
             begun,
             records,
-            outputs=wanted,
-            shifts=asked.shifts,
-            biases=strings(asked.biases),
-            method=asked.method or "output-error",
-            iterations=asked.iterations or 80,
-            gusts=asked.gusts,
-            horizon=asked.horizon,
             progress=_iterations(say),
+            **asked.to_estimators() | {"outputs": wanted, "fix": None},
         )
     fit = cast(Result[StateSpaceModel, TimeDetails], stopping.with_stop(result))
     say("flying the model")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from swashplate.flights.checked import check_disjoint
 from swashplate.identification.core import stopping
 from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Result
-from swashplate.identification.estimators import Question, check_method
+from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
 from swashplate.identification.posterior import check_posterior
 from swashplate.identification.posterior import posterior as draw_posterior
@@ -30,9 +30,6 @@ from swashplate.reporting.summary import banners, summary
 from swashplate.reporting.terminal_tables import fit_table
 from swashplate.validation.controller_law import check_closed
 from swashplate.validation.validation import Validation
-
-_SAME = {field.name for field in fields(Question)} & {field.name for field in fields(FitVehicle)} - {"free", "prior"}
-"""What the verb asks as the estimators do."""
 
 
 def write_fit(fit: Result[object, object], folder: Path) -> None:
@@ -60,6 +57,7 @@ def fit_parts(fit: Result[object, object]) -> list[Any]:
 def identify_vehicle(asked: FitVehicle, say: Say) -> Result[object, object]:
     """The model that was asked for, with how it predicts what its fit has not seen."""
     posterior, close_loop = asked.posterior, strings(asked.close_loop)
+    most = asked.iterations or 60  # what a line of progress counts up to; a search ends sooner or by its own number
     prior: Mapping[str, Any] = asked.prior if isinstance(asked.prior, Mapping) else {"": asked.prior}
     card = prior.get("")
     vehicle = find(asked.vehicle or "") if isinstance(asked.vehicle, str | Path | None) else asked.vehicle
@@ -88,12 +86,11 @@ def identify_vehicle(asked: FitVehicle, say: Say) -> Result[object, object]:
         fit = identify(
             vehicle,
             seen if responses is None else responses,
-            method=asked.method,
             free=(free[0] if len(free) == 1 else free) or None,
             prior={name: value for name, value in prior.items() if name} or None,
             prior_card=card if card is None or isinstance(card, Card) else find(card).card,
-            progress=lambda i, cost: say("fitting", note=f"iteration {i}, cost {cost:.6g}"),
-            **{name: getattr(asked, name) for name in _SAME},
+            progress=lambda i, cost: say("fitting", done=i, total=most, note=f"iteration {i}, cost {cost:.6g}"),
+            **asked.to_estimators(),
         )
     fit = stopping.with_stop(fit)
     if posterior is not None and not fit.failed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -90,6 +91,13 @@ class FitOfRecords(Fit[Answer]):
     shifts: bool | None = setting(
         default=None, help="estimate constants in the states' rates; usual for state-space models"
     )
+
+    def to_estimators(self) -> dict[str, Any]:
+        """The method, and what it is asked as this verb is."""
+        from swashplate.identification.estimators import Question
+
+        same = {field.name for field in dataclasses.fields(Question)} & entries(type(self)).keys() - {"free", "prior"}
+        return {name: getattr(self, name) for name in ("method", *same)}
 
 
 class LinearFit(Fit[Answer]):

@@ -12,6 +12,7 @@ from swashplate.api.asking import InAir, name_of, one_or_more
 from swashplate.api.languages import Air, Aircraft, Speeds, Wind
 from swashplate.api.question import argument, option, setting, verb
 from swashplate.api.saying import Say, silent
+from swashplate.api.verbs.simulate import careful
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ class Steadily(InAir[Flown]):
         return Flown(name_of(self.vehicle) or vehicle.name, curve, result, tuple(curve.remarks))
 
     def remarks(self, answer: Flown) -> list[str]:
-        return [f"Careful: {words}" for words in answer.remarks]
+        return careful(answer.remarks)
 
 
 class TrimVehicle(Steadily):
