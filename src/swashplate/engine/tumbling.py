@@ -118,7 +118,7 @@ def to_euler(row: Array, before: Array) -> Array:
 
 def counted_on(angle: float, before: float) -> float:
     """The angle [rad], whole turns apart, that is nearest to `before`."""
-    return before + math.remainder(angle - before, 2.0 * math.pi)
+    return angle + 2.0 * math.pi * float(np.rint((before - angle) / (2.0 * math.pi)))
 
 
 def steep(states: Array) -> bool:

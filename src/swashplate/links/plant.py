@@ -140,11 +140,14 @@ class Plant:
         if self._around.sag:
             low = 0.5 * self.environment.voltage
             self._surround(max(low, self.environment.voltage - self._around.sag * self.time))
+        self._record(inputs)
+        return self._held
+
+    def _record(self, inputs: Sequence[float]) -> None:
         if self.time >= self._next - 1e-9:
             self._next += self._spacing
             if self._recorder is not None:
                 self._recorder.add(self.time, [*self._held.states, *inputs, *self._stepping.surroundings])
-        return self._held
 
     def was_flown(self, time: float, throttle: float) -> None:
         """C has moved it by `native`, until a time [s] with an engine's throttle there."""
@@ -154,6 +157,7 @@ class Plant:
         if engine is not None:
             engine.throttle = throttle
         self._follow(lambda: self._stepping.motion(native.rows[-1].tolist()))
+        self._record(native.rows[1].tolist())
 
     def _follow(self, move: Callable[[], Motion]) -> None:
         try:

@@ -59,7 +59,7 @@ class Client:
 
     def __init__(self, port: int) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.settimeout(5.0)
+        self.socket.settimeout(30.0)
         self.port = port
 
     def __enter__(self) -> Client:

@@ -3,7 +3,6 @@
 #include <arpa/inet.h>
 #include <math.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
 
@@ -12,7 +11,7 @@ struct link {
   double *x, *u, *s, *p, *g, *told;
   const char *form;
   double duration, time, until, throttle, voltage;
-  int fd, steps, rate, flown, length, size;
+  int fd, steps, rate, flown, length, size, held;
   uint32_t count;
   unsigned char address[4], port[2], data[@LONGEST@];
   char answer[@ROOM@];
@@ -55,11 +54,40 @@ static int ordinary(const struct link *l, double *pulses) {
   return 1;
 }
 
+/* As `decimal` of links/ardupilot/answer.py. */
+static char *decimal(char *to, double value) {
+  char digits[24];
+  uint64_t rest = (uint64_t)(fabs(value) * 1e9 + 0.5);
+  int n = 0;
+  if (value < 0.0 && rest) *to++ = '-';
+  for (; rest || n < 10; rest /= 10) {
+    if (n == 9) digits[n++] = '.';
+    digits[n++] = (char)('0' + rest % 10);
+  }
+  while (n) *to++ = digits[--n];
+  return to;
+}
+
+static int written(const char *form, const double *r, char *answer) {
+  char *to = answer;
+  for (; *form; ++form)
+    if (*form == '%') to = decimal(to, *r++);
+    else *to++ = *form;
+  return (int)(to - answer);
+}
+
+/* The last answer before `until` is held, and sent when this is called again: sticks are moved before it. */
 void fly(struct link *l) {
   double pulses[@CHANNELS@] = {0}, r[@NUMBERS@], after;
-  for (l->flown = 0, l->size = -1; l->time + l->duration < l->until - 1e-9; ++l->flown, ++l->count) {
-    struct sockaddr_in from;
-    socklen_t room = sizeof from;
+  struct sockaddr_in from;
+  socklen_t room = sizeof from;
+  memset(&from, 0, sizeof from);
+  from.sin_family = AF_INET;
+  memcpy(&from.sin_addr, l->address, 4);
+  memcpy(&from.sin_port, l->port, 2);
+  for (l->flown = 0; !l->held || l->time < l->until - 1e-9; ++l->flown, ++l->count) {
+    if (l->held) sendto(l->fd, l->answer, (size_t)l->length, 0, (struct sockaddr *)&from, room);
+    l->held = 0;
     l->size = (int)recvfrom(l->fd, l->data, sizeof l->data, 0, (struct sockaddr *)&from, &room);
     if (l->size < 0) return;
     if (memcmp(&from.sin_addr, l->address, 4) || memcmp(&from.sin_port, l->port, 2)) {
@@ -74,8 +102,7 @@ void fly(struct link *l) {
     if (!whole(l->told)) return;
     l->time += l->duration;
     felt(l->told, &l->time, &l->voltage, r);
-    l->length = snprintf(l->answer, sizeof l->answer, l->form, @PRINTED@);
-    sendto(l->fd, l->answer, (size_t)l->length, 0, (struct sockaddr *)&from, room);
-    l->size = -1;
+    l->length = written(l->form, r, l->answer);
+    l->held = 1;
   }
 }

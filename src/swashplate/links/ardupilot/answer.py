@@ -11,22 +11,28 @@ from swashplate.links.sensing import Readings
 from swashplate.physics.backend import Scalar
 
 _FORM = (
-    '\n{"timestamp":%.9f,"imu":{"gyro":[%.9g,%.9g,%.9g],"accel_body":[%.9g,%.9g,%.9g]},"position":[%.9g,%.9g,%.9g],'
-    '"attitude":[%.9g,%.9g,%.9g],"velocity":[%.9g,%.9g,%.9g],"rng_1":%.6g,"airspeed":%.6g,'
-    '"velocity_wind":[%.6g,%.6g,%.6g],"windvane":{"direction":%.6g,"speed":%.6g},"rpm":{"rpm_1":%.6g,"rpm_2":%.6g}'
+    '\n{"timestamp":%,"imu":{"gyro":[%,%,%],"accel_body":[%,%,%]},"position":[%,%,%],"attitude":[%,%,%],'
+    '"velocity":[%,%,%],"rng_1":%,"airspeed":%,"velocity_wind":[%,%,%],"windvane":{"direction":%,"speed":%},'
+    '"rpm":{"rpm_1":%,"rpm_2":%}'
 )
-_BATTERY = ',"battery":{"voltage":%.6g,"current":%.6g}'
+_BATTERY = ',"battery":{"voltage":%,"current":%}'
 
 
 def line(readings: Readings) -> bytes:
     """The answer to one servo packet."""
     values = in_order(readings)
-    return (form(len(values)) % values).encode("ascii")
+    return (form(len(values)).replace("%", "%s") % tuple(map(decimal, values))).encode("ascii")
 
 
 def form(count: int) -> str:
-    """The line with blanks, of `printf` here and in C, for so many numbers."""
+    """The line with a % for each of so many numbers."""
     return f"{_FORM}{'' if count == _FORM.count('%') else _BATTERY}}}\n"
+
+
+def decimal(value: float) -> str:
+    """A number with nine places. C writes it so too: `printf` took a fifth of the link's time."""
+    digits = int(abs(value) * 1e9 + 0.5)
+    return f"{'-' if value < 0.0 and digits else ''}{digits // 10**9}.{digits % 10**9:09d}"
 
 
 def in_order(r: Readings) -> tuple[Scalar, ...]:

@@ -33,7 +33,7 @@ from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.stepping import Motion, steps_of
 
-_AT_ONCE = 0.02
+_AT_ONCE = 0.1
 """s that are flown until Python is asked again: keys, other threads and clocks are looked at there."""
 _ROOM = 1024
 _OPTIONS = ("-O1",)
@@ -45,7 +45,7 @@ class _Link(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("x", "u", "s", "p", "g", "told")),
         ("form", ctypes.c_char_p),
         *((name, ctypes.c_double) for name in ("duration", "time", "until", "throttle", "voltage")),
-        *((name, ctypes.c_int) for name in ("fd", "steps", "rate", "flown", "length", "size")),
+        *((name, ctypes.c_int) for name in ("fd", "steps", "rate", "flown", "length", "size", "held")),
         ("count", ctypes.c_uint),
         ("address", ctypes.c_ubyte * 4),
         ("port", ctypes.c_ubyte * 2),
@@ -61,7 +61,7 @@ class Lockstep:
         plant: stepped by C. sensing: of it, without noise.
 
     Attributes:
-        answer: the newest one that was sent.
+        answer: the newest one.
     """
 
     def __init__(self, plant: Plant, sensing: Sensing) -> None:
@@ -86,10 +86,10 @@ class Lockstep:
         Args:
             bound: the socket. sender: whose packets are answered.
             count: of the last frame. rate: of the frames [Hz].
-            until: the physics' time before which it ends [s].
+            until: the physics' time to which it flies [s].
 
         Returns:
-            How many frames were answered; `left` is what came then.
+            How many frames were flown; `holding` and `left` say why no more.
         """
         plant, link = self._plant, self._link
         link.fd, link.rate, link.count, link.duration = bound.fileno(), rate, count & 0xFFFFFFFF, 1.0 / rate
@@ -102,10 +102,15 @@ class Lockstep:
         return int(link.flown)
 
     @property
+    def holding(self) -> bool:
+        """Whether the newest answer is held until it is flown on."""
+        return bool(self._link.held)
+
+    @property
     def left(self) -> tuple[bytes, Address] | None:
         """What came and was not answered, and its sender."""
         link = self._link
-        if link.size < 0:
+        if link.held or link.size < 0:
             return None
         return bytes(link.data[: link.size]), (socket.inet_ntoa(bytes(link.address)), int.from_bytes(link.port, "big"))
 

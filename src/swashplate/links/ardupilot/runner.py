@@ -21,8 +21,9 @@ class Answering(Protocol):
     def handle(self, data: bytes, sender: tuple[str, int], now: float) -> bytes | None:
         """The answer, or None where there is none."""
 
-    def carry_on(self, bound: socket.socket) -> tuple[bytes, tuple[str, int]] | None:
-        """Answer what comes without further ado; returns what it leaves to `handle`, and its sender."""
+    def carry_on(self, bound: socket.socket) -> tuple[tuple[bytes, tuple[str, int]] | None, bool]:
+        """Answer what comes without further ado; returns what it leaves to `handle`, and its sender, and whether to
+        carry on at once."""
 
 
 def serve(
@@ -43,21 +44,24 @@ def serve(
     wait_at_most(bound, _LOOK_UP)
     heard = looked = time.monotonic()
     left: tuple[bytes, tuple[str, int]] | None = None
+    more = False
     while True:
-        try:
-            data, sender = left or bound.recvfrom(LONGEST + 1)
-        except (TimeoutError, BlockingIOError):
-            data = None
-        except ConnectionError:
-            continue  # an answer found nobody: the autopilot has gone, and will be back or not
-        now, left = time.monotonic(), None
-        if data is not None:
-            answer = session.handle(data, sender, now)
-            if answer is not None:
+        if more:
+            left, more = session.carry_on(bound)
+            heard = now = time.monotonic()
+        else:
+            try:
+                data, sender = left or bound.recvfrom(LONGEST + 1)
+            except (TimeoutError, BlockingIOError):
+                data, sender = b"", None
+            except ConnectionError:
+                continue  # an answer found nobody: the autopilot has gone, and will be back or not
+            now, left = time.monotonic(), None
+            answer = session.handle(data, sender, now) if sender else None
+            if sender and answer is not None:
                 _answer(bound, answer, sender)
-                left = session.carry_on(bound)
-                heard = now = time.monotonic()
-        if now - looked >= _LOOK_UP or data is None:
+                heard, more = now, True
+        if now - looked >= _LOOK_UP:
             looked = now
             if not go_on() or (idle_exit is not None and now - heard >= idle_exit):
                 return

@@ -99,22 +99,21 @@ class ArduPilotSession:
             self._notices.tell("skip", f"{missed} frames before {packet.frame_count} never came; the flight goes on.")
         return self._fly(packet)
 
-    def carry_on(self, bound: socket.socket, until: float = math.inf) -> tuple[bytes, Address] | None:
-        """Answer ordinary frames that come to a socket until the physics' time is so late [s], or something else comes.
+    def carry_on(self, bound: socket.socket, until: float = math.inf) -> tuple[tuple[bytes, Address] | None, bool]:
+        """Answer ordinary frames that come to a socket up to a time of the physics [s], or until something else comes.
 
         Returns:
-            The datagram that is left to `handle`, and its sender.
+            The datagram that is left to `handle`, and its sender; whether to carry on at once: an answer waits.
         """
-        frames, sender = self._frames, self._frames.sender
-        if self._lockstep is None or sender is None or self.plant.broken:
-            return None
-        until = min(until, self.plant.due)
-        answered = self._lockstep.fly(bound, sender, frames.last, self._rate, until)
+        frames, sender, lockstep = self._frames, self._frames.sender, self._lockstep
+        if lockstep is None or sender is None or self.plant.broken:
+            return None, False
+        answered = lockstep.fly(bound, sender, frames.last, self._rate, min(until, self.plant.due))
         if answered:
             self._frames = Frames(sender, frames.last + answered, time.monotonic())
             self._exchanges += answered
-            self._answer = self._lockstep.answer
-        return self._lockstep.left
+            self._answer = lockstep.answer
+        return lockstep.left, lockstep.holding
 
     def _start(self, packet: ServoPacket, sender: Address, before: Frames, now: float) -> None:
         where = f"{_at(sender)}, {len(packet.pulses)} outputs, {packet.frame_rate} Hz"

@@ -331,13 +331,19 @@ class Piloted:
         """The session's answer; the sticks are moved before it is sent."""
         answer = self._session.handle(data, sender, now)
         if answer is not None:
-            plant = self._session.plant
-            self._pilot.look(plant.time, plant.motion, plant.rotor_speeds(plant.motion)[0])
+            self._look()
         return answer
 
-    def carry_on(self, bound: socket.socket) -> tuple[bytes, tuple[str, int]] | None:
+    def carry_on(self, bound: socket.socket) -> tuple[tuple[bytes, tuple[str, int]] | None, bool]:
         """The session's, until the pilot is due."""
-        return self._session.carry_on(bound, self._pilot.due)
+        left, more = self._session.carry_on(bound, self._pilot.due)
+        if more:
+            self._look()
+        return left, more
+
+    def _look(self) -> None:
+        plant = self._session.plant
+        self._pilot.look(plant.time, plant.motion, plant.rotor_speeds(plant.motion)[0])
 
 
 class Background:
