@@ -26,9 +26,10 @@ from swashplate.links.betaflight.configuration import configuration
 from swashplate.links.betaflight.gains import AXES, RATES, SIGNS, axis_response, betaflight_gains
 from swashplate.links.betaflight.log_clock import log_clock
 from swashplate.links.betaflight.motors import MotorMapping
-from swashplate.links.betaflight.packets import MOTORS_PORT
+from swashplate.links.betaflight.packets import MOTORS_PORT, STATE_SIZE
 from swashplate.links.betaflight.pilot import pilot_for
-from swashplate.links.betaflight.session import STEP, BetaflightSession, serve
+from swashplate.links.betaflight.session import BetaflightSession, serve
+from swashplate.links.betaflight.stepped_clock import LOOP, stepped_clock
 from swashplate.links.betaflight.trial import BetaflightTrial, StickSweep
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
     from swashplate.api.verbs.link import Accept
 
 _PACE = 0.25
-"""Simulated seconds a second, where nothing slower is asked for: there is no lockstep."""
+"""Simulated seconds a second without lockstep, where nothing slower is asked for."""
 _RATE = 200.0
 """Hz of the records."""
 _COHERENT, _LEAST_SHARE = 0.8, 0.5
@@ -56,15 +57,15 @@ def accept_multirotor(
     """The trial of Betaflight that was asked for, of a vehicle with its changes.
 
     It is configured (motors, modes, gains with margins), started, armed, hovered in ANGLE mode by a pilot of ours, and
-    each stick is swept; then the response of its Blackbox log is held against the vehicle's linearisation. Its clock is
-    not in lockstep with the physics: both run slowly, so that a busy machine is not late. The binary is ended in every
-    case.
+    each stick is swept; then the response of its Blackbox log is held against the vehicle's linearisation. Where its
+    clock cannot be brought into lockstep with the physics, both run slowly, so that a busy machine is not late. The
+    binary is ended in every case.
 
     Args:
         gains: settings of Betaflight's command line that are flown; those of `betaflight_gains` where None.
     """
     axes = tuple(axis for axis in strings(asked.axes) if axis != "heave" or asked.axes != tuple(MIXER_AXES))
-    pace, timeout, truth = min(asked.speedup, _PACE), asked.timeout, asked.other()
+    timeout, truth = asked.timeout, asked.other()
     band, seconds = asked.band or (0.5, 6.0), asked.seconds or 20.0
     if unknown := [axis for axis in axes if axis not in AXES]:
         raise SwashError(f"'{unknown[0]}' is none of {', '.join(AXES)}.", channel="axes")
@@ -74,6 +75,9 @@ def accept_multirotor(
     mapping, sitl = MotorMapping(vehicle), BetaflightBinary(asked.binary, folder)
     around = asked.around(vehicle)
     with listen_udp("127.0.0.1", MOTORS_PORT) as bound:
+        say("asking the binary who it is")
+        sitl.configure(configuration(mapping, gains or {}), timeout=timeout)
+        clock = sitl.before = stepped_clock(STATE_SIZE, folder)
         say("trimming and linearising the vehicle")
         flying = airborne(vehicle)
         model = linearize(flying, trim(flying, environment=around))
@@ -87,7 +91,7 @@ def accept_multirotor(
         plant.prepare()
         pilot = pilot_for(model, plant.standing_depth)
         session = BetaflightSession(plant, mapping, Sensing(plant), Notices(lambda text: say(text)), sticks=pilot)
-        session.pace = pace
+        session.pace, session.in_lockstep = asked.speedup if clock else min(asked.speedup, _PACE), clock is not None
         sweeps = tuple(StickSweep(axis, *band, seconds) for axis in axes)
         trial = BetaflightTrial(session, pilot, sitl, asked.height or 1.5, asked.hover or 5.0, sweeps)
         trial.lines.append(TrialLine("configuration", f"{len(settings)} settings", "loaded without an error", True))
@@ -104,8 +108,9 @@ def accept_multirotor(
                     trial.lines.append(TrialLine("physics", str(physics.failed[0]), "answers to the end", False))
         told = session.exchanged
         speed = plant.time / max(time.monotonic() - begun, 1e-9)
-        words = f"{told.states} states, motors for {100.0 * told.answered:.0f} %, {1e3 * told.longest:.0f} ms at most"
-        trial.lines.append(TrialLine("exchanges, no lockstep", f"{words}, {1e3 * told.lost:.0f} ms lost"))
+        what = f"exchanges, {'' if clock else 'no '}lockstep"
+        words = f"{told.states} states, motors for {100.0 * told.answered:.1f} %, {1e3 * told.longest:.0f} ms at most"
+        trial.lines.append(TrialLine(what, f"{words}, {1e3 * told.lost:.0f} ms lost"))
     say("reading the log")
     logs = sitl.logs()
     other = model if truth is None else linearize(airborne(truth), trim(airborne(truth), environment=around))
@@ -166,8 +171,9 @@ def _axis(
     The command is what the motors got of it: the mixer limits the sums that a log has. The log's clock is held against
     ours by the stick, and the truth is taken at our frequencies.
 
-    The truth is not late: a step moves the time that has passed under the newest motors, which is early by what a state
-    waits for its loop. Without lockstep either side may be off by the longest step that there was, so may the phase.
+    In lockstep motors are held for a loop, so the truth is half of one late. Without, it is not: a step moves the time
+    that has passed under the newest motors, which is early by what a state waits for its loop; then either side may be
+    off by the longest step that there was. So may the phase, and by a sample of the records in any case.
     """
     place, command, stick = AXES.index(axis), f"mixer_{axis}", f"stick_{axis}"
     rate = f"{RATES[place]}_imu" if f"{RATES[place]}_imu" in flight else RATES[place]
@@ -188,7 +194,9 @@ def _axis(
     )
     h, coherence, error = response.pair(rate, command)
     good = np.isfinite(h) & (coherence >= _COHERENT)
-    true = axis_response(model, mapping, place, response.omega * clock.ratio)
+    omega = response.omega * clock.ratio
+    late = 0.5 * LOOP if trial.session.in_lockstep else 0.0
+    true = axis_response(model, mapping, place, omega) * np.exp(-1j * omega * late)
     share = float(np.mean(good))
     comparison.curves[(rate, command)] = {
         "truth": (response.omega, true),
@@ -205,7 +213,7 @@ def _axis(
     if good.any():
         gain, phase = gain_and_phase_off(h[good], true[good])
         sigma = np.nan_to_num(error[good])
-        limit = np.minimum(PHASE, np.degrees(response.omega[good] * max(STEP, longest)))
+        limit = np.minimum(PHASE, np.degrees(response.omega[good] * max(1.0 / _RATE, longest)))
         right = (gain <= np.maximum(GAIN, SIGMAS * 8.686 * sigma)) & (
             phase <= np.maximum(limit, SIGMAS * np.degrees(sigma))
         )

@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 import math
+import os
+import socket
 import struct
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import swashplate as sp
+from link_bench import QUICK
+from swashplate.compiler import compiler
 from swashplate.control.laws.rotorflight.mixers import SWASHPLATES
 from swashplate.links.betaflight.configuration import configuration
 from swashplate.links.betaflight.gains import AXES, axis_response, betaflight_gains
 from swashplate.links.betaflight.log_clock import log_clock
 from swashplate.links.betaflight.motors import MotorMapping
-from swashplate.links.betaflight.packets import PulseRefusal, Pulses, pulses_of, state_packet, sticks_packet
+from swashplate.links.betaflight.packets import (
+    STATE_SIZE,
+    PulseRefusal,
+    Pulses,
+    pulses_of,
+    state_packet,
+    sticks_packet,
+)
 from swashplate.links.betaflight.servo_outputs import SwashServoMapping
 from swashplate.links.betaflight.session import BetaflightSession
+from swashplate.links.betaflight.stepped_clock import stepped_clock
 from swashplate.links.betaflight.trial import StickSweep
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
@@ -246,3 +261,74 @@ def test_a_firmware_without_servos_is_told() -> None:
     assert "drives 4 motors, the vehicle has 1" in said[1]
     assert session.exchanged.motors == 0
     assert len(session.begun(0.0)) == 17 * 8
+
+
+WAITS = """
+#define _GNU_SOURCE
+#include <arpa/inet.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <sys/select.h>
+#include <sys/socket.h>
+#include <time.h>
+static int bound;
+static volatile int taken;
+static void *take(void *none) {
+  char data[256];
+  fd_set in;
+  for (;; ++taken) {
+    FD_ZERO(&in);
+    FD_SET(bound, &in);
+    select(bound + 1, &in, 0, 0, 0);
+    recvfrom(bound, data, sizeof data, 0, 0, 0);
+  }
+  return none;
+}
+static double now(void) {
+  struct timespec at;
+  clock_gettime(CLOCK_MONOTONIC, &at);
+  return at.tv_sec + 1e-9 * at.tv_nsec;
+}
+int main(void) {
+  struct sockaddr_in at = {.sin_family = AF_INET};
+  socklen_t room = sizeof at;
+  struct timespec nap = {0, 50000};
+  pthread_t other;
+  double began;
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  bound = socket(AF_INET, SOCK_DGRAM, 0);
+  bind(bound, (struct sockaddr *)&at, sizeof at);
+  getsockname(bound, (struct sockaddr *)&at, &room);
+  pthread_create(&other, 0, take, 0);
+  printf("%d\\n", ntohs(at.sin_port));
+  fflush(stdout);
+  while (!taken) nanosleep(&nap, 0);
+  for (began = now(); now() < began + 0.020;) nanosleep(&nap, 0);
+  puts("over");
+  return 0;
+}
+"""
+"""Two threads, as the firmware has: one takes states, the other waits until 20 loops are over."""
+
+
+@pytest.mark.skipif(sys.platform != "linux" or QUICK is None, reason="the clock is put before a system's own")
+def test_the_clock_of_a_program_waits_for_states(tmp_path: Path) -> None:
+    library, source, waiting = stepped_clock(STATE_SIZE, tmp_path), tmp_path / "waits.c", tmp_path / "waits"
+    source.write_text(WAITS)
+    subprocess.run([*(compiler() or ()), str(source), "-o", str(waiting), "-pthread"], check=True)
+    loading = {**os.environ, "LD_PRELOAD": str(library)}
+    with subprocess.Popen([str(waiting)], stdout=subprocess.PIPE, text=True, env=loading) as program:
+        try:
+            assert program.stdout is not None
+            port = int(program.stdout.readline())
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+                for _ in range(15):
+                    out.sendto(bytes(STATE_SIZE), ("127.0.0.1", port))
+                    out.sendto(bytes(40), ("127.0.0.1", port))  # what is no state gives no time
+                with pytest.raises(subprocess.TimeoutExpired):
+                    program.wait(1.0)
+                for _ in range(10):
+                    out.sendto(bytes(STATE_SIZE), ("127.0.0.1", port))
+                assert program.stdout.readline() == "over\n"
+        finally:
+            program.kill()

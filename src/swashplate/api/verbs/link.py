@@ -249,8 +249,8 @@ class Accept(InAir["Acceptance"], Linkable):
     extra `link`. The binary is ended in every case.
 
     A multirotor is tried with Betaflight's SITL: configured, armed, hovered in ANGLE mode, its sticks swept from 0.5 to
-    6 Hz (roll, pitch, yaw), and its Blackbox log compared. There is no lockstep, so it flies at a quarter of real time
-    or slower (speedup). Options of modes, parameter files and ports are for ArduPilot.
+    6 Hz (roll, pitch, yaw), and its Blackbox log compared. On Linux with a C compiler it flies in lockstep; elsewhere
+    at a quarter of real time or slower (speedup). Options of modes, parameter files and ports are for ArduPilot.
 
     Raises:
         SwashError: a binary that is missing, cannot be run, ends at once or is another program (ArduCopter 4.5 or

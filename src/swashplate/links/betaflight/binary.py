@@ -24,8 +24,9 @@ from swashplate.systems import end_with_children
 _PATIENCE = 2.0
 """s that it has to end by itself."""
 _CONFIGURED = "EEPROM saved"
-_UP, _SETTLING = f"bind port {MSP_PORT}", 0.5
-"""What it prints once its ports are open, and how long its sensors take from there [s]."""
+_UP, _SETTLING, _STARTING = f"bind port {MSP_PORT}", 0.5, 4.0
+"""What it prints once its ports are open, how long its sensors take from there, and how long all of it takes [s]: its
+clock is the system's until the first state."""
 _CLOCK = re.compile(rb"\[SITL\] t=(\d+)ms  spd")
 
 
@@ -35,12 +36,17 @@ class BetaflightBinary:
     Args:
         binary: Betaflight's SITL. folder: where it runs; made where it is missing.
 
+    Attributes:
+        before: a library that is loaded before its own; None for none.
+        clock: the time that its clock told last [s].
+
     Raises:
         LinkError: where the binary is missing or is no program, or one of its ports is taken.
     """
 
     def __init__(self, binary: str | Path, folder: Path) -> None:
         self.binary, self.folder = _runnable(Path(binary)), folder
+        self.before: Path | None = None
         for kind, port in (
             (socket.SOCK_DGRAM, STATE_PORT),
             (socket.SOCK_DGRAM, STICKS_PORT),
@@ -49,7 +55,7 @@ class BetaflightBinary:
             _check_free(kind, port)
         self._process: subprocess.Popen[bytes] | None = None
         self._told = bytearray()
-        self._clock: tuple[float, float] | None = None
+        self.clock = 0.0
 
     def configure(self, text: str, *, timeout: float) -> None:
         """Let it load lines of its command line.
@@ -88,11 +94,12 @@ class BetaflightBinary:
 
     def _start(self, *arguments: str) -> None:
         self._told.clear()
+        environment = {**os.environ, **({"LD_PRELOAD": str(self.before)} if self.before else {})}
         mine, its = os.openpty()
         try:
             self._process = subprocess.Popen(
                 [str(self.binary), *arguments], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=its, stderr=its,
-                start_new_session=True,
+                start_new_session=True, env=environment,
             )  # fmt: skip
         except OSError as error:
             os.close(mine)
@@ -109,7 +116,7 @@ class BetaflightBinary:
             while piece := os.read(terminal, 4096):
                 self._told += piece
                 if times := _CLOCK.findall(piece):
-                    self._clock = time.monotonic(), 1e-3 * float(times[-1])
+                    self.clock = 1e-3 * float(times[-1])
         os.close(terminal)
 
     def stop(self) -> None:
@@ -154,7 +161,7 @@ class BetaflightBinary:
             if ending := self.ended():
                 raise LinkError(ending, where=self.binary)
             if _UP in self.text():
-                time.sleep(_SETTLING)
+                time.sleep(_SETTLING if self.before is None else _STARTING)
                 return
             time.sleep(0.05)
         raise LinkError(
@@ -162,10 +169,6 @@ class BetaflightBinary:
             where=self.binary,
             hint="Is it Betaflight's SITL?",
         )
-
-    def clock(self) -> tuple[float, float] | None:
-        """When it last told the time of its clock, and that [s]; None where it did not yet."""
-        return self._clock
 
     def refusals(self) -> str:
         """Why it refuses to be armed, in its own words, as it said last; empty for nothing."""

@@ -17,6 +17,7 @@ from swashplate.links.sensing import Readings
 MOTORS_PORT, SHARES_PORT, STATE_PORT, STICKS_PORT, MSP_PORT = 9001, 9002, 9003, 9004, 5761
 CHANNELS = 16
 _STATE = struct.Struct("<18d")
+STATE_SIZE = _STATE.size
 _STICKS = struct.Struct("<d16H")
 _PULSES = struct.Struct("<H2x16f")
 _EITHER = {"<": "<H2x16f", ">": ">H2x16f"}

@@ -1,16 +1,17 @@
-"""A vehicle as the physics of Betaflight's SITL: states out and motors in, each side on a clock of its own.
+"""A vehicle as the physics of Betaflight's SITL: states out and motors in.
 
-The firmware sets the pace of its clock from the time stamps of the last two states and when they came: on a busy
+In lockstep (`stepped_clock`) each state answers the motors of a loop. Otherwise each side has a clock of its own. The
+firmware sets the pace of its clock from the time stamps of the last two states and when they came: on a busy
 machine it rushes by a factor of three. A state with the time stamp of the one before leaves its clock alone. So three
-states set a pace once, slower than the wall clock where a machine is busy, and all others have the same stamp. There is
-no lockstep; how late steps were is told. A build with ENABLE_SIMULATOR_GYROPID_SYNC runs a loop for each state.
+states set a pace once, slower than the wall clock where a machine is busy, and all others have the same stamp; how late
+steps were is told. A build with ENABLE_SIMULATOR_GYROPID_SYNC runs a loop for each state.
 """
 
 from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from swashplate.links.betaflight.motors import MotorMapping
@@ -23,9 +24,11 @@ from swashplate.links.betaflight.packets import (
     sticks_packet,
 )
 from swashplate.links.betaflight.servo_outputs import SwashServoMapping
+from swashplate.links.betaflight.stepped_clock import LOOP
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant
 from swashplate.links.sensing import Sensing
+from swashplate.links.sockets import wait_at_most
 from swashplate.simulation.stepping import Motion
 
 STEP, _WALL = 0.0005, 0.001
@@ -35,6 +38,9 @@ LONGEST = 0.02
 """s that the physics moves at once at most: what a machine stood still longer is lost to it, and told."""
 _TICK = 0.00025
 """s: moves are whole numbers of it."""
+_STARTING, _PATIENCE, _STEADY = 0.002, 0.5, 100
+"""s of wall clock without motors after which the next state goes out in lockstep too: while the firmware starts, which
+sends few, and behind so many that came for each state."""
 _STAMP = 0.015
 """s between the two time stamps that set the pace: 20 ms are no pace for it."""
 STICKS_EVERY = 0.01
@@ -74,7 +80,8 @@ class BetaflightSession:
 
     Attributes:
         pulses: the newest outputs [us].
-        pace: simulated seconds a second.
+        pace: simulated seconds a second; at most in lockstep.
+        in_lockstep: whether the firmware's clock waits for states.
     """
 
     def __init__(
@@ -88,7 +95,7 @@ class BetaflightSession:
         doubles: int = 18,
     ) -> None:
         self.plant, self._sensing, self._notices, self.sticks, self._size = plant, sensing, notices, sticks, 8 * doubles
-        self.pace, self._motors = 1.0, mapping.motors
+        self.pace, self.in_lockstep, self._motors = 1.0, False, mapping.motors
         self.pulses = [_AT_REST] * max(plant.mapping.channels)
         self.exchanged = Exchanged()
         self._said_broken, self._due = False, 0.0
@@ -138,7 +145,7 @@ def serve(
     go_on: Callable[[], bool] = lambda: True,
     idle_exit: float | None = None,
 ) -> None:
-    """Send states at their pace to this machine, and take what comes on the motors' port.
+    """Send states to this machine, in lockstep or at their pace, and take what comes on the motors' port.
 
     Args:
         bound: a UDP socket on the motors' port; it is not closed.
@@ -146,33 +153,54 @@ def serve(
         go_on: asked at every step whether to go on.
         idle_exit: end after so many seconds without a motor packet; None goes on for ever.
     """
-    bound.setblocking(False)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         out.bind(("127.0.0.1", 0))  # left to itself, the first packet would open a port to every machine
-        for stamp in (0.0, 0.0, _STAMP):  # the second is the first whose time it keeps
-            _send(out, session.begun(stamp), STATE_PORT)
-            time.sleep(_STAMP / session.pace if stamp == 0.0 else 0.0)
-        heard = moved_to = time.monotonic()
-        came = 0
-        while go_on():
-            pace = session.pace
-            while (left := moved_to + max(STEP / pace, _WALL) - time.monotonic()) > 0.0:
-                time.sleep(left)
-            _receive(bound, session)
-            now = time.monotonic()
-            ticks = int((now - moved_to) * pace / _TICK)
-            moved_to += ticks * _TICK / pace
-            duration = min(LONGEST, ticks * _TICK)
-            counts = session.exchanged
-            counts.longest, counts.lost = max(counts.longest, ticks * _TICK), counts.lost + ticks * _TICK - duration
+        steps = _in_lockstep(bound, out, session) if session.in_lockstep else _at_pace(bound, out, session)
+        heard, came = time.monotonic(), 0
+        for duration in steps:
+            if not go_on():
+                return
             state, sticks = session.step(duration)
-            _send(out, state, STATE_PORT)
             if sticks is not None:
                 _send(out, sticks, STICKS_PORT)
-            if counts.motors > came:
-                heard, came = now, counts.motors
-            if idle_exit is not None and now - heard >= idle_exit:
+            _send(out, state, STATE_PORT)
+            if session.exchanged.motors > came:
+                heard, came = time.monotonic(), session.exchanged.motors
+            if idle_exit is not None and time.monotonic() - heard >= idle_exit:
                 return
+
+
+def _in_lockstep(bound: socket.socket, out: socket.socket, session: BetaflightSession) -> Iterator[float]:
+    """A loop for each packet of motors."""
+    begun, session.exchanged.longest, answered = time.monotonic(), LOOP, 0
+    while True:
+        if answered in (0, _STEADY):
+            wait_at_most(bound, _PATIENCE if answered else _STARTING)
+        yield LOOP
+        answered = answered + 1 if _receive(bound, session) else 0
+        if (left := begun + session.plant.time / session.pace - time.monotonic()) > 0.0:
+            time.sleep(left)
+
+
+def _at_pace(bound: socket.socket, out: socket.socket, session: BetaflightSession) -> Iterator[float]:
+    """What the wall clock has moved."""
+    bound.setblocking(False)
+    for stamp in (0.0, 0.0, _STAMP):  # the second is the first whose time it keeps
+        _send(out, session.begun(stamp), STATE_PORT)
+        time.sleep(_STAMP / session.pace if stamp == 0.0 else 0.0)
+    moved_to = time.monotonic()
+    while True:
+        pace = session.pace
+        while (left := moved_to + max(STEP / pace, _WALL) - time.monotonic()) > 0.0:
+            time.sleep(left)
+        while _receive(bound, session):
+            pass
+        ticks = int((time.monotonic() - moved_to) * pace / _TICK)
+        moved_to += ticks * _TICK / pace
+        duration = min(LONGEST, ticks * _TICK)
+        counts = session.exchanged
+        counts.longest, counts.lost = max(counts.longest, ticks * _TICK), counts.lost + ticks * _TICK - duration
+        yield duration
 
 
 def _send(out: socket.socket, data: bytes, port: int) -> None:
@@ -182,10 +210,11 @@ def _send(out: socket.socket, data: bytes, port: int) -> None:
         return  # nobody is there yet, or any more
 
 
-def _receive(bound: socket.socket, session: BetaflightSession) -> None:
-    while True:
-        try:
-            data = bound.recv(2048)
-        except (BlockingIOError, ConnectionError):
-            return
-        session.take(data)
+def _receive(bound: socket.socket, session: BetaflightSession) -> bool:
+    """Take one datagram; whether one came."""
+    try:
+        data = bound.recv(2048)
+    except (TimeoutError, BlockingIOError, ConnectionError):
+        return False
+    session.take(data)
+    return True

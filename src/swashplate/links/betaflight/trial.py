@@ -19,7 +19,7 @@ from swashplate.links.betaflight.session import BetaflightSession
 _READY, _IDLE = 25.0, 1020.0
 """s of simulated time within which it must arm; us above which motors turn, and so are armed."""
 _MEASURED, _OFF = 6.0, 0.2
-"""s of wall clock over which its clock is held against ours, and by how much of ours it may be off."""
+"""s over which its clock is held against the physics' in lockstep, or else ours, and by how much it may be off."""
 _STALLED = 15.0
 """s of wall clock without a motor packet."""
 _STRAYS = 0.5
@@ -124,22 +124,29 @@ class BetaflightTrial:
         self.land()
 
     def meet_its_clock(self) -> None:
-        """Hold the pace of its clock against ours, and take it over."""
-        asked = self.session.pace
+        """Hold the pace of its clock against the physics' in lockstep, or else against ours, and take it over."""
+        in_step = self.session.in_lockstep
+        asked, unit = (1.0, "s of the physics'") if in_step else (self.session.pace, "s a second")
         self.wait(lambda: self.session.exchanged.motors > 0, longest=_READY)
-        self.wait(lambda: self.binary.clock() is not None, longest=_READY)
-        first = self.binary.clock()
-        assert first is not None
-        until = time.monotonic() + _MEASURED
-        self.wait(lambda: time.monotonic() > until, longest=math.inf)
-        last = self.binary.clock()
-        assert last is not None
+        first = self._tick()
+        self.wait(lambda: self._now() > first[0] + _MEASURED, longest=math.inf)
+        last = self._tick()
         pace = (last[1] - first[1]) / max(1e-9, last[0] - first[0])
         right = abs(pace / asked - 1.0) < _OFF
-        self._tell("its clock", f"{pace:.3f} s a second", f"{asked:g} within {100.0 * _OFF:g} %", right)
+        self._tell("its clock", f"{pace:.3f} {unit}", f"{asked:g} within {100.0 * _OFF:g} %", right)
         if not right:
-            raise TrialEndedError(f"its clock runs at {pace:.3g} s a second, asked were {asked:g}.")
-        self.session.pace = pace
+            raise TrialEndedError(f"its clock runs at {pace:.3g} {unit}, asked were {asked:g}.")
+        if not in_step:
+            self.session.pace = pace
+
+    def _now(self) -> float:
+        return self.time if self.session.in_lockstep else time.monotonic()
+
+    def _tick(self) -> tuple[float, float]:
+        """When it next tells the time of its clock, and that [s]."""
+        before = self.binary.clock
+        self.wait(lambda: self.binary.clock != before, longest=_READY)
+        return self._now(), self.binary.clock
 
     def arm(self) -> None:
         """Throttle down, the switch up as soon as nothing but its time of grace is in the way."""
