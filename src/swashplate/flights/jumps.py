@@ -66,25 +66,25 @@ def jumps(flight: Flight, beside: Flight | None = None) -> dict[str, int]:
     """
     groups = attitudes(flight)
     grouped = {channel for group in groups.values() for channel in group}
-    changes = {name: _turns(flight, group) for name, group in groups.items()}
-    changes |= {name: _steps(flight, name) for name in flight.channels if name not in grouped}
-    others = () if beside is None else (n for n in beside.channels if _base(n) in _INERTIAL and n not in changes)
-    known = changes | {name: _steps(beside, name) for name in others if beside is not None}
-    outstanding = {name: np.any([_stands_out(row) for row in rows], axis=0) for name, (_, rows) in known.items()}
-    felt = {
-        name: time[1:][outstanding[name]]
-        for name, (time, _) in known.items()
-        if _base(name) in _INERTIAL and outstanding[name].any()
-    }
+    names = [*groups, *(name for name in flight.channels if name not in grouped)]
+    inertial = {name: flight for name in names if _base(name) in _INERTIAL}
+    if beside is not None:
+        inertial |= {n: beside for n in beside.channels if _base(n) in _INERTIAL and n not in names}
+    felt = {}
+    for name, source in inertial.items():
+        time, rows = _steps(source, name)
+        if (out := _outstanding(rows)).any():
+            felt[name] = time[1:][out]
     counts = {}
-    for name in changes:
-        out = outstanding[name]
+    for name in names:  # one at a time: a long log has no room for the changes of all
+        changes = _turns(flight, groups[name]) if name in groups else _steps(flight, name)
+        out = _outstanding(changes[1])
         if out.any():
-            jumped = out & _impossible(changes[name], "attitude" if name in groups else _base(name))
+            jumped = out & _impossible(changes, "attitude" if name in groups else _base(name))
             if name not in groups:
-                jumped |= _spikes(name, changes[name], out, felt)
+                jumped |= _spikes(name, changes, out, felt)
             if name.startswith("mixer_") or name.endswith("_demand"):
-                later = changes[name][0][1:, None] - _changes_of_mode(flight)
+                later = changes[0][1:, None] - _changes_of_mode(flight)
                 jumped &= ~np.any((later >= 0.0) & (later <= _SWITCHED), axis=1)
             if count := int(np.sum(jumped)):
                 counts[name] = count
@@ -125,6 +125,11 @@ def _turns(flight: Flight, group: tuple[str, ...]) -> Changes:
         sign * (w0 * z1 - z0 * w1 - x0 * y1 + y0 * x1),
     )
     return time[good], 2.0 * np.stack(turned)
+
+
+def _outstanding(rows: Array) -> NDArray[np.bool_]:
+    """Which changes stand out in any of their rows."""
+    return np.asarray(np.any([_stands_out(row) for row in rows], axis=0))
 
 
 def _stands_out(changes: Array) -> NDArray[np.bool_]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -95,3 +97,16 @@ def test_an_attitude_is_judged_by_its_rotation() -> None:
 def test_what_a_slow_clock_holds_is_no_jump() -> None:
     sag = np.repeat(3.9 + np.where(np.arange(N // 10) > 30, -0.5, 0.0), 10) + np.repeat(noise(5, 2e-3)[: N // 10], 10)
     assert jumps(flight(voltage=sag)) == {}
+
+
+def test_the_changes_of_one_channel_are_held_at_a_time() -> None:
+    def peak(count: int) -> int:
+        many = flight(**{f"rcin_{k}": np.sin(TIME + k) for k in range(1, count + 1)})
+        tracemalloc.start()
+        jumps(many)
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    peak(2)  # what is imported on the way
+    assert peak(16) < 1.5 * peak(4), "a log of 1 GB has no room for the changes of all"
