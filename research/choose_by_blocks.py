@@ -19,16 +19,16 @@ from flights import CHANNELS, FLIGHTS
 import swashplate as sp
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.core.multi_step import Horizon, MultiStepErrors
+from swashplate.filtering.nuisance import Nuisance, mean_nuisance
+from swashplate.identification.core.multi_step import Horizon
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
-from swashplate.identification.core.scoring import Solver, minimise
+from swashplate.identification.core.scoring import minimise_over_valleys
 from swashplate.identification.estimators import Question
-from swashplate.identification.time.estimates import LAGS, found_at
+from swashplate.identification.time.estimates import solved_ahead, solved_at
 from swashplate.identification.time.feedback import AxisExcitation, excitation, hold_unexcited
-from swashplate.identification.time.filter_error import SETTLING, FilterError
-from swashplate.identification.time.identify import FILTER_ERROR, ITERATIONS
+from swashplate.identification.time.filter_error import SETTLING
+from swashplate.identification.time.identify import FILTER_ERROR, FlightProblem
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.vehicle import Vehicle
 from swashplate.validation.prediction import predict
@@ -75,23 +75,17 @@ def learnt(
     table = parameterize(coax, choice.free)
     if choice.free in HELD:
         table, _ = hold_unexcited(table, axes)
-    likelihood = FILTER_ERROR.likelihood_of(table, pieces, choice.asked)
-    assert isinstance(likelihood, FilterError)
-    optimum = FILTER_ERROR.search(likelihood, Solver(iterations=ITERATIONS))
-    rows = {"likelihood": optimum.row}
-    lags = round(LAGS / likelihood.model.dt)
-    known = found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags).corrected
-    for first, last in choice.horizons:
-        for how, beside in (("alone", None), ("beside the likelihood", known)):
-            criterion = MultiStepErrors(
-                likelihood, optimum.row, pieces, horizon=Horizon(first, last), settling=SETTLING, known=beside
-            )
-            solved = minimise(criterion, start=criterion.start)
-            rows[f"{first:g} to {last:g} s ahead, {how}"] = criterion.whole_row(solved.row)
-    for name, row in rows.items():
-        numbers = (row * likelihood.row.scale)[: len(table.names)]
-        told = Nuisance(*(float(np.asarray(value).ravel()[0]) for value in likelihood.nuisances_of(row)))
-        yield name, table.vehicle.with_values(table.identified(numbers)), likelihood.noise_of(row), told
+    problem = FlightProblem("filter-error", coax, (), table, pieces, choice.asked, axes, ())
+    likelihood = problem.likelihood_of(table)
+    solver = FILTER_ERROR.kind.solver
+    first = solved_at(likelihood, minimise_over_valleys(likelihood, solver))
+    solutions = {"likelihood": first}
+    for ahead in choice.horizons:
+        name = f"{ahead[0]:g} to {ahead[1]:g} s ahead, beside the likelihood"
+        solutions[name] = solved_ahead(first, Horizon(*ahead), solver, settling=SETTLING)
+    for name, solved in solutions.items():
+        vehicle, row = coax.with_values(solved.identified(table)), solved.full_row
+        yield name, vehicle, likelihood.noise_of(row), mean_nuisance(likelihood.nuisances_of(row))
 
 
 def errors(vehicle: Vehicle, record: Record, noise: Noise, nuisance: Nuisance) -> tuple[Array, Array]:

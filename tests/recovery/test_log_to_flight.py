@@ -64,7 +64,7 @@ def test_a_design_that_knows_its_delays_flies_and_one_that_does_not_is_lost() ->
 def test_the_coax_from_its_real_log_to_a_hundred_aircraft(shared_data: Path) -> None:
     """The August flight: what the fit found of delays is flown, in still air and in gusts of 0.3 m/s."""
     found = Demo().answer()
-    model = found.fit.model
+    model = found.model
     made = sp.design_controller(model, sensors=SENSORS)
     assert "identified" in made.late
     check = sp.check_controller(model, made.controller, gusts=indoor(0.3))
@@ -76,7 +76,7 @@ def test_the_coax_from_its_real_log_to_a_hundred_aircraft(shared_data: Path) -> 
             made.controller,
             maneuver="hover:20s",
             count=100,
-            fit=found.fit,
+            fit=found,
             gusts=gusts,
             battery=(12.5, 10.5),
             command_bits=BITS,

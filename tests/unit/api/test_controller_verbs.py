@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from swashplate.api.verbs.simulate import Simulate
 from swashplate.control.kinds import CONTROLLERS, PLAIN, ControllerKind, kind_of, read_controller, save_controller
 from swashplate.errors import ControllerError, SwashError
 from swashplate.json_text import as_json
+from swashplate.simulation.controller import Step, StepController
 from swashplate.simulation.wind import INDOOR
 
 
@@ -60,7 +60,7 @@ def test_axes_of_a_linear_model(tmp_path: Path) -> None:
     assert json.loads(made.save(tmp_path / "d.json").read_text())["kind"] == "decoupling"
 
 
-class Still:
+class Still(StepController):
     """A controller of somebody's own: the trim's inputs, whatever happens."""
 
     type = "still"
@@ -71,11 +71,11 @@ class Still:
         self.gains = np.asarray(inputs, dtype=np.float64)
 
     @property
-    def step(self) -> Callable[..., tuple[Any, Any]]:
+    def step(self) -> Step:
         return still_step
 
 
-def still_step(memory: Any, time: Any, measured: Any, reference: Any, gains: Any) -> tuple[Any, Any]:
+def still_step(memory: Any, measured: Any, reference: Any, gains: Any, xp: Any) -> tuple[Any, Any]:
     return memory, gains
 
 

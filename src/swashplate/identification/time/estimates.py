@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Parameterization, bounds_of, parameter_table
 from swashplate.identification.core.result import Constant, Estimate
 from swashplate.identification.core.scoring import Optimum, Solver, Sought, minimise
+
+if TYPE_CHECKING:
+    from swashplate.identification.time.linear_residual import LinearResidual
 
 LAGS = 1.0
 """Seconds of residual correlation that the corrected bound allows for."""
@@ -53,6 +56,7 @@ class Solved:
         full_row: the likelihood's row where the search ended.
         numbers: of that, by name, in their units.
         colour: standard deviation of each parameter by the errors' autocorrelation, over that of white errors.
+        residual: accelerations that the equations lack, kept or not; None: not asked for.
     """
 
     likelihood: Likelihood
@@ -64,6 +68,7 @@ class Solved:
     full_row: Array
     numbers: Mapping[str, float]
     colour: Array = field(default_factory=lambda: np.ones(1))
+    residual: LinearResidual | None = None
 
     @property
     def row(self) -> Row:

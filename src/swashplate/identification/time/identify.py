@@ -27,7 +27,6 @@ from swashplate.identification.time.filter_error import SETTLING, FilterError, i
 from swashplate.identification.time.following_error import FollowingError, searched
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.linear_residual import (
-    LinearResidual,
     begun,
     begun_where_it_ended,
     beside_physics,
@@ -50,7 +49,7 @@ _BEGIN = 1.0
 FlightLikelihood = FilterError | OutputError
 
 
-@dataclass
+@dataclass(frozen=True)
 class FlightProblem:
     """A helicopter whose pose was tracked, along its records.
 
@@ -59,7 +58,6 @@ class FlightProblem:
         table: what is free. pieces: the records, each with its own delays, trims and lever arm.
         question: what was asked. axes: what each record moves.
         notes: to be read beside the result.
-        residual: that the search kept or did not; None: not asked for.
     """
 
     method: str
@@ -70,7 +68,6 @@ class FlightProblem:
     question: Question
     axes: Sequence[AxisExcitation]
     notes: Sequence[str]
-    residual: LinearResidual | None = None
 
     def likelihood_of(self, table: Parameterization) -> FlightLikelihood:
         if self.method == "output-error":
@@ -93,17 +90,15 @@ class FlightProblem:
         physics, air = self.table.without(solved.optimum.at_bound), likelihood.noise_of(solved.full_row)
         vehicle = self.table.vehicle.with_values(solved.identified(self.table))
         fitted = fit_residual(vehicle, self.pieces, each, air, horizon=horizon, axes=self.axes, physics=physics)
-        self.residual = fitted
         if not fitted.kept or horizon is not None:
-            return solved
+            return replace(solved, residual=fitted)
         # The search goes on with physics and residual free.
         wider = self.likelihood_of(beside_physics(self.table, fitted))
         begin = begun_where_it_ended(wider.row, likelihood.row, solved.full_row, fitted)
         wider.refresh(begin)
         together = self._read(wider, minimise(wider, solver, start=begin), solver, horizon)
         vehicle = wider.table.vehicle.with_values(together.identified(wider.table))
-        self.residual = fitted.at(vehicle, physics_shifts(solved, together))
-        return together
+        return replace(together, residual=fitted.at(vehicle, physics_shifts(solved, together)))
 
     def _read(self, likelihood: FlightLikelihood, optimum: Optimum, solver: Solver, horizon: Horizon | None) -> Solved:
         """What the search says, or the search for small errors ahead that follows it."""
@@ -111,7 +106,7 @@ class FlightProblem:
         return solved if horizon is None else solved_ahead(solved, horizon, solver, settling=SETTLING)
 
     def interpret(self, solved: Solved) -> Interpreted[Vehicle]:
-        likelihood, residual, row = cast(FlightLikelihood, solved.likelihood), self.residual, solved.full_row
+        likelihood, residual, row = cast(FlightLikelihood, solved.likelihood), solved.residual, solved.full_row
         table, pieces, vehicle = likelihood.table, self.pieces, self.start
         began = begun(vehicle, residual) if residual is not None and table is not self.table else vehicle
         every, problems = estimates_of(solved, began, table)
