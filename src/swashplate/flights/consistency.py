@@ -33,6 +33,7 @@ _SCALED = 0.5  # the same where the ratio is a unit's: noise that large would le
 _SURE = 0.95  # correlation from which a ratio that is no unit's is worth a word
 _APART = 0.8  # of its correlation with another axis: below, a channel does not belong to its own
 _SAME = 0.4  # of the logarithm: a ratio between 0.67 and 1.5 is 1 (real sensors' filters: 0.8 to 1.2)
+_CORRECTED = 0.1  # the same for what an estimator's corrections part its velocity from its place (0.05 in EKF3's logs)
 _EXACT = 0.05  # the same for a unit that the log's format fixes: nothing less makes one doubt it
 _FIXED = frozenset({"ardupilot", "blackbox", "ulog", "px4log", "coax56", "nanobench"})
 """Readers of formats that fix the units of their channels."""
@@ -233,7 +234,8 @@ def _compared(
                 every = next(by_row for by_row in both if by_row.get(i) is clearest)
                 owners = {j: by_axis[j] for j, by_axis in every.items() if j in by_axis}
                 of_axis = [by_axis[i] for by_axis in pairs if i in by_axis]
-                wrong = _judged(flight, here, i, clearest, kind, owners) or _scaled(name, of_axis, kind)
+                slight = _CORRECTED if _one_estimate(flight, name, kind.made_of[i]) else 0.0
+                wrong = _judged(flight, here, i, clearest, kind, owners) or _scaled(name, of_axis, kind, slight)
                 contradictions += [replace(one, against=kind.made_of[i]) for one in wrong]
     return contradictions
 
@@ -284,13 +286,22 @@ def _judged(
     return [Inconsistency(name, text, mend)] if faults else []
 
 
-def _scaled(name: str, pairs: Sequence[Agreement], kind: _Kind) -> list[Inconsistency]:
-    """A factor between a channel and its own axis that is none of 1, nor of a filter: alike in every band."""
+def _one_estimate(flight: Flight, name: str, others: Sequence[str]) -> bool:
+    """Whether an autopilot's estimator wrote all of it, in units that its format fixes."""
+    of_format = flight.provenance.reader in _FIXED
+    return of_format and all(other in flight and flight.stream_of(other) == flight.stream_of(name) for other in others)
+
+
+def _scaled(name: str, pairs: Sequence[Agreement], kind: _Kind, slight: float) -> list[Inconsistency]:
+    """A factor between a channel and its own axis that is none of 1, nor of a filter: alike in every band.
+
+    One whose logarithm is below `slight` is none.
+    """
     sure = [at for at in pairs if at.scaled and at.correlation > _SURE]
     if not sure:
         return []
     at = min(sure, key=lambda one: one.sigma / one.ratio)
-    if any(other.excludes(at.ratio) for other in pairs):
+    if abs(np.log(at.ratio)) < slight or any(other.excludes(at.ratio) for other in pairs):
         return []
     text = f"is {at.ratio:.4g} ± {at.sigma:.1g} times {kind.reference}: one of the two has a wrong scale"
     mend = f"If it is {name}'s, correct the log (in a mapping file: factor = {1.0 / at.ratio:.4g}); what is fitted to "

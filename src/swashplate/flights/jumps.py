@@ -5,7 +5,7 @@ Takeoffs, steps and touch-downs stand out too, so what stands out is told only w
 
 * a place, a velocity or an attitude, where it takes an acceleration that no aircraft survives;
 * anything, where the next samples take it back, and the inertial sensors felt nothing of it; but no command of a loop
-  where the mode changes, when another loop takes over.
+  and no term of its law where the mode changes, when another loop takes over.
 """
 
 from __future__ import annotations
@@ -82,10 +82,8 @@ def jumps(flight: Flight, beside: Flight | None = None) -> dict[str, int]:
         if out.any():
             jumped = out & _impossible(changes, "attitude" if name in groups else _base(name))
             if name not in groups:
-                jumped |= _spikes(name, changes, out, felt)
-            if name.startswith("mixer_") or name.endswith("_demand"):
-                later = changes[0][1:, None] - _changes_of_mode(flight)
-                jumped &= ~np.any((later >= 0.0) & (later <= _SWITCHED), axis=1)
+                of_law = name.startswith(("mixer_", "pid_")) or name.endswith("_demand")
+                jumped |= _spikes(name, changes, out, felt, _changes_of_mode(flight) if of_law else np.empty(0))
             if count := int(np.sum(jumped)):
                 counts[name] = count
     return counts
@@ -170,12 +168,19 @@ def _impossible(changes: Changes, kind: str) -> NDArray[np.bool_]:
     return np.asarray(np.any(np.abs(speed) > most, axis=0))
 
 
-def _spikes(name: str, changes: Changes, out: NDArray[np.bool_], felt: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Jumps that one of the next samples takes back, far out of the samples around them, and that were not felt."""
+def _spikes(
+    name: str, changes: Changes, out: NDArray[np.bool_], felt: Mapping[str, Array], switched: Array
+) -> NDArray[np.bool_]:
+    """Jumps that one of the next samples takes back, far out of the samples around them, and that were not felt.
+
+    None begins right after one of the times `switched`.
+    """
     time, (row,) = changes
     values = np.concatenate([[0.0], np.cumsum(row)])
     spikes = np.zeros(out.shape, dtype=np.bool_)
     for k in np.flatnonzero(out).tolist():
+        if np.any((time[k + 1] >= switched) & (time[k + 1] <= switched + _SWITCHED)):
+            continue
         for back in range(k + 1, min(k + _BRIEF, row.size - 1) + 1):
             left = abs(float(np.sum(row[k : back + 1])))
             if out[back] and row[k] * row[back] < 0.0 and left < _TAKEN_BACK * abs(row[k]):

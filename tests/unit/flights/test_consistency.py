@@ -136,6 +136,21 @@ def test_a_scale_error_is_told_with_its_factor_and_stops_nothing(name: str, fact
     refuse_inconsistent(flight)
 
 
+def test_an_estimator_s_corrections_are_no_scale_error() -> None:
+    """Place and velocity of one message whose units the format fixes; a sign, or another message, still is told."""
+    wrong = changed(flown(), vy=1.08 * flown().values("vy"))
+    (finding,) = consistency(wrong)
+    assert finding.scale is not None
+    of_format = replace(wrong, provenance=replace(wrong.provenance, reader="ardupilot"))
+    assert consistency(of_format) == ()
+    gross = changed(of_format, vy=1.5 * of_format.values("vy"))
+    assert [one.channel for one in consistency(gross)] == ["vy"]
+    turned = changed(of_format, vy=-of_format.values("vy"))
+    assert [one.channel for one in consistency(turned)] == ["vy"]
+    gyro = changed(of_format, p=1.08 * of_format.values("p"))
+    assert [one.channel for one in consistency(gyro)] == ["p"]
+
+
 @pytest.mark.parametrize("factor", [1.0, 1.02, 0.98])
 @pytest.mark.parametrize("noise", [0.0, 0.3])
 def test_a_slight_factor_and_noise_on_either_side_are_no_scale_error(factor: float, noise: float) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.jumps import attitudes, jumps
+from swashplate.flights.provenance import Event
 
 N, RATE = 1000, 100.0
 TIME = np.arange(N) / RATE
@@ -54,6 +56,19 @@ def test_a_command_may_step_and_kick_when_the_aircraft_does_and_not_alone() -> N
     assert jumps(flight(mixer_roll=stepped, p_demand=stepped)) == {}
     assert jumps(flight(mixer_roll=kicked)) == {"mixer_roll": 2}
     assert jumps(flight(mixer_roll=kicked, **shaken("p", "q", "r"))) == {}
+
+
+@pytest.mark.parametrize("name", ["mixer_roll", "p_demand", "pid_f_roll"])
+def test_a_slow_log_tells_the_kick_of_another_mode_s_loop_from_others(name: str) -> None:
+    """At 10 Hz: ArduPilot's LOITER takes over with a demand of 0.27 rad/s, taken back 0.3 s later."""
+    time, kicked = np.arange(600) / 10.0, 1e-3 * np.random.default_rng(3).standard_normal(600)
+    kicked[300:302] += [0.045, 0.02]
+    log = Flight({"rates": stream(time, {name: kicked})})
+    assert jumps(log) == {name: 2}
+    switched = replace(log.provenance, events=(Event(time[300] - 0.098, "mode", "LOITER"),))
+    assert jumps(replace(log, provenance=switched)) == {}
+    early = replace(log.provenance, events=(Event(time[300] - 0.5, "mode", "LOITER"),))
+    assert jumps(replace(log, provenance=early)) == {name: 2}
 
 
 @pytest.mark.parametrize("name", ["x", "z", "vx", "w"])
