@@ -149,9 +149,12 @@ class BetaflightTrial:
         return self._now(), self.binary.clock
 
     def arm(self) -> None:
-        """Throttle down, the switch up as soon as nothing but its time of grace is in the way."""
+        """Throttle down, the switch up as soon as nothing but its time of grace is in the way, or it says no more.
+
+        It tells why it refuses, and not that it no longer does.
+        """
         begun, grace = self.time, lambda: self.binary.refusals() in ("", "BOOTGRACE")
-        self.wait(grace, longest=_READY)
+        self.wait(grace, longest=0.4 * _READY)
         self.pause(3.0)
         self.pilot.phase = "armed"
         turning = self.wait(lambda: min(self.session.pulses) > _IDLE, longest=3.0)
@@ -167,7 +170,8 @@ class BetaflightTrial:
             self._tell("armed", f"not within {_READY:g} s: {why}", "motors turn", False)
             raise TrialEndedError(f"it does not arm: {why}.")
         self.armed = self.time
-        self._tell("armed", f"after {self.time - begun:.1f} s", f"within {_READY:g} s", True)
+        took = self.time - begun
+        self._tell("armed", f"after {took:.1f} s", f"within {_READY:g} s", took <= _READY)
         self.pause(1.0)
 
     def take_off(self) -> None:
