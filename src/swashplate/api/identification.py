@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from swashplate.api.asking import called, strings
 from swashplate.api.saying import Say
-from swashplate.api.verbs.identify import FitVehicle
 from swashplate.api.verbs.validate import Validate
 from swashplate.engine.roots import require_casadi
 from swashplate.errors import IdentificationError
@@ -30,6 +29,9 @@ from swashplate.reporting.summary import banners, summary
 from swashplate.reporting.terminal_tables import fit_table
 from swashplate.validation.controller_law import check_closed
 from swashplate.validation.validation import Validation
+
+if TYPE_CHECKING:
+    from swashplate.api.verbs.identify import FitVehicle
 
 
 def write_fit(fit: Result[object, object], folder: Path) -> None:

@@ -18,6 +18,7 @@ from swashplate.errors import SwashError
 if TYPE_CHECKING:
     from swashplate.models.vehicle import Vehicle
     from swashplate.simulation.linearize import LinearModel
+    from swashplate.simulation.trim import Trim
     from swashplate.simulation.trim_curve import TrimCurve
 
 
@@ -125,7 +126,7 @@ class TrimVehicle(Steadily):
         return [text_columns(list(columns), list(zip(*columns.values(), strict=True)), left=0)]
 
 
-def _steady_flight(answer: Flown) -> Any:
+def _steady_flight(answer: Flown) -> Trim | TrimCurve:
     """The trim at one speed, or the curve over several."""
     return answer.curve if len(answer.curve.trims) > 1 else answer.curve.trims[0]
 

@@ -23,7 +23,7 @@ PLACED = ("lever_x", "lever_y", "lever_z", "level_phi", "level_theta", "level_ps
 """Numbers of a record that say what is tracked, as of `Nuisance`."""
 
 
-class Sensors(NamedTuple):
+class TrackedSensors(NamedTuple):
     """What is tracked, and the noise of one reading.
 
     Attributes:
@@ -54,14 +54,14 @@ class Sensors(NamedTuple):
         )
 
 
-def sensors_of(vehicle: Vehicle) -> Sensors:
+def sensors_of(vehicle: Vehicle) -> TrackedSensors:
     """Those that a fit to records left on the card; the true states where there is none."""
     record, noise = (vehicle.card.observer.get(section, {}) for section in ("nuisance", "noise"))
     angle = noise.get("sensor_angle", 0.0)
     sigma = dict.fromkeys(POSITION, noise.get("sensor_position", 0.0))
     sigma |= {"phi": angle, "theta": angle, "psi": noise.get("sensor_heading", 0.0) or angle}
     sigma |= dict.fromkeys(RATES, noise.get("sensor_rate", 0.0))
-    return Sensors(
+    return TrackedSensors(
         tuple(float(record.get(name, 0.0)) for name in PLACED),
         tuple(float(sigma.get(name, 0.0)) for name in RigidBody._fields),
     )

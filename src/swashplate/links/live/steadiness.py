@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from swashplate.arrays import Array
 from swashplate.links.live.pilots import WANTED, Mode, Pilot
-from swashplate.links.live.sensors import Sensors
+from swashplate.links.live.sensors import TrackedSensors
 from swashplate.simulation.linearize import LinearModel
 
 _GROWS = 1.001
@@ -16,7 +16,7 @@ _GROWS = 1.001
 _STEP = 1e-6
 
 
-def holds(pilot: Pilot, mode: Mode, model: LinearModel, back: NDArray[np.int_], sensors: Sensors) -> bool:
+def holds(pilot: Pilot, mode: Mode, model: LinearModel, back: NDArray[np.int_], sensors: TrackedSensors) -> bool:
     """Whether deviations from the hover fade, or grow no faster than they would were nothing late and all states seen.
 
     Args:
@@ -25,11 +25,11 @@ def holds(pilot: Pilot, mode: Mode, model: LinearModel, back: NDArray[np.int_], 
         back: how many commands ago the one was given that acts in a step, shape (steps of a period, inputs).
         sensors: what the law reads.
     """
-    usual = _growth(pilot, _feedback(pilot, mode, model, Sensors()), model, 0 * back)
+    usual = _growth(pilot, _feedback(pilot, mode, model, TrackedSensors()), model, 0 * back)
     return _growth(pilot, _feedback(pilot, mode, model, sensors), model, back) <= max(_GROWS, usual)
 
 
-def _feedback(pilot: Pilot, mode: Mode, model: LinearModel, sensors: Sensors) -> Array:
+def _feedback(pilot: Pilot, mode: Mode, model: LinearModel, sensors: TrackedSensors) -> Array:
     """Slopes of what is carried and commanded to what was carried and the states, by differences."""
     x = np.array(model.trim.state, dtype=np.float64)
     wanted = np.zeros(len(WANTED))

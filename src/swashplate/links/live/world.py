@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import Mode, Pilot, pilot
-from swashplate.links.live.sensors import Sensors, sensors_of
+from swashplate.links.live.sensors import TrackedSensors, sensors_of
 from swashplate.links.live.steadiness import holds
 from swashplate.models.surroundings import environment_of, input_delays
 from swashplate.models.vehicle import Vehicle
@@ -88,7 +88,7 @@ class World:
         delays = [np.zeros(len(vehicle.input_names)) if at_once else self._delays_of(one) for one in flying]
         self.delays = delays[0]
         self.steps_back = np.stack([steps_back(one, self.substeps, rate) for one in delays])
-        self.sensors = [sensors_of(one) if self.pilot.reads else Sensors() for one in flying]
+        self.sensors = [sensors_of(one) if self.pilot.reads else TrackedSensors() for one in flying]
         self.depth = 1 + max(int(np.max(self.steps_back)), round(REMEMBERED / self.period))
         self.not_held = self._not_held() if controller is None else ""
         if self.not_held:
@@ -107,7 +107,7 @@ class World:
             return ""
         model, modes = linearize(self.vehicle, self.trim), set(HELD) & set(self.pilot.modes)
         for cause, delays, shown in (
-            ("delays", back, Sensors()),
+            ("delays", back, TrackedSensors()),
             ("sensors", 0 * back, read),
             ("delays and sensors", back, read),
         ):

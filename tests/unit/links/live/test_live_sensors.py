@@ -11,7 +11,7 @@ import swashplate as sp
 from swashplate.engine.equations import equations_of
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.links.live.sensors import BODY, PLACED, Sensors, sensors_of, traced_sensors
+from swashplate.links.live.sensors import BODY, PLACED, TrackedSensors, sensors_of, traced_sensors
 from swashplate.links.live.world import World
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
@@ -68,9 +68,9 @@ def test_they_say_which_fly(state: np.ndarray) -> None:
         "identified sensors: a point (20, -10, -50) mm ahead, right and below, axes turned by (1.7, -1.1, 11.5) deg in "
         "roll, pitch and heading; noise 0.3 mm, 1.5 mrad (heading 2), rates 40 mrad/s, velocities none"
     )
-    assert world.sensors[1] == Sensors() == sensors_of(sp.vehicle("coax"))
+    assert world.sensors[1] == TrackedSensors() == sensors_of(sp.vehicle("coax"))
     assert "the true states" in str(world.sensors[1])
     np.testing.assert_array_equal(world.sensors[1].read(state), state)
     own = World(identified(), controller=sp.design_controller(sp.vehicle("coax")).controller)
     assert not own.pilot.reads
-    assert own.sensors == [Sensors()], "it was designed with sensors of its own"
+    assert own.sensors == [TrackedSensors()], "it was designed with sensors of its own"
