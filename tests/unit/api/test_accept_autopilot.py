@@ -329,7 +329,7 @@ def test_all_axes_and_a_changed_vehicle(tmp_path: Path) -> None:
     found = accept(tmp_path / "a", axes=tuple(MIXER_AXES), seconds=40.0, hover=5.0)
     assert found.problems == ()
     assert sum("beside truth" in line.what for line in found.lines) == 12
-    other = accept(tmp_path / "b", axes=("roll", "pitch"), seconds=20.0, truth=changed)
+    other = accept(tmp_path / "b", axes=("roll", "pitch"), seconds=20.0, against=changed)
     failed = [line.what for line in other.lines if line.passed is False]
     assert "roll: respond beside truth" in failed
     assert "pitch: respond beside truth" in failed
