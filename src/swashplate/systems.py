@@ -6,6 +6,7 @@ runs there (a test hides them all).
 
 from __future__ import annotations
 
+import mmap
 import os
 import signal
 import subprocess
@@ -28,6 +29,8 @@ NOT_WAITING: Final[int] = getattr(os, "O_NONBLOCK", 0)
 NO_LINK: Final[int] = getattr(os, "O_NOFOLLOW", 0)
 BYTES: Final[int] = getattr(os, "O_BINARY", 0)
 """Flag of `os.open`: line ends stay as they are."""
+DONE_WITH: Final[int | None] = getattr(mmap, "MADV_DONTNEED", None)
+"""Advice on a mapped file: its pages may leave memory."""
 HANGUP: Final[signal.Signals | None] = getattr(signal, "SIGHUP", None)
 """The terminal is closed."""
 OUT_OF_TIME: Final[signal.Signals | None] = getattr(signal, "SIGXCPU", None)

@@ -116,6 +116,8 @@ def test_what_is_no_name_is_said_by_whoever_reads_names() -> None:
         sp.linearize()
     with pytest.raises(TypeError, match="unexpected keyword argument 'speed'"):
         sp.linearize("raptor50", speed="fast")
+    with pytest.raises(TypeError, match=r"^trim\(\) got an unexpected keyword argument 'sped'"):
+        sp.trim("raptor50", sped=3.0)
 
 
 def test_a_string_that_is_meant_as_such_stays_one() -> None:

@@ -158,14 +158,18 @@ def verb(
         value: what of the answer the function returns, where that is not all.
     """
     kind = cast(type[VerbQuestion[Any]], question)
+    fields = inspect.signature(kind)
 
-    def asked(*args: Any, **fields: Any) -> Any:
-        answer = kind(*args, **fields).answer()
+    def asked(*args: Any, **given: Any) -> Any:
+        try:
+            fields.bind(*args, **given)
+        except TypeError as error:  # would name the question's class
+            raise TypeError(f"{name}() {error}") from None
+        answer = kind(*args, **given).answer()
         return answer if value is None else value(answer)
 
     asked.__name__ = asked.__qualname__ = name
     asked.__module__ = "swashplate"
-    fields = inspect.signature(kind)
     asked.__signature__ = fields.replace(return_annotation=(value or kind.answer).__annotations__["return"])  # type: ignore[attr-defined]
     told, parts = entries(kind), (inspect.getdoc(kind) or "").partition("\nRaises:")
     lines = [parts[0].rstrip(), "", "Args:"]

@@ -215,7 +215,9 @@ def _config(model: Traced, guid: str, step: float) -> str:
     if model.delays:
         listed = ", ".join(repr(float(delay)) for delay in model.delays)
         delays = fill_template("fmu_delays.h", {"LONGEST": repr(max(model.delays)), "PAST": _PAST, "DELAYS": listed})
-    return fill_template(_CONFIG, {"NAME": model.name, "STEP": repr(step), "GUID": guid, "DELAYS": delays})
+    names = fill_template("model_names.h", {"NAME": model.name})
+    blanks = {"NAME": model.name, "NAMES": names, "STEP": repr(step), "GUID": guid, "DELAYS": delays}
+    return fill_template(_CONFIG, blanks)
 
 
 def _binary(texts: Mapping[str, str], sources: tuple[str, ...]) -> bytes:

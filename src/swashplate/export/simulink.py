@@ -16,7 +16,9 @@ def simulink(model: Traced) -> dict[str, str]:
     code = model_code(model)
     return {
         f"{model.name}_sfun.c": fill_template("sfunction.c", {}),
-        "sfun_model.h": fill_template("sfun_model.h", {"NAME": model.name}),
+        "sfun_model.h": fill_template(
+            "sfun_model.h", {"NAME": model.name, "NAMES": fill_template("model_names.h", {"NAME": model.name})}
+        ),
         f"{model.name}.h": code.header,
         f"{model.name}.c": code.source,
     }

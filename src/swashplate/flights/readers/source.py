@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from swashplate.errors import FlightError
 from swashplate.files import map_bytes, read_bytes
 from swashplate.flights.provenance import Provenance
+from swashplate.systems import DONE_WITH
 
 # The largest file that is read and the largest content it may unpack to: an hour at 400 Hz of 100 channels is 1.2 GB.
 LARGEST_FILE = 1 << 30
@@ -39,8 +40,8 @@ Places = NDArray[np.uint32] | NDArray[np.int64]
 
 def release(stored: Stored) -> None:
     """Gives the pages of a mapped file that were looked at back to the system, which may keep them in its cache."""
-    if isinstance(stored, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
-        stored.madvise(mmap.MADV_DONTNEED)
+    if isinstance(stored, mmap.mmap) and DONE_WITH is not None:
+        stored.madvise(DONE_WITH)
 
 
 def _hashed(stored: Stored) -> str:
