@@ -3,7 +3,7 @@ import * as THREE from "./vendor/three.module.min.js";
 
 const HORIZON = 0xdbe8f2, ZENITH = 0x5b93c7, FIELDS = ["#b9c8ae", "#aebf9f", "#c3cfb4", "#a9b894", "#c9c9a5"];
 const TILE = 8; // cells after which the fields repeat
-const POSTS = 11, APART = 4; // to each side in all; cells between them
+const POSTS = 9, APART = 4; // to each side in all; cells between them
 const BANDS = 4, RED = [0.7, 0.23, 0], WHITE = [1, 1, 1];
 
 // The same fields every time; `plainly`: as a processor without a graphics card draws them fastest.
@@ -24,7 +24,7 @@ function fields(plainly) {
     texture.generateMipmaps = false;
     texture.minFilter = texture.magFilter = THREE.NearestFilter;
   }
-  texture.colorSpace = THREE.SRGBColorSpace;
+  if (!plainly) texture.colorSpace = THREE.SRGBColorSpace;
   return texture;
 }
 
@@ -37,7 +37,7 @@ function sky() {
 }
 
 function posts(cell) {
-  const post = new THREE.CylinderGeometry(0.03 * cell, 0.03 * cell, cell, 5, BANDS).toNonIndexed(), { position } = post.attributes, colors = [];
+  const post = new THREE.CylinderGeometry(0.03 * cell, 0.03 * cell, cell, 3, BANDS).toNonIndexed(), { position } = post.attributes, colors = [];
   for (let i = 0; i < position.count; i += 3) {
     const middle = (position.getY(i) + position.getY(i + 1) + position.getY(i + 2)) / 3 / cell + 0.5; // of a triangle
     for (let k = 0; k < 3; k += 1) colors.push(...(Math.floor(middle * BANDS * 0.999) % 2 ? WHITE : RED));

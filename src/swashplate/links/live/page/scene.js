@@ -23,6 +23,10 @@ export class Scene {
     this.canvas = canvas;
     this.software = drawnInSoftware(); // by the processor that also simulates: coarser pictures, edges unsmoothed
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.software, powerPreference: "high-performance" });
+    if (this.software) { // colours as they are written: turning each pixel's from linear light costs as much as painting it
+      THREE.ColorManagement.enabled = false;
+      this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
+    }
     this.renderer.setPixelRatio(this.software ? 0.6 : Math.min(window.devicePixelRatio, 2));
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(0xdbe8f2);
