@@ -31,7 +31,7 @@ from swashplate.identification.time.filter_error import SETTLING
 from swashplate.identification.time.identify import FILTER_ERROR, FlightProblem
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.vehicle import Vehicle
-from swashplate.validation.prediction import predict
+from swashplate.validation.prediction import ObservedRecord
 
 
 class Choice(NamedTuple):
@@ -90,7 +90,9 @@ def learnt(
 
 def errors(vehicle: Vehicle, record: Record, noise: Noise, nuisance: Nuisance) -> tuple[Array, Array]:
     """Squared errors and squared movements (starts, 12)."""
-    paths = predict(vehicle, record, noise=noise, nuisance=nuisance, horizon=AHEAD, every=EVERY, settling=SETTLING)
+    paths = ObservedRecord(vehicle, record, noise=noise, nuisance=nuisance).predict(
+        horizon=AHEAD, every=EVERY, settling=SETTLING
+    )
     truth, ahead = measured_states(record, nuisance), round(AHEAD / record.dt)
     counted = paths.starts + ahead < record.time.size - 10  # rates at the end are one-sided
     first = paths.starts[counted]

@@ -16,7 +16,7 @@ from swashplate.identification.core.result import Result
 from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.validation import block_bootstrap
-from swashplate.validation.prediction import predict
+from swashplate.validation.prediction import ObservedRecord
 from swashplate.validation.validate import observer_of
 
 CHANNELS = ("u", "v", "w", "phi", "theta", "p", "q", "r")
@@ -67,7 +67,9 @@ def prediction_errors(fit: Result[Any, Any], flights: Sequence[Flight]) -> Predi
         if piece.time[-1] - piece.time[0] < CALIBRATION + 2.0 * AHEAD:
             continue
         nuisance = calibrate(vehicle, piece, noise=noise, prior=prior)
-        predicted = predict(vehicle, piece, noise=noise, nuisance=nuisance, horizon=AHEAD, settling=CALIBRATION)
+        predicted = ObservedRecord(vehicle, piece, noise=noise, nuisance=nuisance).predict(
+            horizon=AHEAD, settling=CALIBRATION
+        )
         truth, ahead = measured_states(piece, nuisance), round(AHEAD / piece.dt)
         counted = predicted.starts + ahead < piece.time.size - _EDGE
         first = predicted.starts[counted]

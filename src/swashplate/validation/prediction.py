@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array, lengthened
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel, stochastic_model
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, stochastic_model
 from swashplate.filtering.filter_code import RecordSeries, driving_rows
 from swashplate.filtering.nuisance import Nuisance, commands_moved, motors
 from swashplate.filtering.riccati import gain_at, steady_gain
@@ -37,7 +38,10 @@ from swashplate.identification.time.calibration import as_begun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import ArrayBackend
 from swashplate.validation.controller_law import Law, learnt, shares_of
+
+_ARRAYS = ArrayBackend()
 
 
 def rms(rows: Array) -> Array:
@@ -67,93 +71,14 @@ _REACH = 0.5
 """Seconds of past motion that a run carries: the command's delay and the aircraft's together."""
 
 
-class _Loops(NamedTuple):
-    """What one run needs of the closed axes: shares of the inputs (axes, inputs) and back (axes, inputs), gains on the
-    body's states (axes, 12), samples from motion to aircraft (axes,), and from when each input answers (inputs,)."""
+class Uncertainty(NamedTuple):
+    """Of the joined system, linearised: its transition, and the covariances of what disturbs it, of the sensors' noise
+    and of what an observer makes of a reading."""
 
-    shares: Array
-    back: Array
-    gains: Array
-    late: NDArray[np.intp]
-    since: NDArray[np.intp]
-
-
-def closed_ahead(
-    model: StochasticModel,
-    filtered: FilterState,
-    numbers: FilterNumbers,
-    laws: Sequence[Law],
-    inputs: Array,
-    reaching: Array,
-    voltage: Array,
-    starts: NDArray[np.intp],
-    ahead: int,
-) -> Array:
-    """States 1, 2, ... samples after some starts with loops closed (starts, ahead, states).
-
-    Args:
-        model, numbers: of the filter. filtered: its states after each reading.
-        laws: of the closed axes. inputs: as recorded (n, inputs).
-        reaching, voltage: what reaches the vehicle at each sample, `ahead` samples beyond the last start.
-        starts: samples. ahead: how many samples to predict.
-    """
-    vehicle, dt = model.vehicle, model.dt
-    nuisance = Nuisance(*(float(value) for value in numbers.nuisance))
-    trims = np.array([getattr(nuisance, f"trim_{name}", 0.0) for name in vehicle.input_names], dtype=float)
-    delays = np.where(motors(vehicle), nuisance.delay_motor, nuisance.delay_servo)
-    delay_steps = np.round(delays / dt).astype(int)
-    # What reaches the vehicle is a curve through four logged samples: until here, all are from before the start.
-    known = np.maximum(np.floor(delays / dt).astype(int) - 1, 0)
-    body = np.asarray(filtered.x)[:, [vehicle.index(name) for name in PREDICTED]]
-    reach = round(_REACH / dt)
-    before = np.concatenate([np.repeat(body[:1], reach, axis=0), body])
-    shares, gains, behind, references = [], [], [], []
-    for law in laws:
-        share = shares_of(vehicle, law.axis)
-        gain = np.array([dict(zip(law.motion, law.gains, strict=True)).get(name, 0.0) for name in PREDICTED])
-        lag = round(law.lag / dt)
-        left = np.cumsum(np.concatenate([[0.0], inputs @ share - (before @ gain)[reach - lag : len(before) - lag]]))
-        low = np.maximum(starts + 1 - round(_REFERENCE / dt), 0)
-        references.append((left[starts + 1] - left[low]) / (starts + 1 - low) + share @ trims)
-        shares.append(share)
-        gains.append(gain)
-        behind.append(min(lag + int(delay_steps[np.flatnonzero(share)[0]]), reach - 1))
-    back = [share / (share @ share) for share in shares]
-    answers = np.any(np.array(shares) != 0.0, axis=0)
-    since = np.where(answers, known, ahead)
-    loops = _Loops(np.array(shares), np.array(back), np.array(gains), np.array(behind), since)
-    past = before[starts[:, None] + np.arange(1, reach + 1)]
-    return _closed_ahead(
-        model, filtered, numbers, loops, past, np.stack(references, axis=1), (reaching, voltage), starts, ahead
-    )
-
-
-def _closed_ahead(
-    model: StochasticModel,
-    filtered: FilterState,
-    numbers: FilterNumbers,
-    loops: _Loops,
-    past: Array,
-    reference: Array,
-    recorded: tuple[Array, Array],
-    starts: NDArray[np.intp],
-    ahead: int,
-) -> Array:
-    """As `closed_ahead`; past: body states (starts, reach, 12), reference: (starts, axes), recorded: what reached the
-    vehicle and the voltage by sample."""
-    body, step = [model.vehicle.index(name) for name in PREDICTED], record_filter(model).step
-    fade, constants = model.fade(Noise(*numbers.noise)), numbers_and_constants(model.vehicle, numbers.parameters)
-    x, gust, drift = (np.asarray(part)[starts] for part in filtered[:3])
-    states = np.empty((len(starts), ahead, x.shape[1]))
-    for k in range(ahead):
-        u = recorded[0][starts + k]
-        answer = reference + np.sum(loops.gains * past[:, past.shape[1] - 1 - loops.late], axis=2)
-        # The part of the inputs that is the axis's command becomes the answer, all else stays as recorded.
-        u = np.where(k >= loops.since, u + (answer - u @ loops.shares.T) @ loops.back, u)
-        states[:, k] = x = step(x, gust, drift, u, recorded[1][starts + k], constants)
-        gust = fade * gust
-        past = np.concatenate([past[:, 1:], x[:, None, body]], axis=1)
-    return states
+    transition: Array
+    disturbed: Array
+    measured: Array
+    observed: Array
 
 
 SETTLING = 2.0
@@ -200,82 +125,158 @@ class Predictions:
         return early, after
 
 
-class Observed(NamedTuple):
-    """What an observer made of a record: its model and numbers, the states after each reading, innovations (n, outputs)
-    with their covariance, and commands as they arrive with the voltage, some samples longer than the record."""
+class ObservedRecord:
+    """A record as a vehicle's causal observer sees it, and what it predicts from there.
 
-    model: StochasticModel
-    numbers: FilterNumbers
-    filtered: FilterState
-    innovations: Array
-    covariance: Array
-    commands: Array
-    voltage: Array
+    Attributes:
+        record, nuisance: what is seen, and what belongs to it.
+        model, numbers: of the filter. filtered: its states after each reading.
+        innovations: one-step prediction errors (n, outputs), and `covariance` their model covariance.
+    """
+
+    def __init__(self, vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance) -> None:
+        self._vehicle, self.record, self.nuisance = as_begun(vehicle, record), record, nuisance
+        # Uncertainty is told for a nose that points north.
+        self._northward = vehicle, stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
+        self.model = stochastic_model(self._vehicle, record.output_names, record.dt, noise=noise)
+        self._filter = record_filter(self.model)
+        reaching, voltage = self._commands(0)
+        starting = reaching[: starting_samples(record.dt)].mean(axis=0)
+        rows = self._vehicle.values(), noise, nuisance, starting
+        self.numbers = FilterNumbers(*(np.array(row, dtype=np.float64) for row in rows))
+        begin = begun(self.model, self.numbers, seen_at_start(self._vehicle, record))
+        series = RecordSeries(record.outputs, driving_rows(reaching, voltage))
+        self.innovations, self.filtered, _ = self._filter.along(begin, self.numbers, series)
+        self.covariance = np.asarray(begin.gain.covariance)
+        self._body = [vehicle.index(name) for name in PREDICTED]
+        self._constants = numbers_and_constants(self._vehicle, self.numbers.parameters)
+
+    def _commands(self, beyond: int) -> tuple[Array, Array]:
+        """Commands as they reach the vehicle and the voltage, which hold for some samples beyond the record."""
+        count = self.record.time.size + beyond
+        inputs, voltage = (lengthened(rows, count) for rows in (self.record.inputs, self.record.voltage))
+        return commands_moved(self._vehicle, self.record.dt, inputs, self.nuisance)[0], voltage
+
+    @property
+    def states(self) -> Array:
+        """Body states after each reading (n, 12)."""
+        return self.filtered.x[:, self._body]
 
     def ahead(self, starts: NDArray[np.intp], ahead: int) -> Array:
-        """States 1, 2, ... samples after some starts, with nothing measured any more (starts, ahead, states)."""
-        known = self.filtered, self.numbers, self.commands, self.voltage
-        return record_filter(self.model).ahead_of(*known, starts, ahead)
+        """Body states 1, 2, ... samples after some starts, with nothing measured any more (starts, ahead, 12)."""
+        known = self.filtered, self.numbers, *self._commands(ahead)
+        return self._filter.ahead_of(*known, starts, ahead)[..., self._body]
 
+    def closed_ahead(self, laws: Sequence[Law], starts: NDArray[np.intp], ahead: int) -> Array:
+        """As `ahead`, with the loops of some axes closed."""
+        inputs, (reaching, voltage) = self.record.inputs, self._commands(ahead)
+        vehicle, nuisance, dt = self._vehicle, self.nuisance, self.record.dt
+        trims = np.array([getattr(nuisance, f"trim_{name}", 0.0) for name in vehicle.input_names], dtype=float)
+        delays = np.where(motors(vehicle), nuisance.delay_motor, nuisance.delay_servo)
+        delay_steps = np.round(delays / dt).astype(int)
+        # What reaches the vehicle is a curve through four logged samples: until here, all are from before the start.
+        known = np.maximum(np.floor(delays / dt).astype(int) - 1, 0)
+        reach = round(_REACH / dt)
+        before = np.concatenate([np.repeat(self.states[:1], reach, axis=0), self.states])
+        shares, gains, late, references = [], [], [], []
+        for law in laws:
+            share = shares_of(vehicle, law.axis)
+            gain = np.array([dict(zip(law.motion, law.gains, strict=True)).get(name, 0.0) for name in PREDICTED])
+            lag = round(law.lag / dt)
+            left = np.cumsum(np.concatenate([[0.0], inputs @ share - (before @ gain)[reach - lag : len(before) - lag]]))
+            low = np.maximum(starts + 1 - round(_REFERENCE / dt), 0)
+            references.append((left[starts + 1] - left[low]) / (starts + 1 - low) + share @ trims)
+            shares.append(share)
+            gains.append(gain)
+            late.append(min(lag + int(delay_steps[np.flatnonzero(share)[0]]), reach - 1))
+        shared, back = np.array(shares), np.array([share / (share @ share) for share in shares])
+        since = np.where(np.any(shared != 0.0, axis=0), known, ahead)  # from when each input answers
+        reference, answering = np.stack(references, axis=1), reach - 1 - np.array(late)
+        past = before[starts[:, None] + np.arange(1, reach + 1)]
+        fade = self.model.fade(Noise(*self.numbers.noise))
+        x, gust, drift = (np.asarray(part)[starts] for part in self.filtered[:3])
+        states = np.empty((len(starts), ahead, len(PREDICTED)))
+        for k in range(ahead):
+            u = reaching[starts + k]
+            answer = reference + np.sum(np.array(gains) * past[:, answering], axis=2)
+            # The part of the inputs that is the axis's command becomes the answer, all else stays as recorded.
+            u = np.where(k >= since, u + (answer - u @ shared.T) @ back, u)
+            x = self._filter.step(x, gust, drift, u, voltage[starts + k], self._constants)
+            states[:, k], gust = x[:, self._body], fade * gust
+            past = np.concatenate([past[:, 1:], states[:, k, None]], axis=1)
+        return states
 
-def predict(
-    vehicle: Vehicle,
-    record: Record,
-    *,
-    noise: Noise,
-    nuisance: Nuisance,
-    horizon: float = max(HORIZONS),
-    every: float = 0.1,
-    settling: float = SETTLING,
-    early: float | None = None,
-    close_loop: Sequence[str] = (),
-) -> Predictions:
-    """Predict `horizon` seconds ahead from starts every `every` seconds, the first after `settling` seconds.
+    def shown(self, starts: NDArray[np.intp], aside: Array, kicks: Array) -> Array:
+        """Readings without the sensors' noise (runs, samples, outputs), of states that begin `aside` (runs, joined) and
+        are kicked at every sample (runs, samples, joined)."""
+        model, (commands, voltage) = self.model, self._commands(kicks.shape[1])
+        fade = model.fade(Noise(*self.numbers.noise))
+        state = model.displace(FilterState(*(np.asarray(part)[starts] for part in self.filtered)), aside)
+        shown = []
+        for k in range(kicks.shape[1]):
+            here = starts + k
+            x = self._filter.step(state.x, state.gust, state.drift, commands[here], voltage[here], self._constants)
+            state = model.displace(FilterState(x, fade * state.gust, state.drift), kicks[:, k])
+            shown.append(model.measure(state.x.T, self.nuisance, _ARRAYS).T)
+        return np.stack(shown, axis=1)
 
-    With `early` starts at the same distance begin before it, from `early` seconds on.
+    @cached_property
+    def uncertainty(self) -> Uncertainty:
+        """How sure the observer is about the mean flight, nose north."""
+        vehicle, model = self._northward
+        noise, nuisance = self.numbers[1:3]
+        rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (vehicle.values(), noise, nuisance, [0.0])))
+        A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, self.record)))
+        predicted = steady_gain(A, C, Q, R)[2]
+        return Uncertainty(A, Q, R, predicted - gain_at(predicted, C, R) @ C @ predicted)
 
-    At each start the observer has seen the record up to that sample and nothing after it. From there on the equations
-    run on the recorded inputs; gusts fade and drifts stay as the observer last saw them. `close_loop` names axes that
-    are predicted again with their controller, as the seconds before tell it, in the place of their recorded command.
-    """
-    filtered = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=round(horizon / record.dt))
-    n, ahead = record.time.size, round(horizon / record.dt)
-    first, step = round(settling / record.dt), max(1, round(every / record.dt))
-    if early is not None:
-        first -= max(0, (first - round(early / record.dt)) // step) * step
-    starts = np.arange(first, max(n - 1, 0), step)
-    kept = [vehicle.index(name) for name in PREDICTED]
-    laws = learnt(vehicle, record, filtered.filtered.x[:, kept], axes=close_loop, seconds=settling)
-    closed = None
-    if laws:
-        given = (filtered.model, filtered.filtered, filtered.numbers, laws, record.inputs)
-        answered = closed_ahead(*given, filtered.commands, filtered.voltage, starts, ahead)
-        closed = answered[..., kept]
-    return Predictions(
-        starts=starts,
-        states=filtered.ahead(starts, ahead)[..., kept],
-        filtered=filtered.filtered.x[:, kept],
-        innovations=filtered.innovations,
-        covariance=np.asarray(filtered.covariance),
-        disturbances=filtered.filtered.gust[:, :N_DISTURBANCES] + filtered.filtered.drift,
-        closed=closed,
-        laws=laws,
-    )
+    def sigma(self, ahead: int) -> Array:
+        """Standard deviations (ahead, 12) of predictions 1, 2, ... samples ahead.
 
+        Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
+        """
+        A, Q, _, P = self.uncertainty
+        sigmas = []
+        for _ in range(ahead):
+            P = A @ P @ A.T + Q
+            sigmas.append(np.sqrt(np.maximum(np.diag(P)[self._body], 0.0)))
+        return np.array(sigmas)
 
-def observed(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, beyond: int) -> Observed:
-    """The causal observer of a vehicle along a record, whose last commands hold for `beyond` samples more."""
-    vehicle = as_begun(vehicle, record)
-    model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
-    n = record.time.size
-    inputs, voltage = (lengthened(rows, n + beyond) for rows in (record.inputs, record.voltage))
-    reaching, _ = commands_moved(vehicle, record.dt, inputs, nuisance)
-    starting = reaching[: starting_samples(record.dt)].mean(axis=0)
-    numbers = FilterNumbers(*(np.array(row, dtype=np.float64) for row in (vehicle.values(), noise, nuisance, starting)))
-    begin = begun(model, numbers, seen_at_start(vehicle, record))
-    series = RecordSeries(record.outputs, driving_rows(reaching[:n], record.voltage))
-    innovations, filtered, _ = record_filter(model).along(begin, numbers, series)
-    return Observed(model, numbers, filtered, innovations, begin.gain.covariance, reaching, voltage)
+    def predict(
+        self,
+        *,
+        horizon: float = max(HORIZONS),
+        every: float = 0.1,
+        settling: float = SETTLING,
+        early: float | None = None,
+        close_loop: Sequence[str] = (),
+    ) -> Predictions:
+        """Predict `horizon` seconds ahead from starts every `every` seconds, the first after `settling` seconds.
+
+        With `early` starts at the same distance begin before it, from `early` seconds on.
+
+        At each start the observer has seen the record up to that sample and nothing after it. From there on the
+        equations run on the recorded inputs; gusts fade and drifts stay as the observer last saw them. `close_loop`
+        names axes that are predicted again with their controller, as the seconds before tell it, in the place of their
+        recorded command.
+        """
+        record = self.record
+        n, ahead = record.time.size, round(horizon / record.dt)
+        first, step = round(settling / record.dt), max(1, round(every / record.dt))
+        if early is not None:
+            first -= max(0, (first - round(early / record.dt)) // step) * step
+        starts = np.arange(first, max(n - 1, 0), step)
+        laws = learnt(self._vehicle, record, self.states, axes=close_loop, seconds=settling)
+        return Predictions(
+            starts=starts,
+            states=self.ahead(starts, ahead),
+            filtered=self.states,
+            innovations=self.innovations,
+            covariance=self.covariance,
+            disturbances=self.filtered.gust[:, :N_DISTURBANCES] + self.filtered.drift,
+            closed=self.closed_ahead(laws, starts, ahead) if laws else None,
+            laws=laws,
+        )
 
 
 def naive(states: Array, starts: NDArray[np.intp], ahead: int, dt: float, *, kind: str) -> Array:
@@ -292,28 +293,3 @@ def naive(states: Array, starts: NDArray[np.intp], ahead: int, dt: float, *, kin
     turned = (attitude * Rotation.from_rotvec(rates * time)).as_euler("ZYX")[:, ::-1]
     turned = angles + (turned - angles + np.pi) % (2 * np.pi) - np.pi
     return np.concatenate([position_ahead, velocity, turned, rates], axis=1)
-
-
-def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, horizon: float) -> Array:
-    """Standard deviations (n, 12) of predictions 1, 2, ... samples ahead, about the mean flight, nose north.
-
-    Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
-    """
-    A, _, Q, _, P = uncertainty(vehicle, record, noise=noise, nuisance=nuisance)
-    kept, sigmas = [vehicle.index(name) for name in PREDICTED], []
-    for _ in range(round(horizon / record.dt)):
-        P = A @ P @ A.T + Q
-        sigmas.append(np.sqrt(np.maximum(np.diag(P)[kept], 0.0)))
-    return np.array(sigmas)
-
-
-def uncertainty(
-    vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance
-) -> tuple[Array, Array, Array, Array, Array]:
-    """A, C, Q, R of the joined system about the mean flight, nose north, and the covariance of what an observer makes
-    of a reading."""
-    model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
-    rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (vehicle.values(), noise, nuisance, [0.0])))
-    A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, record)))
-    predicted = steady_gain(A, C, Q, R)[2]
-    return A, C, Q, R, predicted - gain_at(predicted, C, R) @ C @ predicted

@@ -33,11 +33,10 @@ from swashplate.validation.flight_floors import ClosedRecord, ScoredRecord, clos
 from swashplate.validation.paths import spread
 from swashplate.validation.prediction import (
     SETTLING,
+    ObservedRecord,
     Predictions,
     fit_percent,
     naive,
-    predict,
-    prediction_sigma,
     rms,
     theil,
 )
@@ -57,8 +56,7 @@ _EDGE = 0.1
 
 @dataclass(frozen=True)
 class _Rival:
-    vehicle: Vehicle
-    nuisance: Nuisance
+    observed: ObservedRecord
     predictions: Predictions
     early: Predictions  # from starts within the calibration
 
@@ -145,33 +143,29 @@ def validate(
                 rivals[name] = rivals["model"]
                 continue
             nuisance = calibrate(vehicle_flown, piece, noise=noise, prior=prior, seconds=calibration, trims=trims)
-            predictions = predict(
-                vehicle_flown,
-                piece,
-                noise=noise,
-                nuisance=nuisance,
+            observed = ObservedRecord(vehicle_flown, piece, noise=noise, nuisance=nuisance)
+            predictions = observed.predict(
                 horizon=ahead,
                 every=every,
                 settling=calibration,
                 early=None if rivals else SETTLING,
                 close_loop=() if rivals else close_loop,
             )
-            rivals[name] = _Rival(vehicle_flown, nuisance, *reversed(predictions.split(round(calibration / piece.dt))))
+            rivals[name] = _Rival(observed, *reversed(predictions.split(round(calibration / piece.dt))))
         model_rival = rivals["model"]
         laws.extend(model_rival.predictions.laws)
-        calibrated.append(model_rival.nuisance)
-        truth = measured_states(piece, model_rival.nuisance)
+        calibrated.append(model_rival.observed.nuisance)
+        truth = measured_states(piece, model_rival.observed.nuisance)
         # The tracked point as it is: that is what a controller saw, whatever the lever arm.
         judged.extend(excitation(vehicle, piece, measured_states(piece, Nuisance())))
         measured.append(truth)
-        sigma = prediction_sigma(vehicle, piece, noise=noise, nuisance=model_rival.nuisance, horizon=ahead)
+        sigma = model_rival.observed.sigma(round(ahead / piece.dt))
         wider = _wider(piece, model_rival, truth, sigma, every=every, horizon=min(horizons))
         furthest = ahead if draws else min(ahead, JUDGED_AHEAD)
+        nuisance = model_rival.observed.nuisance
+        drawn = [ObservedRecord(one, piece, noise=noise, nuisance=nuisance) for one in draws]
         fan = spread(
-            draws or (vehicle,) * FEWEST_DRAWS,
-            piece,
-            noise=noise,
-            nuisance=model_rival.nuisance,
+            drawn or [model_rival.observed] * FEWEST_DRAWS,
             predictions=model_rival.predictions,
             truth=truth,
             longest=round(furthest / piece.dt),
@@ -334,7 +328,7 @@ def _at_horizon(
     starts = rivals["model"].predictions.starts
     counted = starts + ahead < piece.time.size - round(_EDGE / piece.dt)
     first = starts[counted]
-    truths = {name: measured_states(piece, r.nuisance) for name, r in rivals.items()}
+    truths = {name: measured_states(piece, r.observed.nuisance) for name, r in rivals.items()}
     predicted = {
         name: (r.predictions.states[counted, ahead - 1], truths[name][first + ahead], truths[name][first])
         for name, r in rivals.items()

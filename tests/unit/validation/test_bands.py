@@ -24,7 +24,7 @@ from swashplate.validation.bands import (
     widening,
 )
 from swashplate.validation.paths import paths
-from swashplate.validation.prediction import predict
+from swashplate.validation.prediction import ObservedRecord
 
 
 def _record(
@@ -135,11 +135,11 @@ def test_paths_are_the_models_predictions_with_gusts_and_noise_of_their_own() ->
     coax = sp.vehicle("coax")
     (record,) = records(ten_seconds().condition(rate=100.0, cutoff=0.0), coax)
     noise, nuisance = Noise(), Nuisance()
-    made = predict(coax, record, noise=noise, nuisance=nuisance, horizon=1.0, every=0.1, settling=3.0)
+    made = ObservedRecord(coax, record, noise=noise, nuisance=nuisance).predict(horizon=1.0, every=0.1, settling=3.0)
 
     def fan(noise: Noise) -> tuple[np.ndarray, np.ndarray]:
-        given = {"noise": noise, "nuisance": nuisance, "starts": made.starts, "ahead": 100}
-        return next(paths([coax], record, **given, seed=2))  # type: ignore[arg-type]
+        seen = ObservedRecord(coax, record, noise=noise, nuisance=nuisance)
+        return next(paths([seen], starts=made.starts, ahead=100, seed=2))
 
     path, plain = fan(noise)
     np.testing.assert_allclose(plain, made.states, atol=1e-9)

@@ -16,7 +16,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import CALIBRATION, Record, records
 from swashplate.identification.time.calibration import calibrate, first_part
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.validation.prediction import Predictions, predict
+from swashplate.validation.prediction import ObservedRecord, Predictions
 from swashplate.validation.validate import observer_of, validate
 from swashplate.validation.validation import PREDICTORS, Validation
 
@@ -41,16 +41,9 @@ def _record() -> Record:
 
 
 def _predicted(record: Record, *, nuisance: Nuisance | None = None, close_loop: tuple[str, ...] = ()) -> Predictions:
-    return predict(
-        sp.vehicle("coax"),
-        record,
-        noise=Noise(),
-        nuisance=Nuisance(*map(float, nuisance or Nuisance())),
-        horizon=max(HORIZONS),
-        every=EVERY,
-        settling=CALIBRATION,
-        close_loop=close_loop,
-    )
+    told = Nuisance(*map(float, nuisance or Nuisance()))
+    observed = ObservedRecord(sp.vehicle("coax"), record, noise=Noise(), nuisance=told)
+    return observed.predict(horizon=max(HORIZONS), every=EVERY, settling=CALIBRATION, close_loop=close_loop)
 
 
 def _changed_after(record: Record, sample: int) -> Record:

@@ -25,7 +25,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
-from swashplate.validation.prediction import predict
+from swashplate.validation.prediction import ObservedRecord
 from swashplate.validation.validate import observer_of
 
 RATE = 50.0
@@ -233,7 +233,9 @@ def _predicted(flight: Flight, models: Sequence[Vehicle], ahead: float, time: Ar
         # The prediction is of the centre of gravity; the log shows the tracked point.
         carried = flight_at(flight, piece.time) - measured_states(piece, nuisance)
         for one, body in zip(models, states, strict=True):
-            runs = predict(one, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=ahead, settling=settling)
+            runs = ObservedRecord(one, piece, noise=noise, nuisance=nuisance).predict(
+                horizon=ahead, every=ahead, settling=settling
+            )
             rows = np.full((piece.time.size, len(PREDICTED)), np.nan)
             start = runs.starts[0]
             chain = runs.states.reshape(-1, len(PREDICTED))[: piece.time.size - start - 1]

@@ -24,7 +24,7 @@ from swashplate.identification.time.residual_ahead import FlightAhead, fit_ahead
 from swashplate.models.residual import coefficients, with_residual
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
-from swashplate.validation.prediction import predict
+from swashplate.validation.prediction import ObservedRecord
 
 HORIZON = Horizon(0.25, 0.5)
 TRIMS = {"push_p": 5.0, "push_r": 5.0}
@@ -58,8 +58,8 @@ def predicted(record: Record) -> Array:
     usual = Nuisance(delay_servo=0.05, delay_motor=0.05)
     vehicle, every = wider().with_values(FACTORS), HORIZON.first
     own = calibrate(vehicle, record, noise=Noise(), prior=usual, trims=TRIMS)
-    told = predict(
-        vehicle, record, noise=Noise(), nuisance=own, horizon=HORIZON.last, every=every, settling=CALIBRATION
+    told = ObservedRecord(vehicle, record, noise=Noise(), nuisance=own).predict(
+        horizon=HORIZON.last, every=every, settling=CALIBRATION
     )
     steps = np.array(HORIZON.samples(record.dt))
     starts = told.starts[told.starts + steps[-1] < record.time.size - 1]
