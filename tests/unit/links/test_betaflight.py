@@ -270,7 +270,9 @@ WAITS = """
 #include <stdio.h>
 #include <sys/select.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <time.h>
+#include <unistd.h>
 static int bound;
 static volatile int taken;
 static void *take(void *none) {
@@ -292,7 +294,7 @@ static double now(void) {
 int main(void) {
   struct sockaddr_in at = {.sin_family = AF_INET};
   socklen_t room = sizeof at;
-  struct timespec nap = {0, 50000};
+  struct timespec nap = {0, 50000}, busy = {0, 50000000};
   pthread_t other;
   double began;
   at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -300,6 +302,9 @@ int main(void) {
   bind(bound, (struct sockaddr *)&at, sizeof at);
   getsockname(bound, (struct sockaddr *)&at, &room);
   pthread_create(&other, 0, take, 0);
+  began = now();
+  syscall(SYS_nanosleep, &busy, 0);
+  puts(now() < began + 0.001 ? "no time passed" : "late");
   printf("%d\\n", ntohs(at.sin_port));
   fflush(stdout);
   while (!taken) nanosleep(&nap, 0);
@@ -308,7 +313,7 @@ int main(void) {
   return 0;
 }
 """
-"""Two threads, as the firmware has: one takes states, the other waits until 20 loops are over."""
+"""Two threads, as the firmware has: one takes states, the other finds the machine busy, then waits for 20 loops."""
 
 
 @pytest.mark.skipif(sys.platform != "linux" or QUICK is None, reason="the clock is put before a system's own")
@@ -320,6 +325,7 @@ def test_the_clock_of_a_program_waits_for_states(tmp_path: Path) -> None:
     with subprocess.Popen([str(waiting)], stdout=subprocess.PIPE, text=True, env=loading) as program:
         try:
             assert program.stdout is not None
+            assert program.stdout.readline() == "no time passed\n"
             port = int(program.stdout.readline())
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
                 for _ in range(15):

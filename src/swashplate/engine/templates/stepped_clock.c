@@ -1,6 +1,8 @@
 /* The clock of Betaflight's SITL, loaded before its libraries (links/betaflight/stepped_clock.py): from the first state
-   on, each state that it takes gives it @LOOP@ ns more, and its main thread waits when these are over. Until then it is
-   the system's. A main thread that waits for time makes it pass: @NAP@ ns where it sleeps, @LOOK@ ns where it looks. */
+   on, each state that it takes gives it @LOOP@ ns more, and its main thread waits when these are over. A main thread that
+   waits for time makes it pass: @NAP@ ns where it sleeps, @LOOK@ ns where it looks; before the first state too, while it
+   sleeps for as long as it asks. Its scheduler never runs its loop if more than a period passes before the first: so no
+   time passes while the machine is busy with others. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <linux/futex.h>
@@ -11,7 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
-static volatile int64_t now, until;
+static volatile int64_t now, until = INT64_MAX;
 static volatile int states;
 static __thread int took, thread;
 
@@ -27,7 +29,10 @@ static void pass(int64_t ns) {
 }
 
 int clock_gettime(clockid_t which, struct timespec *told) {
-  if (which != CLOCK_MONOTONIC || !states) return (int)syscall(SYS_clock_gettime, which, told);
+  const int system = which != CLOCK_MONOTONIC || !now;
+  const int had = system ? (int)syscall(SYS_clock_gettime, which, told) : 0;
+  if (which == CLOCK_MONOTONIC && !now && is_main()) now = (int64_t)told->tv_sec * 1000000000 + told->tv_nsec;
+  if (system) return had;
   if (is_main()) pass(@LOOK@);
   told->tv_sec = now / 1000000000;
   told->tv_nsec = now % 1000000000;
@@ -35,9 +40,10 @@ int clock_gettime(clockid_t which, struct timespec *told) {
 }
 
 int nanosleep(const struct timespec *asked, struct timespec *left) {
-  if (!states || !is_main()) return (int)syscall(SYS_nanosleep, asked, left);
-  pass(@NAP@);
-  return 0;
+  const int64_t ns = (int64_t)asked->tv_sec * 1000000000 + asked->tv_nsec;
+  const int had = states && is_main() ? 0 : (int)syscall(SYS_nanosleep, asked, left);
+  if (now && is_main()) pass(states ? @NAP@ : ns);
+  return had;
 }
 
 ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *from, socklen_t *room) {
@@ -52,14 +58,9 @@ ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *fr
 /* It waits for the next datagram, and so has taken the last one. */
 int select(int most, fd_set *in, fd_set *out, fd_set *odd, struct timeval *wait) {
   int (*real)(int, fd_set *, fd_set *, fd_set *, struct timeval *);
-  struct timespec at;
   *(void **)&real = dlsym(RTLD_NEXT, "select");
   if (took) {
-    if (!states) {
-      syscall(SYS_clock_gettime, CLOCK_MONOTONIC, &at);
-      now = until = (int64_t)at.tv_sec * 1000000000 + at.tv_nsec;
-    }
-    until += @LOOP@;
+    until = (states ? until : now) + @LOOP@;
     __sync_synchronize();
     ++states;
     syscall(SYS_futex, &states, FUTEX_WAKE, 1, (void *)0, (void *)0, 0);

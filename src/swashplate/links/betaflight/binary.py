@@ -24,9 +24,8 @@ from swashplate.systems import end_with_children
 _PATIENCE = 2.0
 """s that it has to end by itself."""
 _CONFIGURED = "EEPROM saved"
-_UP, _SETTLING, _STARTING = f"bind port {MSP_PORT}", 0.5, 4.0
-"""What it prints once its ports are open, how long its sensors take from there, and how long all of it takes [s]: its
-clock is the system's until the first state."""
+_UP, _SETTLING = f"bind port {MSP_PORT}", 0.5
+"""What it prints once its ports are open, and how long its sensors take from there [s]."""
 _CLOCK = re.compile(rb"\[SITL\] t=(\d+)ms  spd")
 
 
@@ -161,7 +160,7 @@ class BetaflightBinary:
             if ending := self.ended():
                 raise LinkError(ending, where=self.binary)
             if _UP in self.text():
-                time.sleep(_SETTLING if self.before is None else _STARTING)
+                time.sleep(_SETTLING)
                 return
             time.sleep(0.05)
         raise LinkError(

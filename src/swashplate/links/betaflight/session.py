@@ -2,8 +2,8 @@
 
 In lockstep (`stepped_clock`) each state answers the motors of a loop. Otherwise each side has a clock of its own. The
 firmware sets the pace of its clock from the time stamps of the last two states and when they came: on a busy
-machine it rushes by a factor of three. A state with the time stamp of the one before leaves its clock alone. So three
-states set a pace once, slower than the wall clock where a machine is busy, and all others have the same stamp; how late
+machine it rushes by a factor of three. A state with the time stamp of the one before leaves its clock alone, and so does
+0, where it begins: all of lockstep. Without it three states set a pace once, slower than the wall clock where a machine is busy, and all others have the same stamp; how late
 steps were is told. A build with ENABLE_SIMULATOR_GYROPID_SYNC runs a loop for each state.
 """
 
@@ -131,7 +131,7 @@ class BetaflightSession:
             self._notices.always(f"the vehicle broke at {self.plant.time:.2f} s: {self.plant.broken}. It lies there.")
         held = self.sticks(self.plant.time, motion)
         self.exchanged.states += 1
-        state = state_packet(_STAMP, self._sensing.read(motion))[: self._size]
+        state = self.begun(0.0 if self.in_lockstep else _STAMP)
         if held is None or self.plant.time < self._due:
             return state, None
         self._due = self.plant.time + STICKS_EVERY - 1e-9
