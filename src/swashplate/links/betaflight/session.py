@@ -2,9 +2,10 @@
 
 In lockstep (`stepped_clock`) each state answers the motors of a loop. Otherwise each side has a clock of its own. The
 firmware sets the pace of its clock from the time stamps of the last two states and when they came: on a busy
-machine it rushes by a factor of three. A state with the time stamp of the one before leaves its clock alone, and so does
-0, where it begins: all of lockstep. Without it three states set a pace once, slower than the wall clock where a machine is busy, and all others have the same stamp; how late
-steps were is told. A build with ENABLE_SIMULATOR_GYROPID_SYNC runs a loop for each state.
+machine it rushes by a factor of three. A state with the time stamp of the one before leaves its clock alone, and so
+does 0, where it begins: all of lockstep. Without it three states set a pace once, slower than the wall clock where a
+machine is busy, and all others have the same stamp; how late steps were is told.
+A build with ENABLE_SIMULATOR_GYROPID_SYNC runs a loop for each state.
 """
 
 from __future__ import annotations
