@@ -112,11 +112,12 @@ def pieces(flight: Flight, names: Sequence[str], time: Array, reference: Referen
         from scipy.ndimage import uniform_filter1d  # a quarter of a second that most logs need not wait
 
         table = uniform_filter1d(table, width, axis=0)
+    rows = np.ascontiguousarray(table.T)  # once, for all pieces
     gap = max(_MAX_GAP, 2.5 / rate)
     for start, stop in common(unbroken(time, max_gap=gap), unbroken(stamps, max_gap=gap)):
         grid = start + np.arange(int((stop - start) * rate)) / rate
         if grid.size >= SHORTEST:
-            columns = [np.interp(grid, stamps, values) for values in table.T]
+            columns = [np.interp(grid, stamps, values) for values in rows]
             yield rate, np.column_stack([*columns, reference(grid)])
 
 

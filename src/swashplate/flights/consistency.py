@@ -83,7 +83,7 @@ def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
 
         def body(grid: Array) -> Array:
             assert attitude is not None
-            return to_body(interpolate(attitude.time, attitude.quaternion, grid), local(grid))
+            return to_body(attitude.during(grid), local(grid))
 
         complete = attitude is not None and len(attitude.axes) == 3
         for names, reference in ((_LOCAL, local), *([(VELOCITY, body)] if complete else [])):
@@ -166,9 +166,15 @@ class _Attitude:
     quaternion: Array
     axes: tuple[int, ...]
 
+    def during(self, times: Array) -> Array:
+        """Quaternions at rising times [s], shape (n, 4), from the samples around them alone: a log has many pieces."""
+        first = max(0, int(np.searchsorted(self.time, times[0], side="right")) - 1)
+        last = int(np.searchsorted(self.time, times[-1], side="right")) + 1
+        return interpolate(self.time[first:last], self.quaternion[first:last], times)
+
     def turning(self, grid: Array) -> Array:
         """Body rates [rad/s] at the times of a uniform grid, shape (n, 3)."""
-        return body_rates(interpolate(self.time, self.quaternion, grid), rate=1.0 / float(grid[1] - grid[0]))
+        return body_rates(self.during(grid), rate=1.0 / float(grid[1] - grid[0]))
 
 
 def _attitude(flight: Flight, contradictions: list[Inconsistency]) -> _Attitude | None:
@@ -329,7 +335,7 @@ def _weight(flight: Flight, inner: set[str], attitude: _Attitude | None) -> list
         down = np.ones(values.size)
         if attitude is not None:
             # Third row, third column of body to local: how much of body z points down.
-            down = to_body(interpolate(attitude.time, attitude.quaternion, stamps), np.array([0.0, 0.0, 1.0]))[:, 2]
+            down = to_body(attitude.during(stamps), np.array([0.0, 0.0, 1.0]))[:, 2]
         upright = np.abs(down) > _UPRIGHT
         felt = float(np.median(values[upright] / -down[upright])) if upright.sum() >= SHORTEST else gravity
         for unit, weight in (("m/s^2", gravity), ("g", 1.0)):

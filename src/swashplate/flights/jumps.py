@@ -22,6 +22,7 @@ from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, VAR
 
 OUTLIER = 12.0
 """Robust standard deviations of the sample-to-sample change from which on it stands out."""
+_BLOCK = 1 << 16  # samples that are turned at a time: a long log has no room for the quaternions of all
 _NEAR = 25  # changes on each side that are its neighbours
 _UNUSUAL = 4.0  # robust standard deviations of the neighbours; a sweep's own changes reach one
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
@@ -113,7 +114,16 @@ def _turns(flight: Flight, group: tuple[str, ...]) -> Changes:
     """The rotation from sample to sample [rad] about three axes, blind to flips of sign and to whole turns."""
     table, time = flight.array(group), flight.time(group[0])
     good = np.isfinite(table).all(axis=1)
-    quaternion = (table[good] if group == QUATERNION else quaternion_from_euler(table[good])).T
+    time, table = time[good], table[good]
+    turned = np.empty((3, max(time.size - 1, 0)))
+    for begin in range(0, turned.shape[1], _BLOCK):
+        turned[:, begin : begin + _BLOCK] = _turned(group, table[begin : begin + _BLOCK + 1])
+    return time, turned
+
+
+def _turned(group: tuple[str, ...], table: Array) -> Array:
+    """The rotations between samples of an attitude, shape (n, 3 or 4), about three axes [rad], shape (3, n - 1)."""
+    quaternion = (table if group == QUATERNION else quaternion_from_euler(table)).T
     (w0, x0, y0, z0), (w1, x1, y1, z1) = quaternion[:, :-1], quaternion[:, 1:]
     sign = np.sign(w0 * w1 + x0 * x1 + y0 * y1 + z0 * z1)
     # Vector part of conj(q0) * q1, which is half the rotation vector where the step is small.
@@ -122,7 +132,7 @@ def _turns(flight: Flight, group: tuple[str, ...]) -> Changes:
         sign * (w0 * y1 - y0 * w1 - z0 * x1 + x0 * z1),
         sign * (w0 * z1 - z0 * w1 - x0 * y1 + y0 * x1),
     )
-    return time[good], 2.0 * np.stack(turned)
+    return 2.0 * np.stack(turned)
 
 
 def _outstanding(rows: Array) -> NDArray[np.bool_]:

@@ -294,3 +294,29 @@ def test_stamps_that_hardly_differ_are_no_reason_to_stop() -> None:
     time = np.arange(50) * 5e-324
     stamps, table = thinned(time, np.ones((50, 3)))
     assert (stamps.shape, table.shape) == ((50,), (50, 3))
+
+
+def test_a_log_in_many_pieces_turns_each_sample_of_its_attitude_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, turned = flown(), 0
+    parts = {
+        name: data.isel(time=np.flatnonzero(data["time"].values % 10.0 < 9.0)) for name, data in whole.streams.items()
+    }
+    turn = consistency_module.interpolate
+
+    def counting(time: np.ndarray, quaternion: np.ndarray, grid: np.ndarray) -> np.ndarray:
+        nonlocal turned
+        turned += time.size
+        assert np.abs(np.sum(turn(time, quaternion, grid) * turn(*every, grid), axis=1)) == pytest.approx(
+            1.0, abs=1e-12
+        )
+        return turn(time, quaternion, grid)
+
+    cut = Flight(parts)
+    attitude = consistency_module._attitude(cut, [])
+    assert attitude is not None
+    every = (attitude.time, attitude.quaternion)
+    monkeypatch.setattr(consistency_module, "interpolate", counting)
+    assert consistency(cut) == ()
+    several = 4  # rates, velocities of either axes, weight
+    assert attitude.time.size < turned < several * attitude.time.size
+    assert [one.channel for one in consistency(changed(cut, q=-cut.values("q")))] == ["q"]

@@ -38,6 +38,9 @@ _UNUSUAL = 0.1  # of that share: a ridge that ends in a tone which lasts is cut 
 _LEAST_RATIO = 2.5  # highest over lowest frequency
 _LEAST_PERIODS = 8.0
 _LEAST_SECONDS = 4.0
+_WINDOW = 1800.0  # s that are searched at a time
+_SHARED = 300.0  # s: of a sweep at a quarter of an octave a minute this is enough to be seen
+_AT_THE_END = 10.0  # s: a sweep that stops so near to a window's end may go on behind it
 _SEEN_WITHIN = 0.2  # of the median amplitude: the sweep's ends
 _COMMANDS = ("mixer_", "servo_", "motor_", "stick_", "sid_target", "rcin_")
 _SETPOINT = "_demand"
@@ -128,7 +131,7 @@ def _visible_sweeps(flight: Flight, logged: Sequence[tuple[float, float]]) -> li
     for name in _candidates(flight):
         time, values = flight.time(name), flight.values(name)
         for start, stop in unbroken_in_mode(flight, time):
-            inside = (time >= start) & (time <= stop)
+            inside = slice(*np.searchsorted(time, (start, np.nextafter(stop, np.inf))).tolist())
             for ridge in all_rising(time[inside], values[inside]):
                 low, high = float(ridge.frequency[0]), float(ridge.frequency[-1])
                 amplitude = float(np.median(ridge.amplitude))
@@ -161,12 +164,35 @@ def unbroken_in_mode(flight: Flight, time: Array) -> list[tuple[float, float]]:
 
 
 def all_rising(time: Array, values: Array) -> list[Ridge]:
-    """The strongest sweep in a signal, and those before and after it; arguments as of `rising`."""
+    """The sweeps in a signal, in order of time; arguments as of `rising`.
+
+    A long signal is searched in windows which share what a sweep needs to be seen: a log of hours has no room for one
+    scalogram. A window in which a sweep goes on to the end is made longer.
+    """
+    ridges: list[Ridge] = []
+    begin, length = 0, _WINDOW
+    while begin < time.size:
+        end = int(np.searchsorted(time, time[begin] + length, side="right"))
+        here = _rising_in(time[begin:end], values[begin:end])
+        if end < time.size and here and here[-1].stop > time[end - 1] - _AT_THE_END:
+            length += _WINDOW
+            continue
+        ridges += here
+        if end == time.size:
+            break
+        last_stop = here[-1].stop if here else -np.inf
+        begin, length = int(np.searchsorted(time, max(time[end - 1] - _SHARED, last_stop), side="right")), _WINDOW
+    return ridges
+
+
+def _rising_in(time: Array, values: Array) -> list[Ridge]:
+    """The strongest sweep in a window, and those before and after it."""
     ridge = rising(time, values)
     if ridge is None:
         return []
-    before, after = time < ridge.start, time > ridge.stop
-    return [*all_rising(time[before], values[before]), ridge, *all_rising(time[after], values[after])]
+    before = slice(None, int(np.searchsorted(time, ridge.start, side="left")))
+    after = slice(int(np.searchsorted(time, ridge.stop, side="right")), None)
+    return [*_rising_in(time[before], values[before]), ridge, *_rising_in(time[after], values[after])]
 
 
 def rising(time: Array, values: Array) -> Ridge | None:
@@ -269,13 +295,14 @@ def _scalogram(signal: Array, frequency: Array, *, rate: float, hop: int) -> tup
     """
     n = signal.size
     frames = -(-n // hop)
-    short = int(2 ** np.ceil(np.log2(2 * frames)))
+    # Behind the signal there is room for its own length, or for what the longest wavelet reaches.
+    reach = int(_NOTHING * _CYCLES / (2.0 * np.pi * frequency[0]) * rate / hop) + 1
+    short = int(2 ** np.ceil(np.log2(frames + min(frames, reach))))
     size = short * hop  # the inverse transform's every hop-th sample is that of its folded spectrum
     spectrum = np.fft.fft(signal, size)
     bins = np.fft.fftfreq(size, 1.0 / rate)
     spectrum[np.abs(bins) < 0.5 * frequency[0]] = 0.0
     squared = np.fft.rfft(np.real(np.fft.ifft(spectrum))[:n] ** 2, size)
-    squared[1:] *= 2.0  # its real part has both sides
     amplitude = np.empty((frequency.size, frames))
     power = np.empty_like(amplitude)
     bins = bins[: size // 2]  # of a real signal's one side
@@ -287,8 +314,12 @@ def _scalogram(signal: Array, frequency: Array, *, rate: float, hop: int) -> tup
         window = 2.0 * np.exp(-0.5 * (2.0 * np.pi * (bins[here] - f) * spread) ** 2)
         amplitude[i] = np.abs(_sampled(spectrum[here] * window, here.start, short, hop))[:frames]
         here = slice(0, min(bins.size, int(np.sqrt(2.0) * wide / step) + 2))
-        gauss = np.exp(-0.5 * (2.0 * np.pi * bins[here] * spread / np.sqrt(2.0)) ** 2)
-        power[i] = np.real(_sampled(squared[here] * gauss, 0, short, hop))[:frames]
+        smooth = squared[here] * np.exp(-0.5 * (2.0 * np.pi * bins[here] * spread / np.sqrt(2.0)) ** 2)
+        if smooth.size <= short // 2:
+            power[i] = np.fft.irfft(smooth, short)[:frames] / hop
+        else:
+            smooth[1:] *= 2.0  # its real part has both sides
+            power[i] = np.real(_sampled(smooth, 0, short, hop))[:frames]
     return amplitude, np.maximum(power, 0.0)
 
 
@@ -313,10 +344,11 @@ def _best_path(gain: Array) -> tuple[int, NDArray[np.int64]] | None:
     # Sums of the paths that end at a row, behind a margin from which none comes.
     sums = np.full((frames + 1, _REACH + rows), -np.inf)
     sums[0, _REACH:] = 0.0
+    two = np.empty(_REACH + rows - 1)
     for before, after, gained in zip(sums, sums[1:, _REACH:], np.ascontiguousarray(gain.T), strict=False):
-        np.maximum(before[_REACH:], 0.0, out=after)  # one begins here, or comes from the same row or one below
-        for step in range(1, _REACH + 1):
-            np.maximum(after, before[_REACH - step : -step], out=after)
+        np.maximum(before[1:], before[:-1], out=two)  # the better of a row and the one below
+        np.maximum(two[_REACH - 1 :], two[: 1 - _REACH], out=after)
+        np.maximum(after, 0.0, out=after)  # or one begins here
         after += gained
     best = sums[1:, _REACH:]
     k, row = divmod(int(best.argmax()), rows)

@@ -13,7 +13,9 @@ from conditioning_flights import sweep as linear_sweep
 from made_autopilot_logs import ardupilot_rows, dataflash
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.inspect import inspect
+from swashplate.flights.maneuvers import sweeps as sweeps_module
 from swashplate.flights.maneuvers.series import parse
+from swashplate.flights.maneuvers.sweep_tracking import Ridge
 from swashplate.flights.maneuvers.sweeps import rising, sweeps
 from swashplate.flights.provenance import Event, Provenance
 from swashplate.flights.readers.read import read
@@ -153,3 +155,40 @@ def test_a_sweep_has_no_jumps_though_its_changes_grow() -> None:
     spiked = _swept(4, noise=1e-4)
     spiked[6000] += 1.0
     assert inspect(_flight(p=spiked)).problems == ("p: 2 jumps beyond 12 robust sigmas (outliers?)",)
+
+
+def _hours(hours: float, *, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps at 25 Hz, and noise with sweeps: one over the end of the first window, and one that lasts ten minutes."""
+    time = np.arange(int(hours * 3600.0 * 25.0)) / 25.0
+    signal = 0.002 * np.random.default_rng(seed).standard_normal(time.size)
+    for start, words in ((600.0, "0.3-8Hz,60s"), (1770.0, "0.3-8Hz,60s"), (4900.0, "0.1-8Hz,600s")):
+        signal += parse(f"sweep:roll,{words},0.1").signals(time - start)["roll"]
+    return time, signal
+
+
+def test_a_long_log_is_searched_in_windows_and_no_sweep_is_cut() -> None:
+    time, signal = _hours(3.0, seed=1)
+    found = sweeps(Flight({"log": stream(time, {"mixer_roll": signal})}))
+    assert [s.stop for s in found] == pytest.approx([660.0, 1830.0, 5495.0], abs=5.0)
+    assert [s.start for s in found] == pytest.approx([600.0, 1770.0, 4900.0], abs=15.0)
+    for one in found:
+        near = (time > one.start - 100.0) & (time < one.stop + 100.0)
+        alone = rising(time[near], signal[near])
+        assert alone is not None
+        assert (one.start, one.stop) == pytest.approx((alone.start, alone.stop), abs=1.0)
+
+
+def test_hours_of_noise_hold_no_sweep_and_need_no_more_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    longest = []
+    search = sweeps_module.rising
+
+    def watched(time: np.ndarray, values: np.ndarray) -> Ridge | None:
+        longest.append(float(np.ptp(time)))
+        return search(time, values)
+
+    monkeypatch.setattr(sweeps_module, "rising", watched)
+    time = np.arange(5 * 36_000) / 10.0
+    noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(7).standard_normal(time.size))
+    assert sweeps(Flight({"log": stream(time, {"mixer_roll": np.asarray(noise)})})) == ()
+    assert sum(longest) > 4.9 * 3600.0, "all of it is searched"
+    assert max(longest) < 3600.0, "no scalogram of all"
