@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.timing import Result, best_rate
 from swashplate.models.catalogue import vehicle
 from swashplate.simulation.derivatives import derivative_table
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.lpv import simulate_lpv
 from swashplate.simulation.reduction import PAPER_INPUTS
 from swashplate.simulation.trim import trim
@@ -26,7 +26,7 @@ def scan(*, steps: int, repeats: int) -> Result:
     inputs = np.tile(hover.inputs, (steps + 1, 1))
 
     def run() -> None:
-        simulate(flown, inputs, start=hover, rate=1000.0)
+        simulate_open_loop(flown, inputs, start=hover, rate=1000.0)
 
     return Result("helicopter, simulate", best_rate(run, steps, repeats=repeats), SCAN_TARGET, "19 states, float64")
 

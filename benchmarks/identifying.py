@@ -56,7 +56,7 @@ def flight(seconds: float = 34.0) -> sp.Flight:
     """
     vehicle = sp.vehicle("coax")
     maneuver = f"multisine:roll+pitch+yaw+heave,0.3-8Hz,{seconds:g}s"
-    flown = sp.simulate_maneuver(vehicle, maneuver, controller=sp.hover_hold)
+    flown = sp.simulate(vehicle, maneuver, controller=sp.hover_hold)
     return sp.observe(flown, vehicle, seed=1, sensors=sp.Sensors()).condition(rate=100.0, cutoff=0.0)
 
 

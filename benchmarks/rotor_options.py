@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.timing import Result, best_rate
 from swashplate.models.catalogue import vehicle
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.trim import trim
 
 CASES: tuple[tuple[str, str, dict[str, Any]], ...] = (
@@ -24,7 +24,7 @@ def _loop(name: str, options: dict[str, Any], steps: int) -> Any:
     flown = vehicle(name, **options)
     hover = trim(flown)
     inputs = np.tile(hover.inputs, (steps + 1, 1))
-    return lambda: simulate(flown, inputs, start=hover, rate=500.0)
+    return lambda: simulate_open_loop(flown, inputs, start=hover, rate=500.0)
 
 
 def rotor_options(*, steps: int, repeats: int, short: bool) -> list[Result]:

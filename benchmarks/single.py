@@ -15,7 +15,7 @@ from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_ro
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.physics.backend import CasadiBackend
 from swashplate.simulation.discretisation import rk4_step
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.trim import trim
 
 TARGET = 180_000.0
@@ -65,7 +65,7 @@ def scan(*, steps: int, repeats: int) -> Result:
     start = dict(zip(vehicle.state_names, x, strict=True))
 
     def run() -> None:
-        simulate(vehicle, inputs, start=start, rate=1.0 / DT)
+        simulate_open_loop(vehicle, inputs, start=start, rate=1.0 / DT)
 
     return Result("swashplate, simulate", best_rate(run, steps, repeats=repeats), TARGET, "float64, one core")
 

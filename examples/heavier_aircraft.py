@@ -15,6 +15,6 @@ for name, vehicle in (("bare", coax), ("with computer", sp.vehicle("heavy.toml")
     print(f"{name}: motors {hover.commands()['motor_lower']:.3f} and {hover.commands()['motor_upper']:.3f} at 11.1 V,")
     print(f"  least damped mode {slowest.eigenvalue:.2f} 1/s")
 
-flight = sp.simulate_maneuver(heavy, "doublet:pitch,0.3s,0.2", controller=sp.hover_hold, voltage=11.1)
+flight = sp.simulate(heavy, "doublet:pitch,0.3s,0.2", voltage=11.1)
 flight.save("doublet.nc")
 print(flight)

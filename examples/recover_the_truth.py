@@ -11,7 +11,7 @@ TRUTH = {"tau_f_upper": 1.3, "linkage_lower": 0.12}  # s, rad; the card says 1.6
 
 def log(maneuver: str, *, seed: int) -> sp.Flight:
     """What motion capture and the flight computer record, at one rate."""
-    flown = sp.simulate_maneuver(aircraft, maneuver, controller=sp.hover_hold, lead=1.0, tail=1.0)
+    flown = sp.simulate(aircraft, maneuver, lead=1.0, tail=1.0)
     return sp.observe(flown, aircraft, sensors=QUIET, seed=seed).condition(rate=100, cutoff=0)
 
 

@@ -30,8 +30,7 @@ FLOWN = "multisine:roll+pitch+yaw+heave,0.3-4Hz,18s,0.05"
 def flight(aircraft: Vehicle, *, gusts: float, line: bool, seed: int) -> sp.Flight:
     """Twenty seconds as motion capture logs them, conditioned."""
     wind = lfilter([1.0], [1.0, -0.99], gusts * np.random.default_rng(100 + seed).standard_normal((2, 2001)))
-    blown = {"wind_north": wind[0], "wind_east": wind[1]}
-    flown = sp.simulate_maneuver(aircraft, FLOWN, controller=sp.hover_hold, lead=1, tail=1, wind=blown)
+    flown = sp.simulate(aircraft, FLOWN, controller=sp.hover_hold, lead=1, tail=1, wind=(*wind, 0.0))
     seen = sp.observe(flown, aircraft, sensors=sp.QUIET, seed=seed).condition(rate=100.0, cutoff=0.0)
     streams, turning = dict(seen.streams), flown.time("omega_upper")
     turned = np.cumsum(flown.values("omega_upper")) * float(np.median(np.diff(turning)))

@@ -16,5 +16,5 @@ TIE = "design_angle_lower = 2 * linkage_lower"  # nothing depends on that angle,
 def ten_seconds() -> Flight:
     """What motion capture without faults and a battery log of 10 s of hover with independent roll and pitch inputs."""
     coax = sp.vehicle("coax")
-    flight = sp.simulate_maneuver(coax, "multisine:roll+pitch,0.4-4Hz,8s,0.1", controller=sp.hover_hold, lead=1, tail=1)
+    flight = sp.simulate(coax, "multisine:roll+pitch,0.4-4Hz,8s,0.1", controller=sp.hover_hold, lead=1, tail=1)
     return sp.observe(flight, coax, sensors=QUIET, seed=3)

@@ -182,9 +182,7 @@ def _log(name: str) -> Any:
     from swashplate.simulation.sensors import QUIET
 
     vehicle = sp.vehicle("coax")
-    flown = sp.simulate_maneuver(
-        vehicle, "multisine:roll+pitch,0.4-4Hz,8s,0.1", controller=sp.hover_hold, lead=1.0, tail=1.0
-    )
+    flown = sp.simulate(vehicle, "multisine:roll+pitch,0.4-4Hz,8s,0.1", lead=1.0, tail=1.0)
     log = sp.observe(flown, vehicle, sensors=QUIET, seed=len(name))
     return replace(log, provenance=replace(log.provenance, source=name))
 

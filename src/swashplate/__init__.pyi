@@ -21,6 +21,7 @@ from swashplate.api.verbs.maneuver import design_maneuver as design_maneuver
 from swashplate.api.verbs.maneuver import needed_excitation as needed_excitation
 from swashplate.api.verbs.respond import respond as respond
 from swashplate.api.verbs.simulate import monte_carlo as monte_carlo
+from swashplate.api.verbs.simulate import simulate as simulate
 from swashplate.api.verbs.steady import trim as trim
 from swashplate.api.verbs.track import track as track
 from swashplate.api.verbs.validate import compare as compare
@@ -50,9 +51,7 @@ from swashplate.models.vehicle import Vehicle as Vehicle
 from swashplate.physics.environment import Environment as Environment
 from swashplate.reporting.report import report as report
 from swashplate.simulation.closed_loop import simulate_closed_loop as simulate_closed_loop
-from swashplate.simulation.closed_loop import simulate_maneuver as simulate_maneuver
 from swashplate.simulation.derivatives_over_speed import derivatives as derivatives
-from swashplate.simulation.integrate import simulate as simulate
 from swashplate.simulation.linearize import linearize as linearize
 from swashplate.simulation.sensors import QUIET as QUIET
 from swashplate.simulation.sensors import Sensors as Sensors

@@ -331,9 +331,7 @@ def test_a_coax_flown_by_hand_is_identified(visit_: Any, coax: str) -> None:
 def test_replay_scrubs_and_shows_the_prediction(visit_: Any, tmp_path: Path) -> None:
     raptor = sp.vehicle("raptor50", bar=True)
     raptor.save(tmp_path / "barred.toml")
-    sp.simulate_maneuver(raptor, "doublet:roll,0.5s,0.02", controller=sp.state_hold, lead=1, tail=2).save(
-        tmp_path / "flight.nc"
-    )
+    sp.simulate(raptor, "doublet:roll,0.5s,0.02", controller=sp.state_hold, lead=1, tail=2).save(tmp_path / "flight.nc")
     with _served(
         "live", "barred.toml", "--replay", tmp_path / "flight.nc", "--settings", "ahead=1", cwd=tmp_path
     ) as url:

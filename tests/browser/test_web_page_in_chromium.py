@@ -127,7 +127,7 @@ def test_a_recording_is_a_log(browser: Any, tmp_path: Path) -> None:
 
 def test_the_flight_it_was_learnt_from_flies_beside_it(browser: Any, tmp_path: Path) -> None:
     coax = sp.vehicle("coax")
-    flight = sp.simulate_maneuver(coax, "doublet:roll,0.5s,0.1", controller=sp.autopilot, tail=4)
+    flight = sp.simulate(coax, "doublet:roll,0.5s,0.1", controller=sp.autopilot, tail=4)
     flight.save(tmp_path / "flight.nc")
     ExportModel("coax", "web", out=tmp_path, flight=tmp_path / "flight.nc").answer()
     page, said = opened(browser, tmp_path / "coax.html")

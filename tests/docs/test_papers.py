@@ -94,7 +94,7 @@ def _coax(*numbers: str) -> dict[str, str]:
 
 
 _ALIGNED = _coax(*(f"{k}_zeta_{side}=0.0" for k in "ko" for side in ("upper", "lower")))
-_SLOW = ("coax56", "evaluate_bench", "found.details", "simulate_maneuver", "fit_ahead", "to_speed")
+_SLOW = ("coax56", "evaluate_bench", "found.details", "sweep:pitch", "fit_ahead", "to_speed")
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ _SLOW = ("coax56", "evaluate_bench", "found.details", "simulate_maneuver", "fit_
         ({"mixing=law_form)": 'mixing="rotation")'}, "", {"12": "does not hold"}),
         ({"vehicle=coax, only": "vehicle=coax.with_values({'linkage_lower': 0.15}), only"}, "simulate_bench",
          {"8": "does not hold"}),
-        ({"20s,0.2": "20s,0.01"}, "simulate_maneuver", {"9": "does not hold"}),
+        ({"20s,0.2": "20s,0.01"}, "sweep:pitch", {"9": "does not hold"}),
     ],
 )  # fmt: skip
 def test_a_claim_on_the_coax_can_turn_out_the_other_way(

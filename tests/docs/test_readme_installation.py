@@ -74,9 +74,7 @@ def test_the_readme_s_libraries_fit_in_c(tmp_path: Path) -> None:
     found = required_distributions("swashplate", installed_extras())
     link_distributions(found, site)
     vehicle = sp.vehicle("coax")
-    flown = sp.simulate_maneuver(
-        vehicle, "multisine:roll+pitch,0.4-4Hz,6s,0.1", controller=sp.hover_hold, lead=1.0, tail=1.0
-    )
+    flown = sp.simulate(vehicle, "multisine:roll+pitch,0.4-4Hz,6s,0.1", controller=sp.hover_hold, lead=1.0, tail=1.0)
     sp.observe(flown, vehicle, sensors=QUIET, seed=0).save(tmp_path / "flight.nc")
     asked = ["identify", "--vehicle", "coax", "--flight", "flight.nc", "--free", "tau_f_upper,linkage_lower"]
     done = subprocess.run(

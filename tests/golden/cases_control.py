@@ -26,10 +26,10 @@ def holds_in_flight(folder: Path) -> Values:
     coax, raptor = sp.vehicle("coax"), sp.vehicle("raptor50")
     hover = sp.trim(coax)
     how: dict[str, Any] = {"controller": sp.hover_hold, "lead": 0.5, "tail": 0.5}
-    flights = {"hover_hold": sp.simulate_maneuver(coax, "doublet:pitch,0.4s,0.05", **how)}
+    flights = {"hover_hold": sp.simulate(coax, "doublet:pitch,0.4s,0.05", **how)}
     how["controller"] = sp.state_hold
-    flights["state_hold"] = sp.simulate_maneuver(raptor, "doublet:roll,0.4s,0.02", **how)
-    flights["ahead"] = sp.simulate_maneuver(raptor, "doublet:pitch,0.4s,0.02", speed=8.0, **how)
+    flights["state_hold"] = sp.simulate(raptor, "doublet:roll,0.4s,0.02", **how)
+    flights["ahead"] = sp.simulate(raptor, "doublet:pitch,0.4s,0.02", speed=8.0, **how)
     for mode in ("manual", "speed", "place"):
         reference = {"pitch": 0.1} if mode == "manual" else {"ahead": 0.3} if mode == "speed" else {"x": 0.2}
         law = sp.autopilot(coax, hover, mode=mode)

@@ -74,7 +74,7 @@ def real_conditioning(folder: Path) -> Values:
 def hover_flight() -> Any:
     """10 s of hover with independent roll and pitch inputs, as simulated motion capture sees it."""
     coax = sp.vehicle("coax")
-    flight = sp.simulate_maneuver(coax, "multisine:roll+pitch,0.4-4Hz,8s,0.1", controller=sp.hover_hold, lead=1, tail=1)
+    flight = sp.simulate(coax, "multisine:roll+pitch,0.4-4Hz,8s,0.1", controller=sp.hover_hold, lead=1, tail=1)
     return sp.observe(flight, coax, sensors=sp.Sensors(), seed=3).condition(rate=100.0, cutoff=0.0)
 
 

@@ -47,7 +47,7 @@ def truth() -> Vehicle:
 
 def flown() -> Flight:
     """The maneuver in calm air under a hold of height and heading, every state known."""
-    return sp.simulate_maneuver(truth(), MANEUVER, controller=sp.hover_hold)
+    return sp.simulate(truth(), MANEUVER, controller=sp.hover_hold)
 
 
 def flown_in_gusts(
@@ -61,8 +61,7 @@ def flown_in_gusts(
     keep = np.exp(-1.0 / (rate * fade))
     steps = sigma * np.sqrt(1.0 - keep**2) * random.standard_normal((2, SAMPLES))
     north, east = (lfilter([1.0], [1.0, -keep], row) for row in steps)
-    wind = {"wind_north": north, "wind_east": east}
-    return sp.simulate_maneuver(truth(), MANEUVER, controller=controller, wind=wind, rate=rate)
+    return sp.simulate(truth(), MANEUVER, controller=controller, wind=(north, east, 0.0), rate=rate)
 
 
 @dataclass(frozen=True)

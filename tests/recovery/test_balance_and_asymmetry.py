@@ -28,13 +28,13 @@ def found(truth: tuple[tuple[str, float], ...] = (), horizon: tuple[float, float
     """A fit from the published card of ten seconds of an aircraft with some other numbers."""
     flown = sp.vehicle("coax").with_values(dict(truth))
     gusts = lfilter([1.0], [1.0, -0.99], 0.015 * np.random.default_rng(5).standard_normal((2, 1001)))
-    flight = sp.simulate_maneuver(
+    flight = sp.simulate(
         flown,
         "multisine:roll+pitch,0.4-4Hz,8s,0.1",
         controller=sp.hover_hold,
         lead=1,
         tail=1,
-        wind={"wind_north": gusts[0], "wind_east": gusts[1]},
+        wind=(*gusts, 0.0),
     )
     seen = sp.observe(flight, flown, sensors=sp.QUIET, seed=4).condition(rate=100.0, cutoff=0.0)
     return sp.identify(sp.vehicle("coax"), seen, free=list(FREE), horizon=horizon)

@@ -62,9 +62,8 @@ def flown(vehicle: Vehicle, pieces: tuple[Maneuver, ...], seed: int) -> list[sp.
         samples, keep = round((piece.duration + 6.0) * 100.0) + 1, float(np.exp(-0.01))
         steps = GUST * np.sqrt(1.0 - keep**2) * random.standard_normal((2, samples))
         north, east = (lfilter([1.0], [1.0, -keep], row) for row in steps)
-        wind = {"wind_north": north, "wind_east": east}
         hold = sp.hover_hold if vehicle.traits.coaxial else sp.state_hold
-        flight = sp.simulate_maneuver(vehicle, piece, controller=hold, wind=wind)
+        flight = sp.simulate(vehicle, piece, controller=hold, wind=(north, east, 0.0))
         quiet = sp.observe(flight, vehicle, seed=100 * seed + k, sensors=sp.QUIET)
         logged.append(quiet.condition(rate=100.0, cutoff=0.0))
     return logged

@@ -25,13 +25,13 @@ TRUTH = {
 def _flight(gusts: float) -> Flight:
     aircraft = sp.vehicle("coax").with_values(TRUTH)
     wind = lfilter([1.0], [1.0, -0.99], gusts * np.random.default_rng(101).standard_normal((2, 2001)))
-    flown = sp.simulate_maneuver(
+    flown = sp.simulate(
         aircraft,
         "multisine:roll+pitch+yaw+heave,0.3-4Hz,18s,0.05",
         controller=sp.hover_hold,
         lead=1,
         tail=1,
-        wind={"wind_north": wind[0], "wind_east": wind[1]},
+        wind=(*wind, 0.0),
     )
     return sp.observe(flown, aircraft, sensors=sp.QUIET, seed=1).condition(rate=100.0, cutoff=0.0)
 

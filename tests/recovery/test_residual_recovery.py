@@ -30,9 +30,7 @@ NOISE = Noise(white_tilt=0.05, white_yaw=0.05, white_horizontal=0.01, white_vert
 
 
 def seen(vehicle: Vehicle) -> Flight:
-    flight = sp.simulate_maneuver(
-        vehicle, "multisine:roll+pitch,0.4-4Hz,26s,0.02", controller=sp.state_hold, lead=1, tail=1
-    )
+    flight = sp.simulate(vehicle, "multisine:roll+pitch,0.4-4Hz,26s,0.02", controller=sp.state_hold, lead=1, tail=1)
     return sp.observe(flight, vehicle, sensors=QUIET, seed=5).condition(rate=100.0, cutoff=0.0)
 
 

@@ -14,7 +14,7 @@ from swashplate.arrays import Array
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim, trim
 
@@ -45,7 +45,7 @@ def response(flown: Vehicle, at: Trim, name: str) -> Array:
     """Deviation from trim after a step of one input, rows of u, v, w, p, q, r."""
     inputs = {key: np.full(int(2.0 * RATE) + 1, value) for key, value in at.commands().items()}
     inputs[name] = inputs[name] + STEP
-    flight = simulate(flown, inputs, start=at, rate=RATE)
+    flight = simulate_open_loop(flown, inputs, start=at, rate=RATE)
     return flight.array(STATES).T - np.array([[at.states()[key]] for key in STATES])
 
 

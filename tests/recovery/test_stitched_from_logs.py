@@ -33,9 +33,9 @@ def flown(truth: Vehicle, speed: float, axis: str) -> Flight:
     size = 0.08 if axis == "yaw" else 0.04
     seed = 10 * int(10 * speed) + list(AXES).index(axis)
     gusts = dryden(outdoor(2.0), samples=int(66 * RATE) + 1, rate=RATE, seed=seed)
-    wind = {name: values.ravel() for name, values in gusts.items()}
+    wind = [values.ravel() for values in gusts.values()]
     maneuver = f"sweep:{axis},0.1-4Hz,60s,{size}"
-    flight = sp.simulate_maneuver(truth, maneuver, controller=sp.state_hold, speed=speed, rate=RATE, wind=wind)
+    flight = sp.simulate(truth, maneuver, controller=sp.state_hold, speed=speed, rate=RATE, wind=wind)
     time, noise = flight.time("u"), np.random.default_rng(seed)
     channels = {name: flight.values(name) + s * noise.standard_normal(time.size) for name, s in NOISE.items()}
     channels |= {name: flight.values(old) for name, old in CALLED.items()}

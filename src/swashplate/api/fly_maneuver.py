@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swashplate.api.controllers import flown_by
+from swashplate.api.languages import in_seconds
 from swashplate.control.laws.hold import hover_hold
 from swashplate.control.laws.state_hold import state_hold
 from swashplate.errors import SwashError
@@ -20,6 +21,7 @@ from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
 from swashplate.simulation.closed_loop import simulate_maneuver
 from swashplate.simulation.controller import Controller
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.sensors import QUIET, Sensors, observe
 from swashplate.simulation.trim import Trim
 
@@ -104,32 +106,50 @@ def fly(asked: Simulate, vehicle: Vehicle) -> SimulatedFlight:
         DivergenceError: where the flight was lost, with the flight up to there.
     """
     remarks = []
-    if asked.controller is None and vehicle.traits.coaxial and any(input_delays(vehicle).values()):
-        remarks.append("The hover hold acts at once; identified delays are left out.")
-    truth = simulate_maneuver(
-        vehicle,
-        asked.maneuver,
-        controller=holding(asked.controller, seed=asked.seed),
-        pilot=asked.pilot,
-        speed=asked.speed,
-        voltage=asked.voltage,
-        sag=asked.sag,
-        rate=asked.rate,
-        wind=dict(zip(_WIND, asked.wind, strict=True)),
-    )
+    maneuver = asked.described()
+    if maneuver is None:
+        truth = simulate_open_loop(
+            vehicle,
+            asked.maneuver,
+            start=asked.start,
+            rate=asked.rate,
+            substeps=asked.substeps,
+            interpolation="linear" if asked.interpolation == "linear" else "held",
+            environment=asked.environment,
+            delays=in_seconds(asked.delays),
+        )
+    else:
+        if asked.controller is None and vehicle.traits.coaxial and any(input_delays(vehicle).values()):
+            remarks.append("The hover hold acts at once; identified delays are left out.")
+        truth = simulate_maneuver(
+            vehicle,
+            maneuver,
+            controller=holding(asked.controller, seed=asked.seed),
+            lead=asked.lead,
+            tail=asked.tail,
+            pilot=asked.pilot,
+            speed=asked.speed,
+            voltage=asked.voltage,
+            sag=asked.sag,
+            rate=asked.rate,
+            wind=dict(zip(_WIND, asked.wind, strict=True)),
+            environment=asked.environment,
+        )
     remarks += [f"{words}." for words in truth.provenance.notes] + _at_limits(vehicle, truth)
     seen = truth
     if asked.sensors != "none":
         seen = observe(truth, vehicle, sensors=QUIET if asked.sensors == "clean" else Sensors(), seed=asked.seed)
-    return SimulatedFlight(vehicle, str(asked.maneuver), truth, seen, tuple(remarks))
+    return SimulatedFlight(vehicle, str(asked.maneuver) if maneuver else "inputs", truth, seen, tuple(remarks))
 
 
 def holding(
-    controller: Controller | str | Path | None = None, *, seed: int = 0
+    controller: Controller | Callable[[Vehicle, Trim], Controller] | str | Path | None = None, *, seed: int = 0
 ) -> Callable[[Vehicle, Trim], Controller]:
-    """What makes the controller that a maneuver is flown under: one, its file, or the hold of the vehicle's kind."""
+    """What makes the controller of a maneuver: that itself, one, its file, or the hold of the vehicle's kind."""
 
     def make(vehicle: Vehicle, trim: Trim) -> Controller:
+        if callable(controller):
+            return controller(vehicle, trim)
         if controller is not None:
             return flown_by(controller, vehicle, trim, seed=seed)[0]
         return hover_hold(vehicle, trim) if vehicle.traits.coaxial else state_hold(vehicle, trim)

@@ -35,7 +35,7 @@ def simulate_batch(
     precision: Precision = "float64",
     card: bool = False,
 ) -> Batch:
-    """Fly many vehicles of one kind at once; agrees with `simulate` to 1e-11 in float64.
+    """Fly many vehicles of one kind at once; agrees with `simulate_open_loop` to 1e-11 in float64.
 
     Args:
         vehicle: their equations and the numbers that `parameters` does not replace.
@@ -45,8 +45,8 @@ def simulate_batch(
         size: number of vehicles, needed where nothing else says it.
         rate: steps per second [Hz].
         interpolation: inputs "held" or "linear" between samples.
-        environment: air, gravity, and wind and voltage where `inputs` has none; by default as in `simulate`.
-        delays: as in `simulate`.
+        environment: air, gravity, and wind and voltage where `inputs` has none; by default as in `simulate_open_loop`.
+        delays: as in `simulate_open_loop`.
         keep: every how many steps a sample is kept (memory: 8 x 18 bytes per sample and vehicle).
         precision: "float32" is faster and loses about nine digits.
         card: fly on a graphics card, by JAX (extra `cuda`); held inputs only.

@@ -54,10 +54,10 @@ def simulate_closed_loop(
 ) -> Flight:
     """Fly a vehicle under a controller, with an excitation added to what the controller commands.
 
-    A flight that pitches beyond 80 degrees is integrated with a quaternion, as by `simulate`.
+    A flight that pitches beyond 80 degrees is integrated with a quaternion, as by `simulate_open_loop`.
 
     Args:
-        vehicle, start, rate, environment: as in `simulate`; inputs are held over a step.
+        vehicle, start, rate, environment: as in `simulate_open_loop`; inputs are held over a step.
         controller: see `Controller`.
         duration: [s].
         reference: numbers or series (n,) of `REFERENCES`; a place or heading that is not given stays at the start's

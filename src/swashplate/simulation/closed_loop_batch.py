@@ -112,7 +112,7 @@ def simulate_closed_loops(
 
     Returns:
         States, inputs and surroundings at the kept samples. A vehicle that is lost has numbers that are not finite.
-        One that pitches beyond 80 degrees is integrated with a quaternion, as by `simulate`.
+        One that pitches beyond 80 degrees is integrated with a quaternion, as by `simulate_open_loop`.
     """
     substeps = rate / controller.rate
     if substeps < 1.0 or abs(substeps - round(substeps)) > 1e-9:

@@ -1,4 +1,4 @@
-"""`simulate`: fixed-step Runge-Kutta in one compiled loop, from inputs to a `Flight`."""
+"""`simulate_open_loop`: fixed-step Runge-Kutta in one compiled loop, from inputs to a `Flight`."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def check_step(
     )
 
 
-def simulate(
+def simulate_open_loop(
     vehicle: Vehicle,
     inputs: Inputs,
     *,

@@ -36,7 +36,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.reduction import PAPER_INPUTS, PAPER_STATES, paper_model
 from swashplate.simulation.trim import Trim
@@ -128,7 +128,7 @@ def simulate_lpv(
         if scheme == "stitched":
             begins = start.states() | dict(zip(PAPER_STATES, began.tolist(), strict=True))
             stitched = _stitched(over)
-            states = simulate(
+            states = simulate_open_loop(
                 stitched,
                 dict(zip(PAPER_INPUTS, u.T, strict=True)),
                 start={name: begins[name] for name in stitched.state_names},

@@ -62,7 +62,7 @@ def acting_rows(
 
     Args:
         delays: [s], one for all inputs or by name; None for what the vehicle's card knows.
-        start: as in `simulate`. environment: for hover.
+        start: as in `simulate_open_loop`. environment: for hover.
 
     Raises:
         CardError: where inputs reach outputs after different times, which no simulation of states can do.

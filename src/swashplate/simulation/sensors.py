@@ -88,7 +88,7 @@ def observe(flight: Flight, vehicle: Vehicle, *, sensors: Sensors | None = None,
     """What the sensors record of a simulated flight: several streams, each at its native times.
 
     Args:
-        flight: from `simulate`, with every state in one stream.
+        flight: from `sp.simulate`, with every state in one stream.
         vehicle: the one that flew (its specific force is what accelerometers feel).
         sensors: which sensors; motion capture, inputs and battery by default.
         seed: of the noise; the same seed gives the same bits.

@@ -41,7 +41,7 @@ def test_it_tells_more_than_a_sweep_of_the_same_length_and_keeps_the_limits() ->
         for name in ("attitude", "rate", "place"):
             assert offer.peaks[name] <= LIMITS[name]
     (piece,) = made.best.pieces
-    again = sp.simulate_maneuver(made.vehicle, piece, controller=sp.hover_hold, rate=100.0)
+    again = sp.simulate(made.vehicle, piece, controller=sp.hover_hold, rate=100.0)
     assert np.degrees(np.ptp(again.values("phi"))) <= 2.0 * LIMITS["attitude"]
 
 
@@ -70,7 +70,7 @@ def test_the_script_for_an_autopilot_asks_for_the_designs_motion() -> None:
     slow = {axis: tuple(line for line in own if line[0] <= 25) for axis, own in piece.lines.items()}
     pieces = (replace(piece, lines=slow),)
     text = maneuver_script(replace(made, offers=(replace(made.best, pieces=pieces),)))
-    flight = sp.simulate_maneuver(made.vehicle, pieces[0], controller=sp.hover_hold, tail=0.0)
+    flight = sp.simulate(made.vehicle, pieces[0], controller=sp.hover_hold, tail=0.0)
     rolled = flight.values("phi")[-1001:-1]
     number, amplitude, phase = map(float, re.findall(r"roll = \{\{(\d+), (\S+), ([^}]+)\}", text)[0])
     time = np.arange(1000) / 100.0

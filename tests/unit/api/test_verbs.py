@@ -56,7 +56,17 @@ def test_a_result_prints_is_saved_and_makes_a_page(name: str) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["check_controller", "compare", "design_controller", "fit_ss", "identify", "monte_carlo", "respond", "validate"],
+    [
+        "check_controller",
+        "compare",
+        "design_controller",
+        "fit_ss",
+        "identify",
+        "monte_carlo",
+        "respond",
+        "simulate",
+        "validate",
+    ],
 )
 def test_a_function_is_its_question(name: str) -> None:
     """Signature and help say each field with its unit, what comes of it, and what is raised."""
@@ -90,3 +100,30 @@ def test_respond_takes_a_flight_at_one_rate_as_it_is_and_conditions_any_other() 
     assert not is_uniform(even, ["mixer_roll", "q"])
     assert [one.history for one in sp.respond(even, **asked).data] == [()]
     assert sp.respond(uneven, **asked).band("p", "mixer_roll")
+
+
+def test_simulate_flies_a_maneuver_under_a_hold_or_inputs_as_they_are() -> None:
+    coax = sp.vehicle("coax")
+    flown = sp.simulate("coax", "doublet:roll,0.3s,0.1", lead=0.5, tail=0.5, wind=(0.2, 0.0, np.zeros(161)))
+    assert flown.duration == pytest.approx(1.6)
+    assert np.all(flown.values("wind_north") == 0.2)
+    again = sp.simulate(coax, flown, start=dict(zip(coax.state_names, flown.array(coax.state_names)[0], strict=True)))
+    assert np.abs(again.values("phi") - flown.values("phi")).max() < 1e-9, "the recorded inputs fly the same"
+    heavy = sp.simulate("coax", "hover:0.2s", changes={"mass": 0.5}, lead=0.0, tail=0.0)
+    assert heavy.values("motor_upper")[0] > flown.values("motor_upper")[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"maneuver": "hover:1s", "start": {"phi": 0.1}}, r"start: is for inputs; here a maneuver"),
+        ({"maneuver": "hover:1s", "substeps": 2}, r"substeps: is for inputs"),
+        ({"maneuver": {}, "wind": (1.0, 0.0, 0.0)}, r"wind: is for a maneuver; here inputs"),
+        ({"maneuver": {}, "controller": sp.hover_hold}, r"controller: is for a maneuver"),
+        ({"maneuver": "hover:1s", "interpolation": "cubic"}, r"interpolation: 'cubic' is unknown"),
+        ({"maneuver": "hover:1s", "lead": -1.0}, r"lead: is -1, expected at least 0 s"),
+    ],
+)
+def test_simulate_refuses_what_suits_the_other_kind_of_flight(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(sp.SwashError, match=said):
+        sp.simulate("coax", **given)

@@ -27,7 +27,7 @@ from swashplate.models.catalogue import vehicle
 from swashplate.physics.backend import ArrayBackend, FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.trim import trim
 
 COAX = vehicle("coax")
@@ -80,7 +80,7 @@ def test_a_calm_step_is_what_simulate_does() -> None:
     x = _state(1)
     start = dict(zip(COAX.state_names, x, strict=True))
     row = {"motor_lower": 0.6, "motor_upper": 0.5, "servo_roll": 0.1, "servo_pitch": -0.2}
-    flight = simulate(
+    flight = simulate_open_loop(
         COAX, {**row, "servo_roll": np.full(2, 0.1)}, start=start, environment=Environment(voltage=VOLTAGE)
     )
     found = _step(x, np.zeros(6), np.array(list(row.values())))

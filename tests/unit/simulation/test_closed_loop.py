@@ -103,9 +103,9 @@ def test_the_linear_model_predicts_a_small_flight(coax: Vehicle) -> None:
 
 
 def simulate_small(coax: Vehicle, inputs: np.ndarray) -> np.ndarray:
-    from swashplate.simulation.integrate import simulate
+    from swashplate.simulation.integrate import simulate_open_loop
 
-    return simulate(coax, trim(coax).inputs + inputs.T, substeps=2).values("phi")
+    return simulate_open_loop(coax, trim(coax).inputs + inputs.T, substeps=2).values("phi")
 
 
 def test_a_maneuver_beyond_half_the_sample_rate_is_refused(coax: Vehicle) -> None:

@@ -19,7 +19,7 @@ from swashplate.physics.backend import FloatBackend
 from swashplate.physics.engine import RotorSpeed
 from swashplate.physics.environment import Environment, air_density
 from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.standing import at_rest, standing
 from swashplate.simulation.stepping import Stepping
 from swashplate.simulation.trim import Trim, trim
@@ -119,7 +119,7 @@ def test_spin_up_on_the_skids_take_off_and_landing() -> None:
     still = {"theta0": -0.03, "B1": 0.0, "A1": 0.0, "theta0T": 0.0}
     inputs = {name: np.full(time.size, value) for name, value in still.items()}
     inputs["throttle"] = np.interp(time, [0.0, 2.0, 9.0, 11.0], [0.02, 0.1, 0.1, 1.0])  # the clutch slips at first
-    spun = simulate(GROUNDED, inputs, start=_start(z=-depth), rate=rate)
+    spun = simulate_open_loop(GROUNDED, inputs, start=_start(z=-depth), rate=rate)
     speed = spun.values("omega")
     assert speed[0] == 0.0
     assert speed[-1] == pytest.approx(RAPTOR.card.values()["rotor_speed"], rel=0.02)
@@ -150,7 +150,7 @@ def _parked(east: float) -> Flight:
     time = np.arange(1200) / 100.0
     inputs = dict.fromkeys(stands.input_names, np.zeros(time.size)) | {"wind_east": np.where(time > 2.0, east, 0.0)}
     start = {**dict.fromkeys(stands.state_names, 0.0), "z": -stands.card.values()["skid_depth"]}
-    return simulate(stands, inputs, start=start, rate=100.0)
+    return simulate_open_loop(stands, inputs, start=start, rate=100.0)
 
 
 def _parked_by_c(east: float) -> Flight:
@@ -191,7 +191,7 @@ def test_grip_lets_go_in_the_air_and_trims_have_none() -> None:
 
 
 def _simulated(flying: Vehicle, inputs: dict[str, np.ndarray], start: Trim) -> Flight:
-    return simulate(flying, inputs, start=start, rate=500.0)
+    return simulate_open_loop(flying, inputs, start=start, rate=500.0)
 
 
 def _by_c(flying: Vehicle, inputs: dict[str, np.ndarray], start: Trim) -> Flight:

@@ -19,7 +19,7 @@ from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.sensors import Sensors
 from swashplate.simulation.trim import trim
 
@@ -62,7 +62,7 @@ def largest_difference(a: Flight, b: Flight, names: tuple[str, ...]) -> float:
 
 
 def test_hover_stays_where_it_is(coax: Vehicle) -> None:
-    flight = simulate(coax, {**trim(coax).commands(), "servo_roll": np.zeros(201)})
+    flight = simulate_open_loop(coax, {**trim(coax).commands(), "servo_roll": np.zeros(201)})
     assert flight.provenance.simulated
     assert largest_difference(flight, flight.between(0.0, 0.0).with_streams(flight.streams), coax.state_names) == 0.0
     moved = flight.array(coax.state_names) - trim(coax).state
@@ -83,7 +83,9 @@ def test_the_fixed_step_converges_with_order_four(coax: Vehicle, interpolation: 
     start = {**trim(coax).states(), "p": 0.5, "q": -0.3, "r": 0.2, "u": 0.7, "phi": 0.1}
     truth = fly_by_scipy(smooth, inputs, start, rate=20.0, held=interpolation == "held")
     errors = [
-        np.max(np.abs(simulate(smooth, inputs, start=start, **how, substeps=n).array(coax.state_names) - truth))
+        np.max(
+            np.abs(simulate_open_loop(smooth, inputs, start=start, **how, substeps=n).array(coax.state_names) - truth)
+        )
         for n in (4, 8, 16)
     ]
     np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / np.array(errors[1:])), 4.0, atol=0.2)
@@ -94,7 +96,7 @@ def test_the_usual_step_is_accurate(coax: Vehicle, interpolation: str) -> None:
     """10 ms with the card's own non-smooth terms: far below what a motion-capture system resolves."""
     inputs = excited(coax, 51)
     truth = fly_by_scipy(coax, inputs, trim(coax).states(), rate=100.0, held=interpolation == "held")
-    flight = simulate(coax, inputs, start=trim(coax), interpolation=interpolation)
+    flight = simulate_open_loop(coax, inputs, start=trim(coax), interpolation=interpolation)
     found = dict(zip(coax.state_names, truth[-1], strict=True))
     for names, most in ((("x", "y", "z"), 1e-6), (("phi", "theta", "psi", "p", "q", "r"), 1e-5)):
         assert max(abs(flight.values(name)[50] - found[name]) for name in names) < most
@@ -103,12 +105,12 @@ def test_the_usual_step_is_accurate(coax: Vehicle, interpolation: str) -> None:
 
 def test_the_same_call_gives_the_same_bits(coax: Vehicle) -> None:
     inputs = excited(coax, 201)
-    first, second = (simulate(coax, inputs, sensors=Sensors(), seed=3) for _ in range(2))
-    other = simulate(coax, inputs, sensors=Sensors(), seed=4)
+    first, second = (simulate_open_loop(coax, inputs, sensors=Sensors(), seed=3) for _ in range(2))
+    other = simulate_open_loop(coax, inputs, sensors=Sensors(), seed=4)
     np.testing.assert_array_equal(first.values("x"), second.values("x"))
     assert not np.array_equal(first.values("x")[:50], other.values("x")[:50])
     with pytest.raises(SwashError, match="need a seed"):
-        simulate(coax, inputs, sensors=Sensors())
+        simulate_open_loop(coax, inputs, sensors=Sensors())
 
 
 @pytest.mark.parametrize("interpolation", ["held", "linear"])
@@ -120,7 +122,7 @@ def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str) -> 
     for i in range(3):
         start = {"phi": float(rolls[i])}
         hover = {name: value for name, value in trim(coax).states().items() if name != "phi"}
-        single = simulate(
+        single = simulate_open_loop(
             coax.with_values({"mass": masses[i]}), inputs, start={**hover, **start}, interpolation=interpolation
         )
         scale = np.maximum(np.abs(single.array(coax.state_names)).max(axis=0), 1.0)
@@ -139,24 +141,24 @@ def test_single_precision_is_near(coax: Vehicle) -> None:
 
 def test_another_card_compiles_nothing(coax: Vehicle, monkeypatch: pytest.MonkeyPatch) -> None:
     inputs = excited(coax, 201)
-    simulate(coax, inputs)
+    simulate_open_loop(coax, inputs)
     asked: list[Equations] = []
     flight_code = engine_fly.flight_code
     monkeypatch.setattr(engine_fly, "flight_code", lambda e, *a, **k: (asked.append(e), flight_code(e, *a, **k))[1])
-    simulate(vehicle("coax").with_values({"mass": 0.333}), inputs)
+    simulate_open_loop(vehicle("coax").with_values({"mass": 0.333}), inputs)
     assert not asked
     engine_fly._open_program.cache_clear()
-    simulate(vehicle("coax", mixing="as_printed"), inputs)
+    simulate_open_loop(vehicle("coax", mixing="as_printed"), inputs)
     assert asked
     assert equations_of(vehicle("coax", mixing="as_printed")) != equations_of(coax)
 
 
 def test_a_flight_drives_its_own_simulation(coax: Vehicle) -> None:
     """What `simulate` returns is a flight like any other: its inputs give it again, also from other rates."""
-    flight = simulate(coax, excited(coax, 201))
-    again = simulate(coax, flight)
+    flight = simulate_open_loop(coax, excited(coax, 201))
+    again = simulate_open_loop(coax, flight)
     assert largest_difference(flight, again, coax.state_names) == 0.0
-    assert simulate(coax, flight, rate=125.0).values("x").size == 251
+    assert simulate_open_loop(coax, flight, rate=125.0).values("x").size == 251
 
 
 def test_wind_carries_a_trimmed_vehicle(coax: Vehicle) -> None:
@@ -170,7 +172,7 @@ def test_wind_carries_a_trimmed_vehicle(coax: Vehicle) -> None:
 def test_divergence_says_when_and_what(coax: Vehicle) -> None:
     inputs = {**trim(coax).commands(), "servo_pitch": np.full(201, 1.0)}
     with pytest.raises(DivergenceError, match="left the flyable range after") as caught:
-        simulate(coax, {**inputs, "motor_upper": 1.0})
+        simulate_open_loop(coax, {**inputs, "motor_upper": 1.0})
     assert caught.value.state in coax.state_names
     assert isinstance(caught.value.flight, Flight)
     assert caught.value.flight.stop == pytest.approx(caught.value.time)
@@ -180,18 +182,18 @@ def test_divergence_says_when_and_what(coax: Vehicle) -> None:
 def test_bad_input_is_named(coax: Vehicle) -> None:
     good = excited(coax, 21)
     with pytest.raises(FlightError, match="motor_upper: is missing"):
-        simulate(coax, {name: value for name, value in good.items() if name != "motor_upper"})
+        simulate_open_loop(coax, {name: value for name, value in good.items() if name != "motor_upper"})
     with pytest.raises(FlightError, match="rudder: is not an input"):
-        simulate(coax, {**good, "rudder": 0.0})
+        simulate_open_loop(coax, {**good, "rudder": 0.0})
     with pytest.raises(FlightError, match="servo_roll: is not a number at sample 4"):
-        simulate(coax, {**good, "servo_roll": np.where(np.arange(21) == 4, np.nan, 0.0)})
+        simulate_open_loop(coax, {**good, "servo_roll": np.where(np.arange(21) == 4, np.nan, 0.0)})
     with pytest.raises(FlightError, match="servo_roll: has 20 samples, others have 21"):
-        simulate(coax, {**good, "servo_roll": np.zeros(20)})
+        simulate_open_loop(coax, {**good, "servo_roll": np.zeros(20)})
     with pytest.raises(TrimError, match="roll: is not a state"):
-        simulate(coax, good, start={"roll": 1.0})
+        simulate_open_loop(coax, good, start={"roll": 1.0})
     with pytest.raises(SwashError, match="rate is 0"):
-        simulate(coax, good, rate=0.0)
+        simulate_open_loop(coax, good, rate=0.0)
     with pytest.raises(FlightError, match="expected \\(n, 4\\)"):
-        simulate(coax, np.zeros((10, 3)))
+        simulate_open_loop(coax, np.zeros((10, 3)))
     with pytest.raises(SwashError, match="number of vehicles is not given"):
         simulate_batch(coax, good)

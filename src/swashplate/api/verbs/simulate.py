@@ -6,8 +6,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.api.asking import OfVehicle, name_of
-from swashplate.api.languages import Aircraft, Battery, Fitted, FlightLimits, Gusts, Motion, Pilot, Wind, Words
-from swashplate.api.question import option, setting, verb
+from swashplate.api.languages import (
+    Air,
+    Aircraft,
+    Battery,
+    Delays,
+    Fitted,
+    FlightLimits,
+    Gusts,
+    Motion,
+    Pilot,
+    Values,
+    Wind,
+    Words,
+)
+from swashplate.api.question import default_of, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
 
@@ -16,6 +29,8 @@ if TYPE_CHECKING:
 
     from swashplate.api.fly_maneuver import SimulatedFlight
     from swashplate.api.monte_carlo import MonteCarlo
+    from swashplate.flights.flight import Flight
+    from swashplate.flights.maneuvers.series import Maneuver
 
 _COMPILING = "(compiling takes longest the first time)"
 
@@ -24,6 +39,14 @@ class Simulate(OfVehicle["SimulatedFlight"]):
     """Fly a maneuver from hover or steady flight under a controller, and save the flight.
 
     --out FILE.nc (complete) or FILE.csv has the flight, --out FILE.html a page of plots over time.
+    In Python `maneuver` may also be inputs, which are flown as they are, without a controller: a flight, series or
+    numbers by name at `rate`, or an array (n, n_inputs). The answer is the flight.
+
+    Raises:
+        DivergenceError: with the time, the state that went first and the flight up to there.
+        FlightError: where an input is missing or not finite.
+        ControllerError: where the controller is for another vehicle.
+        SwashError: what suits a maneuver or inputs only; steps too long for the vehicle's fastest mode.
     """
 
     files: ClassVar[tuple[str, ...]] = ("flight.nc", "report.html")
@@ -50,16 +73,43 @@ class Simulate(OfVehicle["SimulatedFlight"]):
     sag: float = option(default=0.0, help="Fall of the battery's voltage.", unit="V/s")
     rate: float = option(default=100.0, help="Rate of the flight.", unit="Hz", least=1.0, most=2000.0)
     voltage: float | None = setting(default=None, help="battery voltage at the start", unit="V")
+    lead: float = setting(default=3.0, help="hover before the maneuver", unit="s", least=0.0)
+    tail: float = setting(default=3.0, help="hover after the maneuver", unit="s", least=0.0)
+    environment: Air | None = setting(default=None, help="air_density and gravity, where the card's are not meant")
+    start: Values | None = setting(default=None, help="of inputs: states by name, or a trim; hover if not given")
+    substeps: int = setting(default=1, help="of inputs: Runge-Kutta steps per sample", least=1)
+    interpolation: str = setting(default="held", help="of inputs between samples", choices=("held", "linear"))
+    delays: Delays | None = setting(
+        default=None, help="of inputs: from command to action, one or by name; the card's", unit="ms"
+    )
+
+    _OF_MANEUVERS: ClassVar = ("controller", "pilot", "speed", "wind", "sag", "voltage", "lead", "tail")
+    _OF_INPUTS: ClassVar = ("start", "substeps", "interpolation", "delays")
+
+    def described(self) -> Maneuver | None:
+        """The maneuver; None where inputs are given.
+
+        Raises:
+            SwashError: what is no maneuver, or what is given for the other kind of flight.
+        """
+        from swashplate.flights.maneuvers.series import Maneuver, parse
+
+        made = parse(self.maneuver) if isinstance(self.maneuver, str) else self.maneuver
+        maneuver = made if isinstance(made, Maneuver) else None
+        for name in self._OF_INPUTS if maneuver else self._OF_MANEUVERS:
+            given, usual = getattr(self, name), default_of(type(self), name)
+            if given is not usual and (name == "wind" or given != usual):  # which may hold series
+                told = "inputs; here a maneuver is flown." if maneuver else "a maneuver; here inputs are flown."
+                raise SwashError(f"is for {told}", channel=name)
+        return maneuver
 
     def check_places(self, outs: tuple[Path, ...]) -> None:
-        from swashplate.flights.maneuvers.series import parse
-
-        if isinstance(self.maneuver, str):
-            parse(self.maneuver)  # says what is wrong with it before anything else is looked at
+        self.described()  # says what is wrong before anything else is looked at
 
     def answer(self, say: Say = silent) -> SimulatedFlight:
         from swashplate.api.fly_maneuver import fly
 
+        self.described()
         if self.pilot and self.controller is None:
             raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
         aircraft = self.flying(self.vehicle)
@@ -71,6 +121,14 @@ class Simulate(OfVehicle["SimulatedFlight"]):
 
     def document(self, answer: SimulatedFlight) -> Any:
         return answer.to_document() | {"vehicle": name_of(self.vehicle) or self.vehicle.name}
+
+
+def _flight(answer: SimulatedFlight) -> Flight:
+    """What was flown, as sensors saw it."""
+    return answer.flight
+
+
+simulate = verb("simulate", Simulate, value=_flight)
 
 
 class FlyMany(OfVehicle["MonteCarlo"]):

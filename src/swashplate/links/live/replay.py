@@ -23,7 +23,7 @@ from swashplate.models.surroundings import environment_of, input_delays
 from swashplate.models.usual import HELICOPTER, USUAL
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
-from swashplate.simulation.integrate import simulate
+from swashplate.simulation.integrate import simulate_open_loop
 from swashplate.simulation.trim import trim
 from swashplate.validation.prediction import ObservedRecord
 from swashplate.validation.validate import observer_of
@@ -272,7 +272,7 @@ def _simulated(
         if time[first + length] - time[first] > (length + 0.5) * step:
             continue  # a gap in the log
         try:
-            flight = simulate(
+            flight = simulate_open_loop(
                 model,
                 {n: u[part] for n, u in (*zip(model.input_names, inputs.T, strict=True), *around.items())},
                 start=dict(zip(model.state_names, states[first].tolist(), strict=True)),

@@ -18,7 +18,7 @@ from swashplate.simulation.sensors import QUIET
 @pytest.fixture(scope="module")
 def flight() -> Flight:
     raptor = sp.vehicle("raptor50")
-    flown = sp.simulate_maneuver(raptor, "doublet:roll,0.5s,0.02", controller=sp.state_hold, lead=2, tail=3)
+    flown = sp.simulate(raptor, "doublet:roll,0.5s,0.02", controller=sp.state_hold, lead=2, tail=3)
     return flown.condition(rate=100, cutoff=0, outliers=False, trim_ground=False)
 
 
@@ -128,7 +128,7 @@ def test_a_coax_is_predicted_by_its_observer(monkeypatch: pytest.MonkeyPatch) ->
     # The calibration itself is the validation's, and minutes of compiling; this log has no delays to find.
     monkeypatch.setattr("swashplate.links.live.replay.calibrate", lambda *_, **__: Nuisance())
     coax = sp.vehicle("coax")
-    flown = sp.simulate_maneuver(coax, "doublet:pitch,0.5s,0.1", controller=sp.hover_hold, lead=3, tail=3)
+    flown = sp.simulate(coax, "doublet:pitch,0.5s,0.1", controller=sp.hover_hold, lead=3, tail=3)
     log = sp.observe(flown, coax, sensors=QUIET, seed=1).condition(rate=100, cutoff=0)
     found = replay(log, model=coax, draws=[coax], ahead=1.0)
     assert found.predicted is not None
