@@ -47,7 +47,7 @@ class Fan(NamedTuple):
 
 
 def spread(
-    seen: Sequence[ObservedRecord],
+    views: Sequence[ObservedRecord],
     *,
     predictions: Predictions,
     truth: Array,
@@ -57,7 +57,7 @@ def spread(
     """The fan of drawn models about a model's predictions.
 
     Args:
-        seen: of `paths`. predictions: of the model itself.
+        views: of `paths`. predictions: of the model itself.
         truth: body states (n, 12) that came.
         longest: samples ahead that count; all of the predictions' where None.
         wider: how many times as far from the prediction the paths are taken, (12,).
@@ -67,15 +67,15 @@ def spread(
     places = np.minimum(starts[:, None] + np.arange(1, ahead + 1), len(truth) - 1)
     came = truth[places]
     below, variance, own_variance = (np.zeros(about.shape) for _ in range(3))
-    for path, undisturbed in paths(seen, starts=starts, ahead=ahead):
+    for path, undisturbed in paths(views, starts=starts, ahead=ahead):
         below += about + wider * (path - about) < came
-        variance += (wider * (path - about)) ** 2 / len(seen)
-        own_variance += (wider * (undisturbed - about)) ** 2 / len(seen)
-    return Fan(len(seen), below, variance, own_variance, (came - about) ** 2, np.broadcast_to(wider, about.shape[-1:]))
+        variance += (wider * (path - about)) ** 2 / len(views)
+        own_variance += (wider * (undisturbed - about)) ** 2 / len(views)
+    return Fan(len(views), below, variance, own_variance, (came - about) ** 2, np.broadcast_to(wider, about.shape[-1:]))
 
 
 def paths(
-    seen: Sequence[ObservedRecord], *, starts: NDArray[np.intp], ahead: int, seed: int = 0
+    views: Sequence[ObservedRecord], *, starts: NDArray[np.intp], ahead: int, seed: int = 0
 ) -> Iterator[tuple[Array, Array]]:
     """Of each drawn model a path and its prediction from each start: body states (starts, ahead, 12), those of the path
     as `measured_states` would show them.
@@ -85,11 +85,11 @@ def paths(
     arm are what the record told the model.
 
     Args:
-        seen: a record by models that a fit cannot tell apart. starts: samples. ahead: how many samples.
+        views: a record by models that a fit cannot tell apart. starts: samples. ahead: how many samples.
         seed: of all that is random.
     """
     random, before = np.random.default_rng(seed), None
-    for observed in seen:
+    for observed in views:
         record = observed.record
         half = samples_smoothed(record.dt) // 2
         length = ahead + half
