@@ -19,8 +19,8 @@ from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.time.filter_error import FilterError
+from swashplate.models.doubts import monitored
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.record import monitored
 
 SEEDS = int(os.environ.get("SWASHPLATE_DESIGN_SEEDS", "100"))
 UNKNOWN = {

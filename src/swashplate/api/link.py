@@ -25,10 +25,11 @@ from swashplate.links.recorder import Recorder, recover
 from swashplate.links.sensing import Sensing
 from swashplate.links.servos import ServoMapping, packaged, servo_mapping
 from swashplate.links.sockets import is_loopback, listen_tcp, listen_udp
+from swashplate.models.doubts import monitored
 from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.record import monitored, unflown
+from swashplate.simulation.record import unflown
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
 from swashplate.simulation.stepping import MakeEngine, SteppingEngine, VirtualEngine

@@ -52,6 +52,22 @@ def from_card(card: Card) -> Vehicle:
     return carrying(vehicle, card) if has_residual(card) else vehicle
 
 
+def started_from(vehicle: Vehicle) -> Vehicle:
+    """What a model is compared with: the card that it was identified from, or itself where it never was."""
+    before = vehicle.card.started_from()
+    if before is not None:
+        return vehicle.with_card(before)
+    if vehicle.traits.published:
+        return from_card(packaged_cards()[vehicle.traits.published])
+    if any(entry.status == "identified" for entry in vehicle.card.parameters.values()):
+        raise CardError(
+            "does not say from which card it was identified.",
+            where=vehicle.card.path or vehicle.card.title,
+            hint="Name that card with --settings published=CARD, or identify the model anew.",
+        )
+    return vehicle
+
+
 def vehicle(name_or_file: str | Path, **options: bool | str) -> Vehicle:
     """A vehicle by its name, or by the path of a file of any kind of model.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -111,6 +112,14 @@ def envelope(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
                 f"Its battery gave {mean:.3g} V in the mean, and the card's drive train holds about {nominal:.4g}"
             )
     return tuple(beyond)
+
+
+def monitored(flight: Flight, vehicle: Vehicle) -> Flight:
+    """A flight that says in its notes where it leaves what the vehicle's numbers and equations hold for."""
+    said = tuple(doubt for doubt in envelope(vehicle, flight) if doubt not in flight.provenance.notes)
+    if not said:
+        return flight
+    return replace(flight, provenance=replace(flight.provenance, notes=(*flight.provenance.notes, *said)))
 
 
 _AROUND = (*Environment._fields[:3], "voltage")

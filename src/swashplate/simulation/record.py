@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
@@ -16,7 +15,7 @@ from swashplate.errors import CardError, DivergenceError, SwashError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.flights.schema import CHANNELS
-from swashplate.models.doubts import envelope
+from swashplate.models.doubts import monitored
 from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
@@ -128,14 +127,6 @@ def unflown(vehicle: Vehicle, *, details: Mapping[str, Any]) -> Flight:
     """A simulated flight before its first sample: true states, inputs, wind and voltage; what recordings begin with."""
     states, rows = (np.zeros((0, n)) for n in (len(vehicle.state_names), len(vehicle.input_names) + len(SURROUNDINGS)))
     return simulated_flight(vehicle, np.zeros(0), states, rows, details=details)
-
-
-def monitored(flight: Flight, vehicle: Vehicle) -> Flight:
-    """A flight that says in its notes where it leaves what the vehicle's numbers and equations hold for."""
-    said = tuple(doubt for doubt in envelope(vehicle, flight) if doubt not in flight.provenance.notes)
-    if not said:
-        return flight
-    return replace(flight, provenance=replace(flight.provenance, notes=(*flight.provenance.notes, *said)))
 
 
 def largest_states(vehicle: Vehicle) -> Array:

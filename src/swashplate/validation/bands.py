@@ -11,10 +11,8 @@ import numpy as np
 from scipy.special import chdtri
 
 from swashplate.arrays import Array
-from swashplate.errors import SwashError
 from swashplate.flights.schema import channel as known
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.models.vehicle import Vehicle
 from swashplate.validation import block_bootstrap
 
 SHARES = (50.0, 95.0)
@@ -135,22 +133,6 @@ def pairs(judged: Sequence[Band]) -> list[tuple[Band, Band]]:
     """The narrow and the wide band of each channel and horizon."""
     narrow, wide = ([band for band in judged if band.promised == share] for share in SHARES)
     return list(zip(narrow, wide, strict=True))
-
-
-def check_draws(vehicle: Vehicle, draws: Sequence[Vehicle]) -> None:
-    """That drawn models are as many as the bands need, and of the model's equations.
-
-    Raises:
-        SwashError: where not.
-    """
-    if draws and (len(draws) + 1) % (FEWEST_DRAWS + 1):
-        raise SwashError(
-            f"are {len(draws)}, expected {FEWEST_DRAWS}, {2 * FEWEST_DRAWS + 1}, {3 * FEWEST_DRAWS + 2} and so on.",
-            channel="draws",
-            hint="Then a whole number of paths lies outside each band.",
-        )
-    if any(one.state_names != vehicle.state_names or one.input_names != vehicle.input_names for one in draws):
-        raise SwashError("are of another model than the one that is validated.", channel="draws")
 
 
 def widening(errors: Array, sigma: Array, *, seconds: float, horizon: float) -> Array:

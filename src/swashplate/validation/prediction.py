@@ -11,10 +11,9 @@ axis is used.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,7 @@ from swashplate.filtering.nuisance import Nuisance, commands_moved, motors
 from swashplate.filtering.riccati import gain_at, steady_gain
 from swashplate.identification.core.records import HORIZONS, Record
 from swashplate.identification.time.beginning import (
+    Begun,
     FilterNumbers,
     begun,
     joined_at,
@@ -34,9 +34,9 @@ from swashplate.identification.time.beginning import (
     seen_at_start,
     starting_samples,
 )
-from swashplate.identification.time.calibration import as_begun
+from swashplate.identification.time.calibration import as_begun, calibrate
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.record_filter import record_filter
+from swashplate.identification.time.record_filter import FilterRun, RecordFilter, record_filter
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.validation.controller_law import Law, learnt, shares_of
@@ -69,16 +69,6 @@ _REFERENCE = 0.5
 """Seconds before a start over which the reference is averaged; it stays there."""
 _REACH = 0.5
 """Seconds of past motion that a run carries: the command's delay and the aircraft's together."""
-
-
-class Uncertainty(NamedTuple):
-    """Of the joined system, linearised: its transition, and the covariances of what disturbs it, of the sensors' noise
-    and of what an observer makes of a reading."""
-
-    transition: Array
-    disturbed: Array
-    measured: Array
-    observed: Array
 
 
 SETTLING = 2.0
@@ -125,52 +115,80 @@ class Predictions:
         return early, after
 
 
+@dataclass(frozen=True, eq=False)
 class ObservedRecord:
     """A record as a vehicle's causal observer sees it, and what it predicts from there.
 
     Attributes:
-        record, nuisance: what is seen, and what belongs to it.
-        model, numbers: of the filter. filtered: its states after each reading.
-        innovations: one-step prediction errors (n, outputs), and `covariance` their model covariance.
+        vehicle, record: who flies, and what was seen. noise, nuisance: of the observer and of the record.
     """
 
-    def __init__(self, vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance) -> None:
-        self._vehicle, self.record, self.nuisance = as_begun(vehicle, record), record, nuisance
-        # Uncertainty is told for a nose that points north.
-        self._northward = vehicle, stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
-        self.model = stochastic_model(self._vehicle, record.output_names, record.dt, noise=noise)
-        self._filter = record_filter(self.model)
-        reaching, voltage = self._commands(0)
-        starting = reaching[: starting_samples(record.dt)].mean(axis=0)
-        rows = self._vehicle.values(), noise, nuisance, starting
-        self.numbers = FilterNumbers(*(np.array(row, dtype=np.float64) for row in rows))
-        begin = begun(self.model, self.numbers, seen_at_start(self._vehicle, record))
-        series = RecordSeries(record.outputs, driving_rows(reaching, voltage))
-        self.innovations, self.filtered, _ = self._filter.along(begin, self.numbers, series)
-        self.covariance = np.asarray(begin.gain.covariance)
-        self._body = [vehicle.index(name) for name in PREDICTED]
-        self._constants = numbers_and_constants(self._vehicle, self.numbers.parameters)
+    vehicle: Vehicle
+    record: Record
+    noise: Noise
+    nuisance: Nuisance
+
+    def calibrated(self, seconds: float, trims: Mapping[str, float]) -> ObservedRecord:
+        """With delays, trims and lever arm as the record's first seconds tell them (see `calibrate`)."""
+        told = calibrate(self.vehicle, self.record, noise=self.noise, prior=self.nuisance, seconds=seconds, trims=trims)
+        return replace(self, nuisance=told)
+
+    @cached_property
+    def _flown(self) -> Vehicle:
+        return as_begun(self.vehicle, self.record)
+
+    @cached_property
+    def _filter(self) -> RecordFilter:
+        names, dt = self.record.output_names, self.record.dt
+        return record_filter(stochastic_model(self._flown, names, dt, noise=self.noise))
+
+    @cached_property
+    def _numbers(self) -> FilterNumbers:
+        starting = self._commands(0)[0][: starting_samples(self.record.dt)].mean(axis=0)
+        rows = self._flown.values(), self.noise, self.nuisance, starting
+        return FilterNumbers(*(np.array(row, dtype=np.float64) for row in rows))
+
+    @cached_property
+    def _begin(self) -> Begun:
+        return begun(self._filter.model, self._numbers, seen_at_start(self._flown, self.record))
+
+    @cached_property
+    def _run(self) -> FilterRun:
+        series = RecordSeries(self.record.outputs, driving_rows(*self._commands(0)))
+        return self._filter.along(self._begin, self._numbers, series)
+
+    @cached_property
+    def _constants(self) -> Array:
+        return numbers_and_constants(self._flown, self._numbers.parameters)
+
+    @property
+    def _body(self) -> list[int]:
+        return [self.vehicle.index(name) for name in PREDICTED]
+
+    @property
+    def _fade(self) -> Array:
+        return self._filter.model.fade(Noise(*self._numbers.noise))
 
     def _commands(self, beyond: int) -> tuple[Array, Array]:
         """Commands as they reach the vehicle and the voltage, which hold for some samples beyond the record."""
         count = self.record.time.size + beyond
         inputs, voltage = (lengthened(rows, count) for rows in (self.record.inputs, self.record.voltage))
-        return commands_moved(self._vehicle, self.record.dt, inputs, self.nuisance)[0], voltage
+        return commands_moved(self._flown, self.record.dt, inputs, self.nuisance)[0], voltage
 
     @property
     def states(self) -> Array:
         """Body states after each reading (n, 12)."""
-        return self.filtered.x[:, self._body]
+        return self._run.states.x[:, self._body]
 
     def ahead(self, starts: NDArray[np.intp], ahead: int) -> Array:
         """Body states 1, 2, ... samples after some starts, with nothing measured any more (starts, ahead, 12)."""
-        known = self.filtered, self.numbers, *self._commands(ahead)
+        known = self._run.states, self._numbers, *self._commands(ahead)
         return self._filter.ahead_of(*known, starts, ahead)[..., self._body]
 
     def closed_ahead(self, laws: Sequence[Law], starts: NDArray[np.intp], ahead: int) -> Array:
         """As `ahead`, with the loops of some axes closed."""
         inputs, (reaching, voltage) = self.record.inputs, self._commands(ahead)
-        vehicle, nuisance, dt = self._vehicle, self.nuisance, self.record.dt
+        vehicle, nuisance, dt = self._flown, self.nuisance, self.record.dt
         trims = np.array([getattr(nuisance, f"trim_{name}", 0.0) for name in vehicle.input_names], dtype=float)
         delays = np.where(motors(vehicle), nuisance.delay_motor, nuisance.delay_servo)
         delay_steps = np.round(delays / dt).astype(int)
@@ -193,8 +211,8 @@ class ObservedRecord:
         since = np.where(np.any(shared != 0.0, axis=0), known, ahead)  # from when each input answers
         reference, answering = np.stack(references, axis=1), reach - 1 - np.array(late)
         past = before[starts[:, None] + np.arange(1, reach + 1)]
-        fade = self.model.fade(Noise(*self.numbers.noise))
-        x, gust, drift = (np.asarray(part)[starts] for part in self.filtered[:3])
+        body, fade = self._body, self._fade
+        x, gust, drift = (np.asarray(part)[starts] for part in self._run.states[:3])
         states = np.empty((len(starts), ahead, len(PREDICTED)))
         for k in range(ahead):
             u = reaching[starts + k]
@@ -202,16 +220,16 @@ class ObservedRecord:
             # The part of the inputs that is the axis's command becomes the answer, all else stays as recorded.
             u = np.where(k >= since, u + (answer - u @ shared.T) @ back, u)
             x = self._filter.step(x, gust, drift, u, voltage[starts + k], self._constants)
-            states[:, k], gust = x[:, self._body], fade * gust
+            states[:, k], gust = x[:, body], fade * gust
             past = np.concatenate([past[:, 1:], states[:, k, None]], axis=1)
         return states
 
     def shown(self, starts: NDArray[np.intp], aside: Array, kicks: Array) -> Array:
         """Readings without the sensors' noise (runs, samples, outputs), of states that begin `aside` (runs, joined) and
         are kicked at every sample (runs, samples, joined)."""
-        model, (commands, voltage) = self.model, self._commands(kicks.shape[1])
-        fade = model.fade(Noise(*self.numbers.noise))
-        state = model.displace(FilterState(*(np.asarray(part)[starts] for part in self.filtered)), aside)
+        model, (commands, voltage) = self._filter.model, self._commands(kicks.shape[1])
+        fade = self._fade
+        state = model.displace(FilterState(*(np.asarray(part)[starts] for part in self._run.states)), aside)
         shown = []
         for k in range(kicks.shape[1]):
             here = starts + k
@@ -221,14 +239,16 @@ class ObservedRecord:
         return np.stack(shown, axis=1)
 
     @cached_property
-    def uncertainty(self) -> Uncertainty:
-        """How sure the observer is about the mean flight, nose north."""
-        vehicle, model = self._northward
-        noise, nuisance = self.numbers[1:3]
-        rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (vehicle.values(), noise, nuisance, [0.0])))
-        A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, self.record)))
+    def uncertainty(self) -> tuple[Array, Array, Array, Array]:
+        """Of the joined system about the mean flight, nose north: its transition, and the covariances of what disturbs
+        it, of the sensors' noise and of what the observer makes of a reading."""
+        vehicle, record = self.vehicle, self.record
+        told = vehicle.values(), self.noise, self.nuisance, [0.0]
+        rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in told))
+        model = stochastic_model(vehicle, record.output_names, record.dt, noise=self.noise)
+        A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, record)))
         predicted = steady_gain(A, C, Q, R)[2]
-        return Uncertainty(A, Q, R, predicted - gain_at(predicted, C, R) @ C @ predicted)
+        return A, Q, R, predicted - gain_at(predicted, C, R) @ C @ predicted
 
     def sigma(self, ahead: int) -> Array:
         """Standard deviations (ahead, 12) of predictions 1, 2, ... samples ahead.
@@ -236,10 +256,10 @@ class ObservedRecord:
         Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
         """
         A, Q, _, P = self.uncertainty
-        sigmas = []
+        sigmas, body = [], self._body
         for _ in range(ahead):
             P = A @ P @ A.T + Q
-            sigmas.append(np.sqrt(np.maximum(np.diag(P)[self._body], 0.0)))
+            sigmas.append(np.sqrt(np.maximum(np.diag(P)[body], 0.0)))
         return np.array(sigmas)
 
     def predict(
@@ -266,14 +286,14 @@ class ObservedRecord:
         if early is not None:
             first -= max(0, (first - round(early / record.dt)) // step) * step
         starts = np.arange(first, max(n - 1, 0), step)
-        laws = learnt(self._vehicle, record, self.states, axes=close_loop, seconds=settling)
+        laws = learnt(self._flown, record, self.states, axes=close_loop, seconds=settling)
         return Predictions(
             starts=starts,
             states=self.ahead(starts, ahead),
             filtered=self.states,
-            innovations=self.innovations,
-            covariance=self.covariance,
-            disturbances=self.filtered.gust[:, :N_DISTURBANCES] + self.filtered.drift,
+            innovations=self._run.innovations,
+            covariance=np.asarray(self._begin.gain.covariance),
+            disturbances=self._run.states.gust[:, :N_DISTURBANCES] + self._run.states.drift,
             closed=self.closed_ahead(laws, starts, ahead) if laws else None,
             laws=laws,
         )

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.errors import CardError, FlightError, SwashError
+from swashplate.errors import FlightError, SwashError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.records import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION, Record, records
-from swashplate.identification.core.result import Result
 from swashplate.identification.core.sources import sources_of
-from swashplate.identification.time.calibration import calibrate
 from swashplate.identification.time.feedback import AxisExcitation, excitation
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.models.card import packaged_cards
-from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.record import monitored
 from swashplate.validation import innovations
-from swashplate.validation.bands import FEWEST_DRAWS, BandedRecord, bands, check_draws, widening
-from swashplate.validation.black_box import FilteredMotion
+from swashplate.validation.bands import FEWEST_DRAWS, BandedRecord, bands, widening
 from swashplate.validation.contact import Contact, contact
 from swashplate.validation.controller_law import Law, check_closed
 from swashplate.validation.flight_floors import ClosedRecord, ScoredRecord, closed_floors, flight_floors, motion_of
@@ -62,10 +57,11 @@ class _Rival:
 
 
 def validate(
-    model: Result[Vehicle, Any] | Vehicle,
+    vehicle: Vehicle,
     flights: Flight | Iterable[Flight],
     *,
-    published: Vehicle | None = None,
+    published: Vehicle,
+    fitted: Sequence[Record] = (),
     horizons: Sequence[float] = HORIZONS,
     every: float = 0.1,
     calibration: float = CALIBRATION,
@@ -80,10 +76,10 @@ def validate(
     disturbances at each start come from a causal observer with the same noise for both.
 
     Args:
-        model: a fit, or a vehicle (a model file's observer section is used where there is one).
+        vehicle: the model; its card's observer section is used where there is one.
         flights: conditioned flights that the fit has not seen.
-        published: the card to compare with (None: the card that the model was identified from). Where that is the model
-            itself, it is no rival in the verdict.
+        published: the card to compare with. Where that is the model itself, it is no rival in the verdict.
+        fitted: the records of its fit, for predictors without a model to learn from.
         horizons: seconds ahead.
         every: seconds between starts.
         calibration: seconds at the start of each record.
@@ -98,12 +94,7 @@ def validate(
         FlightError: where no record is long enough for calibration and the shortest horizon.
         SwashError: for a calibration that is too short to tell anything, an axis whose loop cannot be closed, or draws
             that are too few or of another model.
-        CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
-    if isinstance(model, Result):
-        vehicle, published = model.model, published or model.start
-    else:
-        vehicle, published = model, published or started_from(model)
     alone = _same_numbers(vehicle, published)
     noise, prior = observer_of(vehicle)
     trims = vehicle.card.observer.get("trims", {})
@@ -130,11 +121,10 @@ def validate(
     measured: list[Array] = []
     looped: dict[float, list[ClosedRecord]] = {}
     banded: dict[float, list[BandedRecord]] = {}
-    laws: list[Law] = []
     examples: list[Example] = []
-    checks: list[tuple[Array, Array]] = []
-    likelihoods: list[dict[str, float]] = []
+    innovated: dict[str, list[tuple[Array, Array]]] = {"model": [], "published card": []}
     calibrated: list[Nuisance] = []
+    laws: list[Law] = []
     for number, piece in enumerate(pieces):
         ahead = max(h for h in horizons if h < piece.time[-1] - piece.time[0] - calibration)
         rivals: dict[str, _Rival] = {}
@@ -142,8 +132,7 @@ def validate(
             if rivals and alone:
                 rivals[name] = rivals["model"]
                 continue
-            nuisance = calibrate(vehicle_flown, piece, noise=noise, prior=prior, seconds=calibration, trims=trims)
-            observed = ObservedRecord(vehicle_flown, piece, noise=noise, nuisance=nuisance)
+            observed = ObservedRecord(vehicle_flown, piece, noise, prior).calibrated(calibration, trims)
             predictions = observed.predict(
                 horizon=ahead,
                 every=every,
@@ -153,17 +142,16 @@ def validate(
             )
             rivals[name] = _Rival(observed, *reversed(predictions.split(round(calibration / piece.dt))))
         model_rival = rivals["model"]
-        laws.extend(model_rival.predictions.laws)
         calibrated.append(model_rival.observed.nuisance)
-        truth = measured_states(piece, model_rival.observed.nuisance)
+        laws.extend(model_rival.predictions.laws)
+        truth = measured_states(piece, calibrated[-1])
         # The tracked point as it is: that is what a controller saw, whatever the lever arm.
         judged.extend(excitation(vehicle, piece, measured_states(piece, Nuisance())))
         measured.append(truth)
         sigma = model_rival.observed.sigma(round(ahead / piece.dt))
         wider = _wider(piece, model_rival, truth, sigma, every=every, horizon=min(horizons))
         furthest = ahead if draws else min(ahead, JUDGED_AHEAD)
-        nuisance = model_rival.observed.nuisance
-        drawn = [ObservedRecord(one, piece, noise=noise, nuisance=nuisance) for one in draws]
+        drawn = [replace(model_rival.observed, vehicle=one) for one in draws]
         fan = spread(
             drawn or [model_rival.observed] * FEWEST_DRAWS,
             predictions=model_rival.predictions,
@@ -190,34 +178,29 @@ def validate(
         shown = fan.sigma if draws else np.broadcast_to(sigma, model_rival.predictions.states.shape)
         examples.extend(_examples(piece, model_rival, shown[:, : round(_EXAMPLE / piece.dt)]))
         settled = round(calibration / piece.dt)
-        pushed = contact(
-            piece.name, piece.time[settled:], truth[settled:], model_rival.predictions.disturbances[settled:]
-        )
-        contacts.append(pushed)
-        checks.append((model_rival.predictions.innovations[settled:], model_rival.predictions.covariance))
-        likelihoods.append(
-            {
-                name: innovations.log_likelihood(r.predictions.innovations[settled:], r.predictions.covariance)
-                for name, r in rivals.items()
-            }
-        )
+        disturbed = model_rival.predictions.disturbances[settled:]
+        contacts.append(contact(piece.name, piece.time[settled:], truth[settled:], disturbed))
+        for name, rival in rivals.items():
+            innovated[name].append((rival.predictions.innovations[settled:], rival.predictions.covariance))
         if progress is not None:
             progress(number + 1, float(len(pieces)))
     scores, judged_bands = _scores(parts), bands(banded)
     beside = flight_floors(
         scored,
         {k: v for k, v in parts.items() if not (alone and k[0] == "published card")},
-        training=_learnt(model, prior),
+        training=[motion_of(one, measured_states(one, prior), np.zeros(0, dtype=np.intp)) for one in fitted],
     )
     return Validation(
         vehicle=vehicle,
         published=published,
         scores=scores,
         innovations=innovations.check(
-            np.concatenate([c[0] for c in checks]), np.mean([c[1] for c in checks], axis=0), pieces[0].output_names
+            np.concatenate([rows for rows, _ in innovated["model"]]),
+            np.mean([covariance for _, covariance in innovated["model"]], axis=0),
+            pieces[0].output_names,
         ),
         log_likelihood={
-            name: float(np.mean([item[name] for item in likelihoods])) for name in ("model", "published card")
+            name: float(np.mean([innovations.log_likelihood(*one) for one in each])) for name, each in innovated.items()
         },
         verdict=verdict(
             [s for s in scores if not (alone and s.predictor == "published card")], judged, beside, judged_bands
@@ -248,6 +231,22 @@ def validate(
     )
 
 
+def check_draws(vehicle: Vehicle, draws: Sequence[Vehicle]) -> None:
+    """That drawn models are as many as the bands need, and of the model's equations.
+
+    Raises:
+        SwashError: where not.
+    """
+    if draws and (len(draws) + 1) % (FEWEST_DRAWS + 1):
+        raise SwashError(
+            f"are {len(draws)}, expected {FEWEST_DRAWS}, {2 * FEWEST_DRAWS + 1}, {3 * FEWEST_DRAWS + 2} and so on.",
+            channel="draws",
+            hint="Then a whole number of paths lies outside each band.",
+        )
+    if any(one.state_names != vehicle.state_names or one.input_names != vehicle.input_names for one in draws):
+        raise SwashError("are of another model than the one that is validated.", channel="draws")
+
+
 def _wider(piece: Record, rival: _Rival, truth: Array, sigma: Array, *, every: float, horizon: float) -> Array:
     """How much wider the bands of a record are to be, by its first seconds (see `widening`)."""
     ahead = round(horizon / piece.dt)
@@ -273,30 +272,6 @@ def _without_contact(
             predicted, truth, first = rows
             errors.setdefault(("model", horizon), []).append((predicted[free], truth[free], first[free]))
     return errors
-
-
-def _learnt(model: Result[Vehicle, Any] | Vehicle, nuisance: Nuisance) -> list[FilteredMotion]:
-    """The records of the fit, where it brings them."""
-    if not isinstance(model, Result):
-        return []
-    nowhere = np.zeros(0, dtype=np.intp)
-    return [motion_of(c.record, measured_states(c.record, nuisance), nowhere) for c in model.in_time]
-
-
-def started_from(vehicle: Vehicle) -> Vehicle:
-    """What a model is compared with: the card that it was identified from, or itself where it never was."""
-    before = vehicle.card.started_from()
-    if before is not None:
-        return vehicle.with_card(before)
-    if vehicle.traits.published:
-        return from_card(packaged_cards()[vehicle.traits.published])
-    if any(entry.status == "identified" for entry in vehicle.card.parameters.values()):
-        raise CardError(
-            "does not say from which card it was identified.",
-            where=vehicle.card.path or vehicle.card.title,
-            hint="Name that card with --settings published=CARD, or identify the model anew.",
-        )
-    return vehicle
 
 
 def _same_numbers(one: Vehicle, other: Vehicle) -> bool:

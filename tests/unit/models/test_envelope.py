@@ -9,8 +9,7 @@ import swashplate as sp
 from swashplate.errors import CardError
 from swashplate.flights.flight import Flight, stream
 from swashplate.models.card import card_from
-from swashplate.models.doubts import envelope
-from swashplate.simulation.record import monitored
+from swashplate.models.doubts import envelope, monitored
 
 TIME = np.arange(0.0, 4.0, 0.01)
 

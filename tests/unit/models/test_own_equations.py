@@ -19,11 +19,10 @@ from swashplate.errors import CardError, SwashError
 from swashplate.export.formats import export_model
 from swashplate.flights.flight import Flight
 from swashplate.links.live.picture import picture, pose_of
-from swashplate.models.catalogue import cards_by_name, from_card
+from swashplate.models.catalogue import cards_by_name, from_card, started_from
 from swashplate.physics.backend import FloatBackend
 from swashplate.simulation.standing import at_rest, standing
 from swashplate.simulation.trim import Trim
-from swashplate.validation.validate import started_from
 
 TRUTH = {"k_vane": 0.95, "drag": 0.6, "fan_time": 0.16}
 

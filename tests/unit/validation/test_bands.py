@@ -17,7 +17,6 @@ from swashplate.validation.bands import (
     SURE,
     BandedRecord,
     bands,
-    check_draws,
     in_brief,
     pairs,
     widened_words,
@@ -25,6 +24,7 @@ from swashplate.validation.bands import (
 )
 from swashplate.validation.paths import paths
 from swashplate.validation.prediction import ObservedRecord
+from swashplate.validation.validate import check_draws
 
 
 def _record(

@@ -8,8 +8,8 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import CardError
+from swashplate.models.catalogue import started_from
 from swashplate.models.vehicle import Vehicle
-from swashplate.validation.validate import started_from
 
 
 def _identified(card: Vehicle, **values: float) -> Vehicle:

@@ -27,9 +27,8 @@ HORIZONS, EVERY = (0.5, 1.0), 0.5  # as in the end-to-end test: the same compile
 def _validation() -> Validation:
     flight = ten_seconds().condition(rate=100.0, cutoff=0.0)
     told: list[tuple[int, float]] = []
-    found = validate(
-        sp.vehicle("coax"), flight, horizons=HORIZONS, every=EVERY, progress=lambda i, n: told.append((i, n))
-    )
+    coax, tell = sp.vehicle("coax"), lambda i, n: told.append((i, n))
+    found = validate(coax, flight, published=coax, horizons=HORIZONS, every=EVERY, progress=tell)
     assert told == [(1, 1.0)]
     return found
 
@@ -177,7 +176,7 @@ def test_every_score_of_the_model_stands_beside_its_floor() -> None:
 def test_a_flight_that_is_over_before_it_is_calibrated_is_refused() -> None:
     flight = ten_seconds().condition(rate=100.0, cutoff=0.0).between(0.0, 6.0)
     with pytest.raises(FlightError, match=r"longest unbroken piece has 6\.0 s, expected more than 6\.5 s"):
-        validate(sp.vehicle("coax"), flight)
+        validate(sp.vehicle("coax"), flight, published=sp.vehicle("coax"))
 
 
 def test_an_observer_section_is_used_and_a_card_without_one_has_the_usual() -> None:

@@ -74,7 +74,7 @@ class Validate(FromConditioned["Validation | Verification"]):
 
     def answer(self, say: Say = silent) -> Validation | Verification:
         from swashplate.identification.core.result import Result
-        from swashplate.models.catalogue import vehicle
+        from swashplate.models.catalogue import started_from, vehicle
         from swashplate.models.linear.state_space import StateSpaceModel
         from swashplate.validation.along_inputs import fitted, verify_vehicle
 
@@ -113,9 +113,10 @@ class Validate(FromConditioned["Validation | Verification"]):
         records(flights, model)
         say("predicting (compiling takes longest the first time)")
         return validate(
-            judged,
+            model,
             flights,
-            published=other,
+            published=other or (judged.start if isinstance(judged, Result) else started_from(model)),
+            fitted=[seen.record for seen in judged.in_time] if isinstance(judged, Result) else (),
             horizons=tuple(self.horizons),
             every=self.every,
             calibration=self.calibration,

@@ -35,10 +35,10 @@ from swashplate.identification.time.linear_residual import (
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.record_fit import Interpreted, RecordEstimator
 from swashplate.identification.time.residual_fit import fit_residual
+from swashplate.models.doubts import monitored
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.residual import PREFIX
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.record import monitored
 
 _FOLLOWING = 0.2
 """A gain in log-likelihood that is too small to go on for, where an iteration takes seconds."""

@@ -21,8 +21,9 @@ from swashplate.flights.growing import SUFFIX
 from swashplate.links.notices import Say
 from swashplate.links.recorder import begin, read_grown, salvage
 from swashplate.models.catalogue import vehicle as load_vehicle
+from swashplate.models.doubts import monitored
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.record import monitored, unflown
+from swashplate.simulation.record import unflown
 
 SHORTEST, LONGEST = 2.0, 1800.0
 """Seconds: less is a slip of the finger, more is another recording."""
