@@ -1,6 +1,7 @@
 """The first commands of a journey on this machine, whatever it is, and on one without what only POSIX has.
 
-The public workflow runs this file on Linux, macOS and Windows with the README's installation and pytest alone.
+The public workflow runs this file on Linux, macOS and Windows with the README's installation and pytest alone. In
+`make test` the other tests of the command line stand for this machine as it is.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import pytest
 from other_machine import hide_posix, started
 
 
-@pytest.fixture(scope="module", params=["as it is", "without POSIX"])
+@pytest.fixture(scope="module", params=[pytest.param("as it is", marks=pytest.mark.proof), "without POSIX"])
 def machine(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, str], Path]:
     """The environment of its processes, and a folder to work in with a flight."""
     folder = tmp_path_factory.mktemp("machine")

@@ -135,6 +135,7 @@ def test_claims_on_flights_follow_the_verdicts(level: str, words: str, monkeypat
     assert set(dict(_CLAIM.findall(real_results.flights_claims_text())).values()) == {words}
 
 
+@pytest.mark.proof
 def test_every_claim_on_the_raptor_can_turn_out_the_other_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each program is changed where it judges: another card, model or scheme in the place of the paper's."""
     monkeypatch.chdir(tmp_path)

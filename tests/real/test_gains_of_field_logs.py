@@ -144,9 +144,10 @@ def test_every_swept_axis_of_real_firmware_has_gains(shared_data: Path) -> None:
         ("raptor50_three_sweeps", "yaw"): "0/1", ("coax_roll_yaw_sweeps", "yaw"): "0/1",
         ("roll", "roll"): "0/2", ("pitch", "pitch"): "0/2",
     }  # fmt: skip
+    sweeps = {name: sp.inspect(log).sweeps for name, log in logs.items()}
     for (name, axis), form in asked.items():
         log, moved, turned = logs[name], f"mixer_{axis}", {"roll": "p", "pitch": "q", "yaw": "r"}[axis]
-        (sweep,) = (one for one in sp.inspect(log).sweeps if axis in one.axis)
+        (sweep,) = (one for one in sweeps[name] if axis in one.axis)
         responses = measured(log.between(sweep.start - 1.0, sweep.stop + 1.0), moved, turned)
         assert not any("sign" in text for text in responses.problems), (name, axis)
         one = gains(called_swept(responses), form)

@@ -48,7 +48,7 @@ def judged(one: Flown, *, known: bool) -> tuple[Suggestion | None, str]:
     return roll, roll.refused
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.proof)])
+@pytest.mark.parametrize("count", [len(MIX), pytest.param(300, marks=pytest.mark.proof)])
 def test_good_logs_get_gains_and_no_log_with_a_fault_does(count: int) -> None:
     kinds = tuple(MIX[k % len(MIX)] for k in range(count))
     flown = [one for k in range(0, count, 100) for one in logs(kinds[k : k + 100], seed=k)]

@@ -162,7 +162,7 @@ def test_a_vehicle_that_tumbles_is_flown_with_a_quaternion(name: str) -> None:
 
 def test_the_card_flies_the_same_graph() -> None:
     pytest.importorskip("jax", reason="the extra 'cuda' is not installed")
-    made = vehicle("raptor50")
+    made = vehicle("coax")
     x0, rows, p = tables(made, 5, 12)
     plan = plan_of(x0, rows, p, keep=4)
     found, _ = fly(made, plan)
