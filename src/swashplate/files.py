@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import errno
-import mmap
 import os
 import stat
+import threading
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from swashplate.systems import BYTES, NOT_WAITING
+from swashplate.systems import BYTES, NOT_WAITING, READ_AT
 
 _AT_LEAST = 1 << 16
 """Bytes that are read of a file whose size the system does not say."""
+_NEAR = 1 << 16
+"""Bytes that are read where a few are asked for."""
 
 
 @contextmanager
@@ -55,11 +58,62 @@ def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
     return content
 
 
-def map_bytes(path: str | os.PathLike[str], *, most: int) -> mmap.mmap:
-    """A file's bytes where they lie on disk, at least one of them. Raises as `read_bytes`."""
-    with _opened(path) as (file, size):
-        _refuse_longer(size, most, path)
-        return mmap.mmap(file.fileno(), size, access=mmap.ACCESS_READ)
+class BytesOnDisk:
+    """A file's bytes where they lie, each part read when it is asked for; raises as `read_bytes`.
+
+    They are not mapped: where a mapped file is cut off while it is looked at, the system ends the process.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], *, most: int) -> None:
+        with _opened(path) as (file, self._size):
+            _refuse_longer(self._size, most, path)
+            self._file = os.dup(file.fileno())
+        weakref.finalize(self, os.close, self._file)
+        self._path = os.fspath(path)
+        self._last = (0, b"")
+        self._one_at_a_time = threading.Lock()
+
+    def __len__(self) -> int:
+        return self._size
+
+    def part(self, begin: int, end: int) -> bytes:
+        """The bytes from `begin` to `end` or the last one.
+
+        Raises:
+            OSError: where the file has become shorter since it was opened, or its disk fails.
+        """
+        wanted = max(0, min(end, self._size) - begin)
+        content = self._read(begin, wanted)
+        while len(content) < wanted and (more := self._read(begin + len(content), wanted - len(content))):
+            content += more
+        if len(content) < wanted:
+            problem = f"it was cut off while it was read: it had {self._size:,} bytes"
+            raise OSError(errno.ENODATA, problem, self._path)
+        return content
+
+    def _read(self, begin: int, count: int) -> bytes:
+        if READ_AT is not None:
+            return READ_AT(self._file, count, begin)
+        with self._one_at_a_time:
+            os.lseek(self._file, begin, os.SEEK_SET)
+            return os.read(self._file, count)
+
+    def __getitem__(self, chosen: slice) -> bytes:
+        """A few bytes: those beside them come with them, for they are likely to be next."""
+        begin, end, _ = chosen.indices(self._size)
+        at, near = self._last
+        if not at <= begin <= end <= at + len(near):
+            if end - begin > _NEAR:
+                return self.part(begin, end)
+            at, near = self._last = (begin, self.part(begin, begin + _NEAR))
+        return near[begin - at : end - at]
+
+    def find(self, what: bytes, start: int = 0) -> int:
+        """Where these bytes stand for the first time from `start` on, -1 if nowhere."""
+        for begin in range(start, self._size, _NEAR):
+            if (at := self[begin : begin + _NEAR + len(what) - 1].find(what)) >= 0:
+                return begin + at
+        return -1
 
 
 def read_text(path: str | os.PathLike[str], *, most: int = 32 << 20) -> str:

@@ -6,10 +6,10 @@ runs there (a test hides them all).
 
 from __future__ import annotations
 
-import mmap
 import os
 import signal
 import subprocess
+from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from typing import Any, Final
@@ -29,8 +29,8 @@ NOT_WAITING: Final[int] = getattr(os, "O_NONBLOCK", 0)
 NO_LINK: Final[int] = getattr(os, "O_NOFOLLOW", 0)
 BYTES: Final[int] = getattr(os, "O_BINARY", 0)
 """Flag of `os.open`: line ends stay as they are."""
-DONE_WITH: Final[int | None] = getattr(mmap, "MADV_DONTNEED", None)
-"""Advice on a mapped file: its pages may leave memory."""
+READ_AT: Final[Callable[[int, int, int], bytes] | None] = getattr(os, "pread", None)
+"""Reads of an open file so many bytes from a place on."""
 HANGUP: Final[signal.Signals | None] = getattr(signal, "SIGHUP", None)
 """The terminal is closed."""
 OUT_OF_TIME: Final[signal.Signals | None] = getattr(signal, "SIGXCPU", None)

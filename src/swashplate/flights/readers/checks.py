@@ -11,6 +11,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import channel
+from swashplate.flights.stored_column import StoredColumn
 
 _NORM_TOLERANCE = 0.01  # six decimals of a motion capture export lose 1e-6; anything near 1 % is no unit quaternion
 
@@ -55,11 +56,18 @@ def quaternion_notes(quaternion: Array, *, channel: str, where: str) -> tuple[st
     return tuple(notes)
 
 
+_ROUNDED = 1.0 - 1e-6
+"""Of a limit: below it no rounding matters."""
+
+
 def beyond_limits(flight: Flight) -> tuple[str, ...]:
     """What is told of each channel with numbers that nothing of its kind can have (`Channel.largest`)."""
     texts = []
     for name in flight.channels:
         known = channel(name)
+        stored = StoredColumn.behind(flight[name])
+        if stored is not None and stored.largest < known.largest * _ROUNDED:
+            continue
         values = np.abs(flight.values(name))
         with np.errstate(invalid="ignore"):  # a netCDF file may hold NaN
             wrong = values > known.largest

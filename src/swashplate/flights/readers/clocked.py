@@ -274,14 +274,17 @@ def made_stream(
         remarks: takes a line for what was left out.
     """
     channels = {channel_name: converted(*column) for channel_name, column in columns.items()}
-    empty = [key for key, (values, _) in channels.items() if not _finite(values).any()]
-    for key in empty:
-        del channels[key]
+    good = np.isfinite(time)
+    for key, (values, _) in list(channels.items()):
+        stored = _stored(values)
+        if stored.dtype.kind == "f":  # whole numbers are finite
+            finite = np.isfinite(stored)
+            if finite.any():
+                good &= finite
+            else:
+                del channels[key]
     if not channels or time.size < 2:
         return None
-    good = np.isfinite(time)
-    for values, _ in channels.values():
-        good &= _finite(values)
     if not good.all():
         lost = share(int(good.size - good.sum()), good.size)
         remarks.damage.append(f"{name}: {lost} are lost because a number is missing or not finite")
@@ -301,10 +304,6 @@ def made_stream(
     known = {key: channel(key).unit for key in channels}
     labels = {key: unit for key, (_, unit) in channels.items() if not known[key]}
     return stream(_rows(time, good), {key: _chosen(values, good) for key, (values, _) in channels.items()}, labels)
-
-
-def _finite(values: Array | StoredColumn) -> Mask:
-    return np.asarray(np.isfinite(_stored(values).astype(np.float64, copy=False)))
 
 
 def _chosen(values: Array | StoredColumn, chosen: Mask) -> Array | StoredColumn:

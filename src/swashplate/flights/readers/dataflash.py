@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.flights.readers.dataflash_index import MessageKind, Scan
-from swashplate.flights.readers.source import RELEASED, Places, Stored, release
+from swashplate.flights.readers.source import Places, Stored, part
 from swashplate.flights.stored_column import StoredColumn
+
+_BLOCK = 1 << 21  # bytes that are decoded at a time
+_LONGEST = 255  # bytes of a message
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,6 @@ def decoded(content: Stored, wanted: Sequence[Wanted]) -> list[dict[str, NDArray
             continue
         begin = min(offset for _, offset in places)
         size = max(offset + dtype.itemsize for dtype, offset in places) - begin
-        rows = np.ndarray((len(content) - size + 1,), f"V{size}", content, strides=(1,))
         record = np.dtype(
             {
                 "names": list(names),
@@ -112,16 +114,21 @@ def decoded(content: Stored, wanted: Sequence[Wanted]) -> list[dict[str, NDArray
                 "itemsize": size,
             }
         )
-        edges = np.searchsorted(at, np.arange(0, len(content) + RELEASED, RELEASED, dtype=at.dtype)).tolist()
-        tasks.append((rows, at, begin + 3, record, arrays, edges))
-    for span in range(-(-len(content) // RELEASED)):
-        for rows, at, offset, record, arrays, edges in tasks:
-            part = slice(edges[span], edges[span + 1])
-            if part.start < part.stop:
-                records = rows[at[part] + offset].view(record)
-                for name, array in zip(record.names or (), arrays, strict=True):
-                    array[part] = records[name]
-        release(content)
+        edges = np.searchsorted(at, np.arange(0, len(content) + _BLOCK, _BLOCK, dtype=at.dtype)).tolist()
+        tasks.append((at, begin + 3, record, arrays, edges))
+    for span in range(-(-len(content) // _BLOCK)):
+        here = [task for task in tasks if task[-1][span] < task[-1][span + 1]]
+        if not here:
+            continue
+        first = span * _BLOCK
+        block = part(content, first, first + _BLOCK + _LONGEST)  # the last message may reach over
+        for at, offset, record, arrays, edges in here:
+            chosen = slice(edges[span], edges[span + 1])
+            size = record.itemsize
+            rows = np.ndarray((len(block) - size + 1,), f"V{size}", block, strides=(1,))
+            records = rows[at[chosen].astype(np.intp) + (offset - first)].view(record)
+            for name, array in zip(record.names or (), arrays, strict=True):
+                array[chosen] = records[name]
     return columns
 
 

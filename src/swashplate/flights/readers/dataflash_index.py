@@ -17,12 +17,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.flights.readers.source import RELEASED, Places, Stored, release
+from swashplate.flights.readers.source import Places, Stored, part
 
 HEAD = b"\xa3\x95"
 FMT = 128
 _FMT_LENGTH = 89
-_CHUNK = 1 << 20  # bytes that are looked through for heads at a time: they stay in the processor's cache
+_CHUNK = 1 << 18  # bytes that are looked through for heads at a time: they stay in the processor's cache
 _HEADS = 1 << 16  # heads that are sorted by type at a time
 _FMT_FIELDS = np.dtype([("type", "u1"), ("length", "u1"), ("name", "S4"), ("format", "S16"), ("columns", "S64")])
 
@@ -62,12 +62,12 @@ class MessageKind:
 def is_dataflash(content: Stored) -> bool:
     """Whether the bytes begin with a whole FMT message, or have one after a few lost blocks."""
     start = 0 if content[:3] == HEAD + bytes([FMT]) else content.find(HEAD + bytes([FMT, FMT, _FMT_LENGTH]))
-    return start >= 0 and len(content) >= start + _FMT_LENGTH and content[start + 4] >= 3
+    return start >= 0 and len(content) >= start + _FMT_LENGTH and content[start + 4 : start + 5] >= b"\x03"
 
 
 def _described(content: Stored, at: int) -> tuple[int, int, MessageKind | None]:
     """Type, length and description in the FMT message at `at`; None where letters and length do not fit together."""
-    fields = np.frombuffer(content, _FMT_FIELDS, count=1, offset=at + 3)[0]
+    fields = np.frombuffer(content[at + 3 : at + _FMT_LENGTH], _FMT_FIELDS)[0]
     name = bytes(fields["name"]).decode("ascii", "replace")
     letters = bytes(fields["format"]).decode("ascii", "replace")
     columns = bytes(fields["columns"]).decode("ascii", "replace").split(",") if fields["columns"] else []
@@ -115,12 +115,16 @@ class _Chain:
             self._joined[:] = False
 
     def _join(self) -> None:
-        after = self.heads + np.array(self.lengths, dtype=np.uint32)[self.numbers]
+        lengths = np.array(self.lengths, dtype=np.uint32)
         self._joined = np.zeros(self.heads.size, dtype=np.bool_)
-        self._joined[:-1] = after[:-1] == self.heads[1:]
+        for start in range(0, self.heads.size - 1, _HEADS):
+            heads = self.heads[start : start + _HEADS + 1]
+            after = lengths.take(self.numbers[start : start + heads.size - 1])
+            after += heads[:-1]
+            np.equal(after, heads[1:], out=self._joined[start : start + heads.size - 1])
         # The others may be joined to a later head, over what only looks like one.
         self._breaks = np.flatnonzero(~self._joined)
-        ends = after[self._breaks]
+        ends = self.heads[self._breaks] + lengths[self.numbers[self._breaks]]
         self._following = np.searchsorted(self.heads, ends)
         inside = (self._following < self.heads.size) & (ends > self.heads[self._breaks])
         self._joined[self._breaks[inside]] = self.heads[self._following[inside]] == ends[inside]
@@ -168,7 +172,6 @@ class Scan:
             described.at = np.concatenate([*joined.pop(number, []), single])
             if single.size:
                 described.at.sort()
-        release(content)
 
     def _walk(self, content: Stored, chain: _Chain) -> tuple[list[list[int]], list[tuple[int, int]]]:
         """Places of single messages by type, and rows of the chain."""
@@ -181,7 +184,7 @@ class Scan:
             if headed and chain.kinds:
                 more, at = chain.run(at)
                 rows += more
-            kind = content[at + 2] if headed and at + 2 < size else -1
+            kind = content[at + 2 : at + 3][0] if headed and at + 2 < size else -1
             length = lengths[kind] if kind >= 0 else 0
             after = at + length
             # A message counts where another one, or the end, follows it: a torn one would swallow its neighbour.
@@ -232,16 +235,14 @@ def _filled(content: Stored, filler: bytes) -> int:
 
 def _heads(content: Stored) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
     """Where the two bytes of a head stand with a byte behind them, and that byte: the type."""
-    cells = np.frombuffer(content, np.uint8)
     heads, numbers = [np.zeros(0, dtype=np.uint32)], [np.zeros(0, dtype=np.uint8)]
     for begin in range(0, len(content) - 2, _CHUNK):
-        part = cells[begin : begin + _CHUNK + 2]
-        inside = np.flatnonzero(part[:-2] == HEAD[0])
-        inside = inside.compress(part[1:].take(inside) == HEAD[1])
-        numbers.append(part[2:].take(inside))
+        cells = np.frombuffer(part(content, begin, begin + _CHUNK + 2), np.uint8)
+        head = cells[:-2] == HEAD[0]
+        head &= cells[1:-1] == HEAD[1]
+        inside = np.flatnonzero(head)
+        numbers.append(cells[2:].take(inside))
         heads.append((inside + begin).astype(np.uint32))
-        if begin % RELEASED == 0:
-            release(content)
     return np.concatenate(heads), np.concatenate(numbers)
 
 
@@ -252,8 +253,10 @@ def _by_type(chain: _Chain, rows: list[tuple[int, int]]) -> dict[int, list[NDArr
         chosen[start:stop] = True
     by_type: dict[int, list[NDArray[np.uint32]]] = {}
     for start in range(0, chosen.size, _HEADS):
-        part = slice(start, start + _HEADS)
-        numbers, heads = chain.numbers[part][chosen[part]], chain.heads[part][chosen[part]]
+        here = slice(start, start + _HEADS)
+        numbers, heads = chain.numbers[here], chain.heads[here]
+        if not chosen[here].all():
+            numbers, heads = numbers[chosen[here]], heads[chosen[here]]
         heads = heads[np.argsort(numbers, kind="stable")]
         counts = np.bincount(numbers, minlength=256)
         ends = np.cumsum(counts)

@@ -21,6 +21,7 @@ from swashplate.flights.readers.ardupilot_events import seconds
 from swashplate.flights.readers.dataflash import MessageTable, Wanted
 from swashplate.flights.readers.dataflash_index import MessageKind, is_dataflash
 from swashplate.flights.readers.source import Places, Stored, open_source
+from swashplate.flights.stored_column import StoredColumn
 
 _INSTANCES = ("I", "C", "Inst", "Instance", "IMU")
 _MOST_INSTANCES, _INSTANCE = 16, "instance"
@@ -56,10 +57,15 @@ class LogFields(ABC):
     listed: Mapping[str, LogField]
 
     @abstractmethod
-    def _samples(self, field: LogField) -> tuple[Places, Array, Array]:
+    def _samples(self, field: LogField) -> tuple[Places, Array, StoredColumn]:
         """Places in the file, times [s] and values."""
 
     def read(self, name: str) -> tuple[Array, Array]:
+        """As `column`, its values in 64 bits."""
+        time, column = self.column(name)
+        return time, column.numbers
+
+    def column(self, name: str) -> tuple[Array, StoredColumn]:
         """Strictly increasing times [s] on the log's clock, and values in the log's unit; two runs are never joined.
 
         Raises:
@@ -67,14 +73,12 @@ class LogFields(ABC):
         """
         if name not in self.listed:
             raise FlightError("is no field of this log.", channel=name)
-        place, time, values = self._samples(self.listed[name])
+        place, time, column = self._samples(self.listed[name])
         good = np.isfinite(time)
-        place, time, values = place[good], time[good], values[good]
-        (first, last), _ = clocked.longest_run([(place, time)])
-        inside = (place >= first) & (place < last)
-        time, values = time[inside], values[inside]
-        keep = clocked.longest_increasing(time)
-        return time[keep], values[keep]
+        (first, last), _ = clocked.longest_run([(place[good], time[good])])
+        good &= (place >= first) & (place < last)
+        good[good] = clocked.longest_increasing(time[good])
+        return (time, column) if good.all() else (time[good], StoredColumn(column.stored[good], *column.factors))
 
 
 def log_fields(path: Path) -> LogFields | None:
@@ -171,16 +175,15 @@ class _Binary(LogFields):
             times.append(np.where(before >= 0, start[np.maximum(before, 0)], np.nan))
         return times
 
-    def _samples(self, field: LogField) -> tuple[Places, Array, Array]:
+    def _samples(self, field: LogField) -> tuple[Places, Array, StoredColumn]:
         if _state(self._path) != self._state:
             raise FlightError("has changed since it was opened.", where=self._path, hint="Open it again.")
         part = self._parts[field.message]
         content = open_source(self._path).stored
         (time,) = self._times(content, [part])
         (values,) = dataflash.decoded(content, [Wanted(part.kind, part.at, [field.field])])
-        with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
-            numbers = np.asarray(values[field.field], dtype=np.float64) * part.kind.factors[field.field]
-        return part.at, time, numbers * part.units.get(field.field, ("", 1.0))[1]
+        factors = (part.kind.factors[field.field], part.units.get(field.field, ("", 1.0))[1])
+        return part.at, time, StoredColumn(values[field.field], *factors)
 
 
 def _state(path: Path) -> tuple[int, int]:
@@ -260,9 +263,9 @@ class _Decoded(LogFields):
         ]
         self.listed = {field.name: field for field in fields}
 
-    def _samples(self, field: LogField) -> tuple[Places, Array, Array]:
+    def _samples(self, field: LogField) -> tuple[Places, Array, StoredColumn]:
         place, time, columns = self._messages[field.message]
-        return place, time, np.asarray(columns[field.field], dtype=np.float64)
+        return place, time, StoredColumn(np.asarray(columns[field.field]))
 
 
 def _columns(table: MessageTable) -> Columns:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import hashlib
-import mmap
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import FlightError
-from swashplate.files import map_bytes, read_bytes
+from swashplate.files import BytesOnDisk, read_bytes
 from swashplate.flights.provenance import Provenance
-from swashplate.systems import DONE_WITH
 
 # The largest file that is read and the largest content it may unpack to: an hour at 400 Hz of 100 channels is 1.2 GB.
 LARGEST_FILE = 1 << 30
@@ -28,28 +26,44 @@ LARGEST_CONTENT = 2 << 30
 _FREE_CONTENT = 16 << 20
 _LARGEST_RATIO = 40
 _FOLDER_MARK = "metadata.yaml"  # of a rosbag2 folder
-_MAPPED = 16 << 20  # bytes from which a file is mapped: a reader that can looks at it where it lies
-RELEASED = 1 << 24
-"""Bytes of a mapped file that are looked at before its pages are given back."""
+_LEFT_ON_DISK = 16 << 20  # bytes from which a file is not read at once: a reader that can looks at it where it lies
+_HASHED = 1 << 20  # bytes at a time
 
-Stored = bytes | mmap.mmap
+
+class LogOnDisk(BytesOnDisk):
+    """The bytes of a log that are left where they lie."""
+
+    def part(self, begin: int, end: int) -> bytes:
+        """The bytes from `begin` to `end` or the last one.
+
+        Raises:
+            FlightError: where the file was cut off since it was opened.
+        """
+        try:
+            return super().part(begin, end)
+        except OSError as error:
+            raise FlightError(
+                f"cannot be read: {error.strerror}.",
+                where=error.filename,
+                hint="Open it again when nothing writes to it any more.",
+            ) from None
+
+
+Stored = bytes | LogOnDisk
 """The bytes of a log, in memory or where they lie on disk."""
 Places = NDArray[np.uint32] | NDArray[np.int64]
 """Where messages stand: increasing numbers. Bytes from a file's begin fit into 32 bits (`LARGEST_FILE`)."""
 
 
-def release(stored: Stored) -> None:
-    """Gives the pages of a mapped file that were looked at back to the system, which may keep them in its cache."""
-    if isinstance(stored, mmap.mmap) and DONE_WITH is not None:
-        stored.madvise(DONE_WITH)
+def part(stored: Stored, begin: int, end: int) -> bytes | memoryview:
+    """The bytes from `begin` to `end` or the last one; those in memory are not copied."""
+    return memoryview(stored)[begin:end] if isinstance(stored, bytes) else stored.part(begin, end)
 
 
 def _hashed(stored: Stored) -> str:
     digest = hashlib.sha256()
-    with memoryview(stored) as cells:
-        for begin in range(0, len(stored), RELEASED):
-            digest.update(cells[begin : begin + RELEASED])
-            release(stored)
+    for begin in range(0, len(stored), _HASHED):
+        digest.update(part(stored, begin, begin + _HASHED))
     return digest.hexdigest()
 
 
@@ -59,7 +73,7 @@ class Source:
 
     Attributes:
         path: where it lies.
-        stored: its bytes, mapped where they are many.
+        stored: its bytes, left on disk where they are many.
     """
 
     path: Path
@@ -76,7 +90,7 @@ class Source:
     @cached_property
     def content(self) -> bytes:
         """Its bytes in memory."""
-        return self.stored if isinstance(self.stored, bytes) else self.stored[:]
+        return self.stored if isinstance(self.stored, bytes) else bytes(part(self.stored, 0, self.size))
 
     @cached_property
     def hashing(self) -> Future[str]:
@@ -173,8 +187,8 @@ def open_source(path: str | os.PathLike[str]) -> Source:
                 hint="Split it into shorter flights.",
             )
         stored: Stored = (
-            map_bytes(place, most=LARGEST_FILE)
-            if files == [place] and size >= _MAPPED
+            LogOnDisk(place, most=LARGEST_FILE)
+            if files == [place] and size >= _LEFT_ON_DISK
             else b"".join(read_bytes(file, most=LARGEST_FILE) for file in files)
         )
     except FileNotFoundError:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.flights.stored_column import StoredColumn
 
 _GAP = (10.0, 0.5)
 """Usual steps, and seconds: a step longer than both is a gap. The rule of `flights.maneuvers.sweeps`."""
@@ -36,7 +37,7 @@ def window(time: Array, start: float, stop: float) -> slice:
     return slice(first, last)
 
 
-def extremes(values: Array, bins: int) -> NDArray[np.int64]:
+def extremes(values: NDArray[np.generic], bins: int) -> NDArray[np.int64]:
     """Indices of the lowest and the highest sample of each bin, rising and without repetition.
 
     Args:
@@ -68,7 +69,7 @@ def extremes(values: Array, bins: int) -> NDArray[np.int64]:
 
 
 def trace(
-    time: Array, values: Array, *, start: float, stop: float, bins: int, breaks: NDArray[np.int64]
+    time: Array, values: Array | StoredColumn, *, start: float, stop: float, bins: int, breaks: NDArray[np.int64]
 ) -> BinnedTrace:
     """A channel between two times, thinned where it has more than two samples a bin, broken at its gaps.
 
@@ -79,10 +80,11 @@ def trace(
         breaks: of the whole channel, from `gaps`.
     """
     part = window(time, start, stop)
-    inside = values[part]
+    column = values if isinstance(values, StoredColumn) else StoredColumn(values)
+    inside = column.stored[part]
     thinned = inside.size > 2 * bins
     chosen = part.start + (extremes(inside, bins) if thinned else np.arange(inside.size))
-    shown_time, shown = time[chosen], values[chosen].astype(np.float64)
+    shown_time, shown = time[chosen], column.at(chosen)
     shown = np.where(np.isfinite(shown), shown, np.nan)
     here = breaks[(breaks > part.start) & (breaks < part.stop)]
     # The place in what is shown before which each gap lies, and a time inside it.

@@ -133,7 +133,7 @@ class Desk:
         for number, name, start, stop in wanted:
             shown = self.log(number).shown(name)
             drawn = trace(
-                shown.time, shown.values, start=start, stop=stop, bins=max(2, min(bins, BINS)), breaks=shown.breaks
+                shown.time, shown.numbers, start=start, stop=stop, bins=max(2, min(bins, BINS)), breaks=shown.breaks
             )
             made.append(
                 {

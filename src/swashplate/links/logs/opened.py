@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import Inspection, inspect
@@ -21,9 +20,11 @@ from swashplate.flights.readers.read import read as read_log
 from swashplate.flights.readers.source import open_source
 from swashplate.flights.readers.table_guess import guessed
 from swashplate.flights.schema import is_known
+from swashplate.flights.stored_column import StoredColumn
 from swashplate.links.logs.bins import gaps
 from swashplate.links.logs.channel_groups import field_groups, groups, shown_unit
 from swashplate.links.logs.code_lines import Read, inspected
+from swashplate.links.logs.drawn_channels import DrawnChannel, DrawnChannels
 from swashplate.links.logs.kept_mappings import kept
 from swashplate.links.logs.remedies import remedy
 
@@ -35,16 +36,6 @@ _TABLES = ("csv", "mat")
 _LOG = logging.getLogger("swashplate.open")
 _PATIENCE = 1.0
 """Seconds: a log that is checked as quickly appears with its findings, a longer one is drawn before."""
-
-
-@dataclass(frozen=True)
-class DrawnChannel:
-    """A channel as it is drawn: stamps [s], values and unit of the screen, and where it has gaps."""
-
-    time: Array
-    values: Array
-    unit: str
-    breaks: NDArray[np.int64]
 
 
 @dataclass
@@ -76,7 +67,7 @@ class Opened:
     problem: str = ""
     hint: str = ""
     version: int = 0
-    _channels: dict[str, DrawnChannel] = field(default_factory=dict, repr=False)
+    _channels: DrawnChannels = field(default_factory=DrawnChannels, repr=False)
     _groups: list[dict[str, Any]] = field(default_factory=list, repr=False)
     _gaps: dict[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
 
@@ -108,7 +99,7 @@ class Opened:
         self.read = read
         self.foreign = self._is_foreign(flight, problem)
         self.flight, self.inspection, self.problem, self.hint = flight, None, problem, hint
-        self._channels, self._gaps, self.fields, self.listed = {}, {}, None, False
+        self._channels, self._gaps, self.fields, self.listed = DrawnChannels(), {}, None, False
         self._groups = [] if flight is None else groups(flight)
         self.version += 1
         self.state = FAILED if problem or flight is None else READY
@@ -182,26 +173,35 @@ class Opened:
         return self.flight
 
     def shown(self, name: str) -> DrawnChannel:
-        """A channel in the unit of the screen, or a field as the log has it, kept for the next zoom.
+        """A channel in the unit of the screen, or a field as the log has it, kept while there is room.
 
         Raises:
             FlightError: where the log is not ready or has no such channel.
         """
-        if name not in self._channels:
-            flight = self.ready
+        channels, flight = self._channels, self.ready
+        drawn = channels.get(name)
+        if drawn is None:
             if name not in flight and self.fields is not None and name in self.fields.listed:
-                time, values = self.fields.read(name)
-                time = time - (flight.epoch or 0.0)
-                kept = DrawnChannel(time, values, self.fields.listed[name].unit, gaps(time))
-                self._channels[name] = kept
-                return kept
-            unit, factor = shown_unit(flight, name)
-            time, values, home = flight.time(name), flight.values(name), flight.stream_of(name)
-            if home not in self._gaps:
-                self._gaps[home] = gaps(time)
-            shown = values if factor == 1.0 else values * factor
-            self._channels[name] = DrawnChannel(time, shown, unit, self._gaps[home])
-        return self._channels[name]
+                time, column = self.fields.column(name)
+                time = channels.same_times(time - (flight.epoch or 0.0))
+                own = (time, column.stored)
+                drawn = DrawnChannel(time, column, self.fields.listed[name].unit, gaps(time), own)
+            else:
+                drawn = self._channel(flight, name)
+            channels.keep(name, drawn)
+        return drawn
+
+    def _channel(self, flight: Flight, name: str) -> DrawnChannel:
+        unit, factor = shown_unit(flight, name)
+        time, home = flight.time(name), flight.stream_of(name)
+        if home not in self._gaps:
+            self._gaps[home] = gaps(time)
+        stored = StoredColumn.behind(flight[name])
+        if stored is not None:
+            return DrawnChannel(time, stored.times(factor), unit, self._gaps[home])
+        values = flight.values(name)
+        shown = values if factor == 1.0 else values * factor
+        return DrawnChannel(time, shown, unit, self._gaps[home], () if factor == 1.0 else (shown,))
 
     def to_document(self) -> dict[str, Any]:
         """What the page lists of it."""

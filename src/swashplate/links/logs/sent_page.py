@@ -217,7 +217,7 @@ def _curves(log: Opened, bins: int) -> _Curves:
 
     for name in log.ready.channels:
         shown = log.shown(name)
-        drawn = trace(shown.time, shown.values, start=-np.inf, stop=np.inf, bins=bins, breaks=shown.breaks)
+        drawn = trace(shown.time, shown.numbers, start=-np.inf, stop=np.inf, bins=bins, breaks=shown.breaks)
         samples, left = samples + shown.time.size, left + drawn.time.size
         thinned += [name] if drawn.thinned else []
         ticks = np.round((drawn.time - drawn.time[0]) / _TICK).astype(np.int64)

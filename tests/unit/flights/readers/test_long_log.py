@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import tracemalloc
 from collections.abc import Sequence
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 import made_autopilot_logs as made
 import swashplate as sp
+from swashplate import files
+from swashplate.errors import FlightError
 from swashplate.flights.readers import dataflash, log_fields, source
 from swashplate.flights.readers.dataflash import Wanted
 from swashplate.flights.readers.source import Stored
@@ -93,16 +96,16 @@ def test_the_memory_is_that_of_the_channels_and_a_small_part_of_the_log(log: Pat
     assert peak < 0.9, "neither the log nor what is not asked for is in memory"
 
 
-def test_mapped_or_in_memory_the_flight_is_the_same(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mapped, stored = sp.read(log), source.open_source(log).stored
+def test_on_disk_or_in_memory_the_flight_is_the_same(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    on_disk, stored = sp.read(log), source.open_source(log).stored
     assert not isinstance(stored, bytes)
-    monkeypatch.setattr(source, "_MAPPED", SIZE * 2)
+    monkeypatch.setattr(source, "_LEFT_ON_DISK", SIZE * 2)
     assert isinstance(source.open_source(log).stored, bytes)
     flight = sp.read(log)
-    assert flight.provenance == mapped.provenance
+    assert flight.provenance == on_disk.provenance
     for name in flight.channels:
-        assert np.array_equal(flight.values(name), mapped.values(name))
-        assert np.array_equal(flight.time(name), mapped.time(name))
+        assert np.array_equal(flight.values(name), on_disk.values(name))
+        assert np.array_equal(flight.time(name), on_disk.time(name))
 
 
 def test_nobody_writes_into_numbers_that_are_made_when_they_are_looked_at(log: Path) -> None:
@@ -111,3 +114,44 @@ def test_nobody_writes_into_numbers_that_are_made_when_they_are_looked_at(log: P
         flight["p"].values[0] = 1.0
     changed = pickle.loads(pickle.dumps(flight)).with_channel("p", flight.values("p") + 1.0, like="p")
     assert changed.values("p")[0] == flight.values("p")[0] + 1.0
+
+
+def test_a_log_that_is_cut_off_while_it_is_read_is_told_and_ends_nothing(log: Path, tmp_path: Path) -> None:
+    path = tmp_path / "cut.bin"
+    path.write_bytes(log.read_bytes())
+    opened, fields = source.open_source(path), log_fields.log_fields(path)
+    assert fields is not None
+    flight = sp.read(path)
+    os.truncate(path, SIZE // 2)
+    with pytest.raises(FlightError, match="was cut off while it was read") as told:
+        dataflash.messages(opened.stored)
+    assert told.value.where == str(path)
+    with pytest.raises(FlightError, match="cut off"):
+        opened.sha256  # noqa: B018
+    with pytest.raises(FlightError, match="has changed"):
+        fields.read("LONG.V3")
+    assert np.isfinite(flight.values("p")).all(), "what was read is there"
+    assert sp.read(path).stop < flight.stop
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_bytes_on_disk_are_those_of_the_file(log: Path, at_once: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not at_once:  # as where the system cannot read at a place
+        monkeypatch.setattr(files, "READ_AT", None)
+    content, lies = log.read_bytes(), files.BytesOnDisk(log, most=1 << 30)
+    assert len(lies) == len(content)
+    for begin, end in (
+        (0, 3),
+        (5, 5),
+        (70_000, 70_010),
+        (70_008, 200_000),
+        (len(content) - 2, len(content) + 9),
+        (3, 8),
+    ):
+        assert lies[begin:end] == lies.part(begin, end) == content[begin:end]
+    last = content[-300:]
+    assert lies.find(last) == content.find(last) == len(content) - 300
+    assert lies.find(b"\xa3\x95", 100_000) == content.find(b"\xa3\x95", 100_000)
+    assert lies.find(b"nowhere in it") == -1
+    with pytest.raises(OSError, match="more than"):
+        files.BytesOnDisk(log, most=100)
