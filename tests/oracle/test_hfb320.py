@@ -35,7 +35,7 @@ from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Result
 from swashplate.identification.identify import identify
 from swashplate.identification.time.equation_error import equation_error
-from swashplate.identification.time.vehicle_likelihood import VehicleErrors
+from swashplate.identification.time.vehicle_problem import VehicleErrors
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse
 from swashplate.physics.backend import FloatBackend

@@ -1,4 +1,4 @@
-"""A vehicle as the physics of a running autopilot: ArduPilot's SITL over UDP, PX4's over TCP."""
+"""A vehicle as the physics of a running autopilot: ArduPilot's and Betaflight's SITL over UDP, PX4's over TCP."""
 
 from __future__ import annotations
 
@@ -17,8 +17,14 @@ from swashplate.control.analysis.cascade_gains import cascade_gains
 from swashplate.errors import ControllerError, SwashError
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, written_gains
 from swashplate.links.ardupilot.parameters import Parameters, parameter_file, parameters
+from swashplate.links.betaflight.binary import wait_for_sitl
+from swashplate.links.betaflight.configuration import configuration
+from swashplate.links.betaflight.gains import betaflight_gains
 from swashplate.links.betaflight.motors import MotorMapping
+from swashplate.links.betaflight.packets import MOTORS_PORT
+from swashplate.links.betaflight.pilot import hovering, pilot_for
 from swashplate.links.betaflight.servo_outputs import SwashServoMapping
+from swashplate.links.betaflight.session import BetaflightSession, serve
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.recorder import Recorder, recover
@@ -29,15 +35,17 @@ from swashplate.models.doubts import monitored
 from swashplate.models.surroundings import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
+from swashplate.simulation.linearize import linearize
 from swashplate.simulation.record import unflown
 from swashplate.simulation.sensors import InertialUnit
-from swashplate.simulation.standing import standing
+from swashplate.simulation.standing import airborne, standing
 from swashplate.simulation.stepping import MakeEngine, SteppingEngine, VirtualEngine
-from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim import Trim, trim
 
 if TYPE_CHECKING:
-    from swashplate.api.verbs.link import Link, Linking
+    from swashplate.api.verbs.link import Link, LinkBetaflight, Linking
     from swashplate.links.estimating import KnownNow
+
 
 Say = Callable[[str], None]
 _ESTIMATED = 100.0
@@ -252,3 +260,49 @@ def finish_link(plant: Plant, recorder: Recorder | None, exchanges: int, counts:
         told = f"written: {', '.join(map(str, saved))}" if saved else "nothing was flown, nothing is written."
         notice_unless_quiet(told)
     return saved
+
+
+def serve_betaflight(asked: LinkBetaflight, *, swash: str = "120") -> Linked:
+    """The physics of Betaflight's SITL, whose ports are fixed, until an interrupt.
+
+    It is waited for until it has opened its MSP port, because a state that comes before ends it.
+    """
+    vehicle = asked.whole()
+    flying, around = airborne(vehicle), asked.around(vehicle)
+    helicopter = vehicle.traits.servo_layout == "swashplate"
+    hover = trim(flying, environment=around)
+    mapping = SwashServoMapping(flying, hover, swash=swash) if helicopter else MotorMapping(vehicle)
+    if helicopter and asked.pilot:
+        raise SwashError("flies multirotors only.", channel="--pilot")
+    notices = Notices(notice)
+    with listen_udp("127.0.0.1", MOTORS_PORT) as bound:
+        plant, recorder = linked_plant(asked, "", mapping)
+        doubles = 17 if helicopter else 18
+        session = BetaflightSession(plant, mapping, linked_sensing(asked, plant), notices, doubles=doubles)
+        session.pace = asked.pace
+        if asked.pilot:
+            session.sticks = hovering(pilot_for(linearize(flying, hover), plant.standing_depth))
+        notice_unless_quiet("waiting for a SITL of Betaflight or Rotorflight (TCP 5761)")
+        wait_for_sitl(asked.wait)
+        saved: tuple[Path, ...] = ()
+        try:
+            serve(bound, session, idle_exit=asked.idle_exit)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            saved = finish_link(plant, recorder, session.exchanged.motors, notices.summary())
+    return Linked(session.exchanged.motors, plant.time, notices.summary(), saved)
+
+
+def write_betaflight_configuration(vehicle: Vehicle, path: str | Path) -> Path:
+    """Write the lines of Betaflight's command line that fly a multirotor, gains included; returns the file.
+
+    Raises:
+        SwashError: where the folder is missing, the vehicle is no multirotor, or no gains keep their margins.
+    """
+    file = Path(path)
+    if not file.absolute().parent.is_dir():
+        raise SwashError("the folder does not exist.", where=file.parent, channel="--out")
+    mapping, flying = MotorMapping(vehicle), airborne(vehicle)
+    gains = betaflight_gains(linearize(flying, trim(flying)), mapping)
+    return write_text(file, configuration(mapping, gains.settings))

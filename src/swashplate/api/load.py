@@ -15,7 +15,7 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.validation import saved
-from swashplate.validation.compare import ModelComparison
+from swashplate.validation.along_inputs import ModelComparison
 from swashplate.validation.residuals import Residuals
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification

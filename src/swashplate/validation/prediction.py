@@ -6,14 +6,15 @@ A recorded command answers gusts that no prediction knows. Where past motion exp
 runs on the recorded one turns against disturbances that it never met, and a model that fits there has taken in minus
 the controller's inverse (docs/explanation/flights-under-feedback.md). Here the controller is identified beside the
 aircraft instead: proportional to position and rate, some samples late. After a start nothing that was recorded of the
-axis is used.
+axis is used. Paths are flights that a model and its gusts might have gone on to make, as the sensors show them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,34 +36,14 @@ from swashplate.identification.time.beginning import (
     starting_samples,
 )
 from swashplate.identification.time.calibration import as_begun, calibrate
-from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.identification.time.kinematics import PREDICTED, measured_states, samples_smoothed
 from swashplate.identification.time.record_filter import FilterRun, RecordFilter, record_filter
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
+from swashplate.validation.bands import BandedRecord
 from swashplate.validation.controller_law import Law, learnt, shares_of
 
 _ARRAYS = ArrayBackend()
-
-
-def rms(rows: Array) -> Array:
-    """Root mean square over the first axis."""
-    return np.asarray(np.sqrt(np.mean(np.square(rows), axis=0)), dtype=np.float64)
-
-
-def fit_percent(predicted: Array, truth: Array, at_start: Array) -> Array:
-    """100 (1 - rms error / rms of the change since the start), per column.
-
-    Holding the last value scores 0, a perfect prediction 100; below 0 it would have been better to predict nothing.
-    """
-    return 100.0 * (1.0 - rms(predicted - truth) / rms(truth - at_start))
-
-
-def theil(predicted: Array, truth: Array, at_start: Array) -> Array:
-    """Theil's inequality coefficient of the changes since the start: 0 perfect, 1 no better than the opposite sign.
-
-    rms(error) / (rms(predicted change) + rms(true change)) (Theil 1966; Jategaonkar 2015, sec. 11.2.3).
-    """
-    return rms(predicted - truth) / (rms(predicted - at_start) + rms(truth - at_start))
 
 
 _REFERENCE = 0.5
@@ -130,27 +111,28 @@ class ObservedRecord:
 
     def calibrated(self, seconds: float, trims: Mapping[str, float]) -> ObservedRecord:
         """With delays, trims and lever arm as the record's first seconds tell them (see `calibrate`)."""
-        told = calibrate(self.vehicle, self.record, noise=self.noise, prior=self.nuisance, seconds=seconds, trims=trims)
-        return replace(self, nuisance=told)
+        vehicle, record, noise = self.vehicle, self.record, self.noise
+        nuisance = calibrate(vehicle, record, noise=noise, prior=self.nuisance, seconds=seconds, trims=trims)
+        return replace(self, nuisance=nuisance)
 
     @cached_property
-    def _flown(self) -> Vehicle:
+    def _begun_vehicle(self) -> Vehicle:
         return as_begun(self.vehicle, self.record)
 
     @cached_property
     def _filter(self) -> RecordFilter:
         names, dt = self.record.output_names, self.record.dt
-        return record_filter(stochastic_model(self._flown, names, dt, noise=self.noise))
+        return record_filter(stochastic_model(self._begun_vehicle, names, dt, noise=self.noise))
 
     @cached_property
     def _numbers(self) -> FilterNumbers:
         starting = self._commands(0)[0][: starting_samples(self.record.dt)].mean(axis=0)
-        rows = self._flown.values(), self.noise, self.nuisance, starting
+        rows = self._begun_vehicle.values(), self.noise, self.nuisance, starting
         return FilterNumbers(*(np.array(row, dtype=np.float64) for row in rows))
 
     @cached_property
     def _begin(self) -> Begun:
-        return begun(self._filter.model, self._numbers, seen_at_start(self._flown, self.record))
+        return begun(self._filter.model, self._numbers, seen_at_start(self._begun_vehicle, self.record))
 
     @cached_property
     def _run(self) -> FilterRun:
@@ -159,7 +141,7 @@ class ObservedRecord:
 
     @cached_property
     def _constants(self) -> Array:
-        return numbers_and_constants(self._flown, self._numbers.parameters)
+        return numbers_and_constants(self._begun_vehicle, self._numbers.parameters)
 
     @property
     def _body(self) -> list[int]:
@@ -173,7 +155,7 @@ class ObservedRecord:
         """Commands as they reach the vehicle and the voltage, which hold for some samples beyond the record."""
         count = self.record.time.size + beyond
         inputs, voltage = (lengthened(rows, count) for rows in (self.record.inputs, self.record.voltage))
-        return commands_moved(self._flown, self.record.dt, inputs, self.nuisance)[0], voltage
+        return commands_moved(self._begun_vehicle, self.record.dt, inputs, self.nuisance)[0], voltage
 
     @property
     def states(self) -> Array:
@@ -188,7 +170,7 @@ class ObservedRecord:
     def closed_ahead(self, laws: Sequence[Law], starts: NDArray[np.intp], ahead: int) -> Array:
         """As `ahead`, with the loops of some axes closed."""
         inputs, (reaching, voltage) = self.record.inputs, self._commands(ahead)
-        vehicle, nuisance, dt = self._flown, self.nuisance, self.record.dt
+        vehicle, nuisance, dt = self._begun_vehicle, self.nuisance, self.record.dt
         trims = np.array([getattr(nuisance, f"trim_{name}", 0.0) for name in vehicle.input_names], dtype=float)
         delays = np.where(motors(vehicle), nuisance.delay_motor, nuisance.delay_servo)
         delay_steps = np.round(delays / dt).astype(int)
@@ -196,7 +178,7 @@ class ObservedRecord:
         known = np.maximum(np.floor(delays / dt).astype(int) - 1, 0)
         reach = round(_REACH / dt)
         before = np.concatenate([np.repeat(self.states[:1], reach, axis=0), self.states])
-        shares, gains, late, references = [], [], [], []
+        shares, gains, lags, references = [], [], [], []
         for law in laws:
             share = shares_of(vehicle, law.axis)
             gain = np.array([dict(zip(law.motion, law.gains, strict=True)).get(name, 0.0) for name in PREDICTED])
@@ -206,10 +188,10 @@ class ObservedRecord:
             references.append((left[starts + 1] - left[low]) / (starts + 1 - low) + share @ trims)
             shares.append(share)
             gains.append(gain)
-            late.append(min(lag + int(delay_steps[np.flatnonzero(share)[0]]), reach - 1))
+            lags.append(min(lag + int(delay_steps[np.flatnonzero(share)[0]]), reach - 1))
         shared, back = np.array(shares), np.array([share / (share @ share) for share in shares])
         since = np.where(np.any(shared != 0.0, axis=0), known, ahead)  # from when each input answers
-        reference, answering = np.stack(references, axis=1), reach - 1 - np.array(late)
+        reference, answering = np.stack(references, axis=1), reach - 1 - np.array(lags)
         past = before[starts[:, None] + np.arange(1, reach + 1)]
         body, fade = self._body, self._fade
         x, gust, drift = (np.asarray(part)[starts] for part in self._run.states[:3])
@@ -243,8 +225,8 @@ class ObservedRecord:
         """Of the joined system about the mean flight, nose north: its transition, and the covariances of what disturbs
         it, of the sensors' noise and of what the observer makes of a reading."""
         vehicle, record = self.vehicle, self.record
-        told = vehicle.values(), self.noise, self.nuisance, [0.0]
-        rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in told))
+        numbers = vehicle.values(), self.noise, self.nuisance, [0.0]
+        rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in numbers))
         model = stochastic_model(vehicle, record.output_names, record.dt, noise=self.noise)
         A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, record)))
         predicted = steady_gain(A, C, Q, R)[2]
@@ -286,7 +268,7 @@ class ObservedRecord:
         if early is not None:
             first -= max(0, (first - round(early / record.dt)) // step) * step
         starts = np.arange(first, max(n - 1, 0), step)
-        laws = learnt(self._flown, record, self.states, axes=close_loop, seconds=settling)
+        laws = learnt(self._begun_vehicle, record, self.states, axes=close_loop, seconds=settling)
         return Predictions(
             starts=starts,
             states=self.ahead(starts, ahead),
@@ -313,3 +295,102 @@ def naive(states: Array, starts: NDArray[np.intp], ahead: int, dt: float, *, kin
     turned = (attitude * Rotation.from_rotvec(rates * time)).as_euler("ZYX")[:, ::-1]
     turned = angles + (turned - angles + np.pi) % (2 * np.pi) - np.pi
     return np.concatenate([position_ahead, velocity, turned, rates], axis=1)
+
+
+class Fan(NamedTuple):
+    """Paths of drawn models about the predictions of one record, by start, samples ahead and body state.
+
+    Attributes:
+        below: how many of the `paths` lie below what came (starts, n, 12); nonsense beyond the record's end.
+        variance: mean square of the paths about the prediction; by_parameters: that of the drawn models' predictions.
+        missed: square of what came about the prediction. wider: as `spread` was asked (12,).
+    """
+
+    paths: int
+    below: Array
+    variance: Array
+    by_parameters: Array
+    missed: Array
+    wider: Array
+
+    @property
+    def sigma(self) -> Array:
+        """Root mean square of the paths about the prediction (starts, n, 12)."""
+        return np.sqrt(self.variance)
+
+    def at(self, horizon: float, record: Record, starts: NDArray[np.intp]) -> BandedRecord:
+        """One horizon [s], from the first `starts` (those whose horizon lies within the record)."""
+        rows, last = slice(len(starts)), round(horizon / record.dt) - 1
+        below, variance, own_variance, missed = (
+            part[rows, last] for part in (self.below, self.variance, self.by_parameters, self.missed)
+        )
+        return BandedRecord(record.time[starts], below, self.paths, variance, own_variance, missed, self.wider)
+
+
+def spread(
+    views: Sequence[ObservedRecord],
+    *,
+    predictions: Predictions,
+    truth: Array,
+    longest: int | None = None,
+    wider: Array | float = 1.0,
+) -> Fan:
+    """The fan of drawn models about a model's predictions.
+
+    Args:
+        views: of `paths`. predictions: of the model itself.
+        truth: body states (n, 12) that came.
+        longest: samples ahead that count; all of the predictions' where None.
+        wider: how many times as far from the prediction the paths are taken, (12,).
+    """
+    starts, about = predictions.starts, predictions.states[:, :longest]
+    ahead = about.shape[1]
+    places = np.minimum(starts[:, None] + np.arange(1, ahead + 1), len(truth) - 1)
+    came = truth[places]
+    below, variance, own_variance = (np.zeros(about.shape) for _ in range(3))
+    for path, undisturbed in paths(views, starts=starts, ahead=ahead):
+        below += about + wider * (path - about) < came
+        variance += (wider * (path - about)) ** 2 / len(views)
+        own_variance += (wider * (undisturbed - about)) ** 2 / len(views)
+    return Fan(len(views), below, variance, own_variance, (came - about) ** 2, np.broadcast_to(wider, about.shape[-1:]))
+
+
+def paths(
+    views: Sequence[ObservedRecord], *, starts: NDArray[np.intp], ahead: int, seed: int = 0
+) -> Iterator[tuple[Array, Array]]:
+    """Of each drawn model a path and its prediction from each start: body states (starts, ahead, 12), those of the path
+    as `measured_states` would show them.
+
+    A path begins where the drawn model's own observer saw the aircraft, a draw of that observer's error aside. Gusts,
+    drifts and white accelerations are drawn anew along it, and so is the noise of the sensors. Delays, trims and lever
+    arm are what the record told the model.
+
+    Args:
+        views: a record by models that a fit cannot tell apart. starts: samples. ahead: how many samples.
+        seed: of all that is random.
+    """
+    random, before = np.random.default_rng(seed), None
+    for observed in views:
+        record = observed.record
+        half = samples_smoothed(record.dt) // 2
+        length = ahead + half
+        if observed is not before:
+            _, Q, R, P = observed.uncertainty
+            roots = [_root(part) for part in (P, Q, R)]
+            undisturbed, before = observed.ahead(starts, ahead), observed
+        aside, kicks, shaken = (
+            random.standard_normal((len(starts), *count, len(root))) @ root.T
+            for root, count in zip(roots, ((), (length,), (length,)), strict=True)
+        )
+        readings = observed.shown(starts, aside, kicks) + shaken
+        reached = record.outputs[np.maximum(starts[:, None] + np.arange(1 - half, 1), 0)]  # by the smoothing
+        joined = np.concatenate([reached, readings], axis=1)
+        flat = joined.reshape(-1, joined.shape[-1])
+        side_by_side = replace(record, time=np.linspace(0.0, record.dt * (len(flat) - 1), len(flat)), outputs=flat)
+        states = measured_states(side_by_side, observed.nuisance).reshape(*joined.shape[:2], len(PREDICTED))
+        yield states[:, half : half + ahead], undisturbed  # where the smoothing reaches no neighbour
+
+
+def _root(covariance: Array) -> Array:
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

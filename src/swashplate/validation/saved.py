@@ -26,7 +26,7 @@ KINDS: Registry[type] = Registry(
     own={
         "validation": "swashplate.validation.validation:Validation",
         "verification": "swashplate.validation.verification:Verification",
-        "comparison": "swashplate.validation.compare:ModelComparison",
+        "comparison": "swashplate.validation.along_inputs:ModelComparison",
         "residuals": "swashplate.validation.residuals:Residuals",
     },
 )

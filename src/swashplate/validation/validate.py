@@ -20,22 +20,21 @@ from swashplate.identification.time.feedback import AxisExcitation, excitation
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.record import monitored
-from swashplate.validation import innovations
 from swashplate.validation.bands import FEWEST_DRAWS, BandedRecord, bands, widening
 from swashplate.validation.contact import Contact, contact
 from swashplate.validation.controller_law import Law, check_closed
-from swashplate.validation.flight_floors import ClosedRecord, ScoredRecord, closed_floors, flight_floors, motion_of
-from swashplate.validation.paths import spread
-from swashplate.validation.prediction import (
-    SETTLING,
-    ObservedRecord,
-    Predictions,
+from swashplate.validation.floors import ClosedRecord, ScoredRecord, closed_floors, flight_floors, motion_of
+from swashplate.validation.prediction import SETTLING, ObservedRecord, Predictions, naive, spread
+from swashplate.validation.validation import (
+    Example,
+    Score,
+    Validation,
+    check_innovations,
     fit_percent,
-    naive,
+    log_likelihood,
     rms,
     theil,
 )
-from swashplate.validation.validation import Example, Score, Validation
 from swashplate.validation.verdict import JUDGED_AHEAD, THRESHOLDS, verdict
 
 _JUDGED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
@@ -194,13 +193,13 @@ def validate(
         vehicle=vehicle,
         published=published,
         scores=scores,
-        innovations=innovations.check(
+        innovations=check_innovations(
             np.concatenate([rows for rows, _ in innovated["model"]]),
             np.mean([covariance for _, covariance in innovated["model"]], axis=0),
             pieces[0].output_names,
         ),
         log_likelihood={
-            name: float(np.mean([innovations.log_likelihood(*one) for one in each])) for name, each in innovated.items()
+            name: float(np.mean([log_likelihood(*one) for one in each])) for name, each in innovated.items()
         },
         verdict=verdict(
             [s for s in scores if not (alone and s.predictor == "published card")], judged, beside, judged_bands

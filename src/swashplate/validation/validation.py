@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
@@ -20,6 +22,27 @@ from swashplate.validation.controller_law import Law
 from swashplate.validation.floors import ROWS, Floor
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
+
+
+def rms(rows: Array) -> Array:
+    """Root mean square over the first axis."""
+    return np.asarray(np.sqrt(np.mean(np.square(rows), axis=0)), dtype=np.float64)
+
+
+def fit_percent(predicted: Array, truth: Array, at_start: Array) -> Array:
+    """100 (1 - rms error / rms of the change since the start), per column.
+
+    Holding the last value scores 0, a perfect prediction 100; below 0 it would have been better to predict nothing.
+    """
+    return 100.0 * (1.0 - rms(predicted - truth) / rms(truth - at_start))
+
+
+def theil(predicted: Array, truth: Array, at_start: Array) -> Array:
+    """Theil's inequality coefficient of the changes since the start: 0 perfect, 1 no better than the opposite sign.
+
+    rms(error) / (rms(predicted change) + rms(true change)) (Theil 1966; Jategaonkar 2015, sec. 11.2.3).
+    """
+    return rms(predicted - truth) / (rms(predicted - at_start) + rms(truth - at_start))
 
 
 @dataclass(frozen=True)
@@ -212,3 +235,37 @@ class Validation(Shown):
                 lines.append(f"  {label:16s}" + "".join(f"{text:>9s}" for text in row_of))
         remarks = [*(c.summary_text for c in self.contacts), *(law.summary_text for law in self.laws), *self.bands_told]
         return "\n".join([*lines, *remarks, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])
+
+
+_LAGS = 20
+
+
+def log_likelihood(innovations: Array, covariance: Array) -> float:
+    """Mean Gaussian log-likelihood per sample of innovations (n, m) with a constant covariance (m, m)."""
+    L = np.linalg.cholesky(covariance)
+    white = np.linalg.solve(L, innovations.T)
+    m = covariance.shape[0]
+    return float(-0.5 * np.mean(np.sum(white**2, axis=0)) - np.log(np.diag(L)).sum() - 0.5 * m * np.log(2.0 * np.pi))
+
+
+def check_innovations(innovations: Array, covariance: Array, names: tuple[str, ...]) -> tuple[InnovationCheck, ...]:
+    """Size, consistency and whiteness per output (Bar-Shalom, Li and Kirubarajan 2001, sec. 5.4)."""
+    n = innovations.shape[0]
+    checks = []
+    for i, name in enumerate(names):
+        row = innovations[:, i] - innovations[:, i].mean()
+        power = float(row @ row) or 1e-300
+        correlations = [float(row[:-lag] @ row[lag:]) / power for lag in range(1, min(_LAGS, n - 1) + 1)]
+        expected = float(np.sqrt(covariance[i, i]))
+        size = float(np.sqrt(np.mean(innovations[:, i] ** 2)))
+        checks.append(
+            InnovationCheck(
+                channel=name,
+                rms=size,
+                expected=expected,
+                consistency=(size / expected) ** 2,
+                whiteness=max(map(abs, correlations), default=0.0),
+                whiteness_bound=2.576 / np.sqrt(n),
+            )
+        )
+    return tuple(checks)

@@ -29,8 +29,7 @@ from swashplate.identification.time.linear_simulation import answers
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
-from swashplate.validation.black_box import CROSSED, Ceiling
-from swashplate.validation.ceiling_along import ceiling_along
+from swashplate.validation.black_box import CROSSED, Ceiling, ceiling_along
 from swashplate.validation.floors import Floor, floors
 from swashplate.validation.noise_filter import Piece
 from swashplate.validation.refutation import OPEN, REFUTED, Judgement, judge

@@ -17,7 +17,7 @@ import pytest
 import swashplate as sp
 from swashplate.api import accept_betaflight
 from swashplate.api.accept_betaflight import accept_multirotor
-from swashplate.api.link_betaflight import write_betaflight_configuration
+from swashplate.api.link import write_betaflight_configuration
 from swashplate.api.saying import silent
 from swashplate.api.verbs.link import Accept, LinkBetaflight
 from swashplate.links.betaflight import trial

@@ -19,7 +19,7 @@ from swashplate.reporting.report import Reportable
 
 RESULTS = (
     "swashplate.api.campaigns.results:Campaign",
-    "swashplate.api.case_comparison:CaseComparison",
+    "swashplate.api.compare:CaseComparison",
     "swashplate.api.check_controller:ControllerCheck",
     "swashplate.api.decouple:DecouplingDesign",
     "swashplate.api.decouple_axes:AxesDecoupling",
@@ -33,7 +33,7 @@ RESULTS = (
     "swashplate.identification.responses.frequency_response:FrequencyResponse",
     "swashplate.simulation.derivatives_over_speed:Derivatives",
     "swashplate.simulation.trim_curve:TrimCurve",
-    "swashplate.validation.compare:ModelComparison",
+    "swashplate.validation.along_inputs:ModelComparison",
     "swashplate.validation.validation:Validation",
 )
 """What verbs return that is worth a page."""

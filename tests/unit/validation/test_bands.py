@@ -22,8 +22,7 @@ from swashplate.validation.bands import (
     widened_words,
     widening,
 )
-from swashplate.validation.paths import paths
-from swashplate.validation.prediction import ObservedRecord
+from swashplate.validation.prediction import ObservedRecord, paths
 from swashplate.validation.validate import check_draws
 
 

@@ -8,8 +8,7 @@ import pytest
 from swashplate.arrays import Array
 from swashplate.flights.flight import Flight, stream
 from swashplate.models.linear.state_space_file import parse
-from swashplate.validation.black_box import LEAK
-from swashplate.validation.ceiling_along import ceiling_along, inputs_so_far
+from swashplate.validation.black_box import LEAK, ceiling_along, inputs_so_far
 from swashplate.validation.verification import Verification
 from swashplate.validation.verify import verify
 

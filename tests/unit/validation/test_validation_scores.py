@@ -10,9 +10,16 @@ from scipy.stats import multivariate_normal
 from swashplate.identification.time.feedback import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.validation.bands import Band
-from swashplate.validation.innovations import check, log_likelihood
-from swashplate.validation.prediction import fit_percent, naive, rms, theil
-from swashplate.validation.validation import AxisVerdict, Score
+from swashplate.validation.prediction import naive
+from swashplate.validation.validation import (
+    AxisVerdict,
+    Score,
+    check_innovations,
+    fit_percent,
+    log_likelihood,
+    rms,
+    theil,
+)
 from swashplate.validation.verdict import THRESHOLDS, in_brief, verdict
 
 RNG = np.random.default_rng(1)
@@ -70,7 +77,7 @@ def test_honest_white_innovations_pass_and_others_are_told_apart() -> None:
     slow = white.copy()
     for k in range(1, 4000):
         slow[k, 1] = 0.6 * slow[k - 1, 1] + 0.8 * white[k, 1]
-    honest, coloured, large = check(slow, np.diag([1.0, 4.0, 1e-4 / 9.0]), ("x", "psi", "z"))
+    honest, coloured, large = check_innovations(slow, np.diag([1.0, 4.0, 1e-4 / 9.0]), ("x", "psi", "z"))
     assert (honest.channel, coloured.channel, large.channel) == ("x", "psi", "z")
     assert honest.consistency == pytest.approx(1.0, abs=0.1)
     assert honest.whiteness < 1.5 * honest.whiteness_bound

@@ -148,7 +148,7 @@ class LinkBetaflight(Linking):
     pilot: bool = option(default=False, help="A simulated pilot arms, takes off and hovers.")
 
     def answer(self, say: Say = silent) -> Any:
-        from swashplate.api.link_betaflight import serve_betaflight
+        from swashplate.api.link import serve_betaflight
 
         self._check_servos()
         return serve_betaflight(self)
@@ -167,7 +167,7 @@ class LinkRotorflight(LinkBetaflight):
     swash: str = option(default="120", help="Type of the swashplate.", choices=("120", "135", "140", "thru"))
 
     def answer(self, say: Say = silent) -> Any:
-        from swashplate.api.link_betaflight import serve_betaflight
+        from swashplate.api.link import serve_betaflight
 
         self._check_servos()
         return serve_betaflight(self, swash=self.swash)
@@ -186,8 +186,7 @@ class WriteParameters(Linkable[Path]):
         return self.whole()
 
     def write(self, answer: Vehicle, folder: Path, names: tuple[str, ...]) -> None:
-        from swashplate.api.link import write_ardupilot_parameters
-        from swashplate.api.link_betaflight import write_betaflight_configuration
+        from swashplate.api.link import write_ardupilot_parameters, write_betaflight_configuration
         from swashplate.simulation.trim import trim
 
         hover = trim(answer)

@@ -14,8 +14,8 @@ from swashplate.errors import SwashError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from swashplate.api.case_comparison import CaseComparison
-    from swashplate.validation.compare import ModelComparison
+    from swashplate.api.compare import CaseComparison
+    from swashplate.validation.along_inputs import ModelComparison
     from swashplate.validation.validation import Validation
     from swashplate.validation.verification import Verification
 

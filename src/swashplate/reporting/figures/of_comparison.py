@@ -28,7 +28,7 @@ from swashplate.reporting.theme import (
     shown,
     stacked,
 )
-from swashplate.validation.compare import ModelComparison
+from swashplate.validation.along_inputs import ModelComparison
 from swashplate.validation.residuals import Correlation, Residuals
 from swashplate.validation.verification import Verification
 

@@ -16,7 +16,7 @@ from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.core.scoring import Solver, minimise
 from swashplate.identification.identify import identify
-from swashplate.identification.time.vehicle_likelihood import VehicleErrors
+from swashplate.identification.time.vehicle_problem import VehicleErrors
 from swashplate.models.linear.state_space_file import parse
 from swashplate.physics.environment import Environment
 
