@@ -136,6 +136,8 @@ def _following(model: StochasticModel, rates: Statements, steps: Sequence[int]) 
     names, m = model.vehicle.state_names, len(model.vehicle.input_names)
     still, windy = split(rates, moving=(f"w[{m}]", f"w[{m + 1}]", *ROOTS), fixed="ca")
     sensed = statements(sensing(model), precision="double", inputs=["s", "g"])
+    read = {*(text for s in rates.body for text in s.reads), *rates.outputs.values()}
+    leading = [place for place in range(len(names)) if f"x[{place}]" in read]
     blanks = {
         "AHEAD": names.index("u"),
         "HEADING": names.index("psi"),
@@ -144,6 +146,11 @@ def _following(model: StochasticModel, rates: Statements, steps: Sequence[int]) 
         "AWAY": ", ".join(map(repr, AWAY)),
         "SHARES": ", ".join(map(repr, SHARES)),
         "SURE": repr(STILL),
+        "LED": len(leading),
+        "FROM": leading[0],
+        "TILL": leading[-1] + 1,
+        "LEADING": ", ".join(map(str, leading)),
+        "ROOTED": int(bool(steps)),
         "STILL_AIR": max(1, len(still.outputs)),
         "IN_STILL_AIR": print_statements(still, "double", "double", ["ca"]),
         "IN_WIND": _rates_in_c(windy, steps),

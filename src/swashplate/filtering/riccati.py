@@ -176,6 +176,16 @@ def steady_gain(A: Array, C: Array, Q: Array, R: Array) -> tuple[Array, Array, A
         return np.full((n, m), np.nan), np.full((m, m), np.nan), np.full((n, n), np.nan)
 
 
+def covariances_beside(P: Array, here: Matrices, beside: Sequence[Array]) -> Array:
+    """P of `steady_gain` for k systems that lie beside one, to first order (k, n, n).
+
+    Args:
+        P, here: of that one, and its matrices. beside: the others' A, C, Q and R, stacked.
+    """
+    A, C, Q, R = (rows - mine for rows, mine in zip(beside, here, strict=True))
+    return P + _sums(*_pushed(P, here, (A, C, Q, R)))
+
+
 def steady_gain_moved(here: Matrices, P: Array, change: Matrices) -> tuple[Array, Array]:
     """How `steady_gain` moves with its matrices: gains (k, n, m) and covariances of the innovations (k, m, m).
 

@@ -1,8 +1,10 @@
 
 /* ---- a gain that follows what is flown, for wind ---- */
 enum { L = S - N, SV = (S + V - 1) / V, NV = (N + V - 1) / V, U = @AHEAD@, H = @HEADING@,
-       Q = @NUISANCES@, CA = @STILL_AIR@ };
+       Q = @NUISANCES@, CA = @STILL_AIR@, LED = @LED@, FROM = @FROM@, TILL = @TILL@ };
 static const double unexcited[N] = {@UNEXCITED@};
+/* States on which rates depend, between FROM and TILL. */
+static const int leading[LED] = {@LEADING@};
 static const double away[4] = {@AWAY@}, shares[4] = {@SHARES@};
 
 /* Of the rates what no wind moves, and the rest. */
@@ -15,30 +17,50 @@ static void in_wind(const double *x, const double *w, const double *p, const dou
   (void)x, (void)w, (void)p, (void)cp, (void)ca, (void)root, (void)known;
 @IN_WIND@}
 
-/* to += the sum of a[k] rows[k], all so many vectors wide: up to four at a time, so that sums stay in registers. */
-static inline void gather(vec *to, const double *a, const vec *rows, int count, int width) {
+/* to += the sum of a[k] rows[k], numbers `apart` from each other and rows so many vectors, of which `width` count: up to
+   four at a time, so that sums stay in registers. few: most of the numbers are zero. */
+static inline __attribute__((always_inline)) void gather(vec *to, const double *a, int apart, int few, const vec *rows,
+                                                         int stride, int count, int width) {
   int v = 0;
   for (; v + 4 <= width; v += 4) {
     vec s0 = to[v], s1 = to[v + 1], s2 = to[v + 2], s3 = to[v + 3];
+#pragma GCC unroll 4
     for (int k = 0; k < count; ++k) {
-      const vec *row = rows + k * width + v;
-      if (a[k] != 0) s0 += a[k] * row[0], s1 += a[k] * row[1], s2 += a[k] * row[2], s3 += a[k] * row[3];
+      const vec *row = rows + k * stride + v;
+      const double by = a[k * apart];
+      if (!few || by != 0) s0 += by * row[0], s1 += by * row[1], s2 += by * row[2], s3 += by * row[3];
     }
     to[v] = s0, to[v + 1] = s1, to[v + 2] = s2, to[v + 3] = s3;
   }
   for (; v + 3 <= width; v += 3) {
     vec s0 = to[v], s1 = to[v + 1], s2 = to[v + 2];
+#pragma GCC unroll 4
     for (int k = 0; k < count; ++k) {
-      const vec *row = rows + k * width + v;
-      if (a[k] != 0) s0 += a[k] * row[0], s1 += a[k] * row[1], s2 += a[k] * row[2];
+      const vec *row = rows + k * stride + v;
+      const double by = a[k * apart];
+      if (!few || by != 0) s0 += by * row[0], s1 += by * row[1], s2 += by * row[2];
     }
     to[v] = s0, to[v + 1] = s1, to[v + 2] = s2;
   }
-  for (; v < width; ++v) {
-    vec sum = to[v];
-    for (int k = 0; k < count; ++k)
-      if (a[k] != 0) sum += a[k] * rows[k * width + v];
-    to[v] = sum;
+  for (; v + 2 <= width; v += 2) {
+    vec s0 = to[v], s1 = to[v + 1];
+#pragma GCC unroll 4
+    for (int k = 0; k < count; ++k) {
+      const vec *row = rows + k * stride + v;
+      const double by = a[k * apart];
+      if (!few || by != 0) s0 += by * row[0], s1 += by * row[1];
+    }
+    to[v] = s0, to[v + 1] = s1;
+  }
+  for (; v + 1 <= width; v += 1) {
+    vec s0 = to[v];
+#pragma GCC unroll 4
+    for (int k = 0; k < count; ++k) {
+      const vec *row = rows + k * stride + v;
+      const double by = a[k * apart];
+      if (!few || by != 0) s0 += by * row[0];
+    }
+    to[v] = s0;
   }
 }
 
@@ -57,12 +79,12 @@ static void corrected(double *s, vec P[S][SV], const double *y, const double *nu
   for (int o = 0; o < Y; ++o) {
     const int read = y[o] == y[o];
     nu[o] = read ? y[o] - expected[o] : 0;
-    for (int j = 0; j < S; ++j)
-      if ((by_s[o * S + j] *= read) != 0) gather(seen[o], by_s + o * S + j, P[j], 1, SV);
+    for (int j = 0; j < N; ++j)
+      if ((by_s[o * S + j] *= read) != 0) gather(seen[o], by_s + o * S + j, 1, 0, P[j], SV, 1, SV);
   }
   for (int q = 0; q < Y; ++q) {
     for (int o = 0; o < Y; ++o) covariance[o * Y + q] = o == q ? sensors[o] : 0;
-    for (int j = 0; j < S; ++j)
+    for (int j = 0; j < N; ++j)
       if (by_s[q * S + j] != 0)
         for (int o = 0; o < Y; ++o) covariance[o * Y + q] += seen[o][j / V][j % V] * by_s[q * S + j];
   }
@@ -83,7 +105,7 @@ static void corrected(double *s, vec P[S][SV], const double *y, const double *nu
   for (int i = 0; i < S; ++i) {
     double back[Y];
     for (int o = 0; o < Y; ++o) back[o] = -seen[o][i / V][i % V], s[i] -= back[o] * left[o];
-    gather(P[i], back, seen[0], Y, SV);
+    gather(P[i], back, 1, 0, seen[0], SV, Y, SV);
   }
 }
 
@@ -95,99 +117,117 @@ static double variance(vec P[S][SV], const int *at, const double *a, int count) 
   return sum;
 }
 
+/* Rates, and dt times their slopes by every state (a row each): those by the air speed ahead and to the right without
+   what the air itself does, since the air goes along. */
+static void slopes_in_moving_air(const double *s, const double *w, const double *p, const double *cp, double dt,
+                                 const double *north, const double *east, double *k, vec by_x[N][NV]) {
+  static const vec dp[P], dcp[CP];
+  double c[C], root[R];
+  vec dx[N], dw[W], dc[C], dk[N];
+  of_inputs(w, p, cp, c);
+  if (@ROOTED@) moving(s, w, p, cp, c, root, 0, k);
+  memset(by_x, 0, N * sizeof *by_x);
+  for (int first = 0; first < LED; first += V) {
+    memset(dx, 0, sizeof dx), memset(dw, 0, sizeof dw);
+    for (int l = 0; l < V && first + l < LED; ++l) {
+      const int at = leading[first + l];
+      dx[at][l] = 1;
+      if (at == U || at == U + 1) dw[M][l] = north[at - U], dw[M + 1][l] = east[at - U];
+    }
+    of_inputs_moved(w, p, cp, c, dw, dp, dcp, dc);
+    moving_moved(s, w, p, cp, c, root, k, dx, dw, dp, dcp, dc, dk);
+    for (int l = 0; l < V && first + l < LED; ++l) {
+      double *row = (double *)by_x[leading[first + l]];
+      for (int i = 0; i < N; ++i) row[i] = dt * dk[i][l];
+    }
+  }
+}
+
 /* One sample later, averaged over what is not known of the air speed. fade (A), white (6), added (L). */
 static void predicted(double *s, vec P[S][SV], const double *drives, double dt, const double *fade,
                       const double *white, const double *added, const double *p, const double *cp) {
   const double co = cos(s[H]), si = sin(s[H]), north[2] = {co, -si}, east[2] = {si, co};
-  double acting[A], w[W], here[N], there[N], apart[N] = {0}, by_x[N * N], by_wind[N * 2], more[N][2], root[4][R], ca[CA];
-  vec a[N][NV], h[N][NV], f[N][NV], f_turned[N][NV], g_turned[A][NV], both[A][SV], led[N][SV], scale[SV];
-  double g[N][A];
+  double acting[A], w[W], here[N], there[N], apart[N] = {0}, by_air[2][N], by_wind[2][N], root[4][R], ca[CA];
+  vec a[N][NV], f[N][NV], h[N][NV], g[A][NV], both[A][SV], led[N][SV], scale[SV];
+  bits mixed;
   for (int j = 0; j < A; ++j) acting[j] = s[N + j] + (j < 6 ? s[N + A + j] : 0);
   driving(drives, acting, w);
-  slopes_at(s, w, p, cp, M, 2, here, by_x, by_wind);
+  slopes_in_moving_air(s, w, p, cp, dt, north, east, here, a);
   in_still_air(s, w, p, cp, ca);
-  memset(more, 0, sizeof more);
+  memset(by_air, 0, sizeof by_air);
   for (int i = 0; i < 2; ++i) {
     const int at[3] = {U + i, N + 6, N + 7};
     const double entries[3] = {1, -north[i], -east[i]}, sure = @SURE@;
     const double known = variance(P, at, entries, 3), spread = sqrt(known > sure ? known : sure);
     for (int k = 0; k < 4; ++k) {
+      const double share = shares[k], slope = dt * shares[k] * away[k] / spread;
       double beside[W];
       memcpy(beside, w, sizeof beside);
       beside[M] -= away[k] * spread * north[i], beside[M + 1] -= away[k] * spread * east[i];
       in_wind(s, beside, p, cp, ca, root[0], 0, there);
-      for (int j = 0; j < N; ++j) {
-        apart[j] += shares[k] * (there[j] - here[j]);
-        more[j][i] += shares[k] * away[k] / spread * there[j];
-      }
+      for (int j = 0; j < N; ++j) apart[j] += share * (there[j] - here[j]), by_air[i][j] += slope * there[j];
     }
   }
-  memset(a, 0, sizeof a), memset(g, 0, sizeof g);
-  for (int i = 0; i < N; ++i) {
-    for (int k = 0; k < 2; ++k) more[i][k] += by_wind[i * 2] * north[k] + by_wind[i * 2 + 1] * east[k];
-    by_x[i * N + U] += more[i][0], by_x[i * N + U + 1] += more[i][1];
-    by_wind[i * 2] -= more[i][0] * north[0] + more[i][1] * north[1];
-    by_wind[i * 2 + 1] -= more[i][0] * east[0] + more[i][1] * east[1];
-    for (int j = 0; j < N; ++j) a[i][j / V][j % V] = by_x[i * N + j];
+  for (int i = 0; i < 2; ++i) {
+    double *row = (double *)a[U + i];
+    for (int j = 0; j < N; ++j) {
+      row[j] += by_air[i][j];
+      by_wind[i][j] = -(i ? by_air[0][j] * east[0] + by_air[1][j] * east[1]
+                          : by_air[0][j] * north[0] + by_air[1][j] * north[1]);
+    }
   }
-  /* f = e^(a dt) = 1 + dt a h, to fourth order; what is held acts by dt h. */
-  for (int i = 0; i < N; ++i)
-    for (int v = 0; v < NV; ++v) h[i][v] = 0.25 * dt * a[i][v];
+  /* Transposed, e^(a dt) = 1 + f, f = a h, to fourth order; what is held acts by h. */
+  memset(f, 0, sizeof f), memset(h, 0, sizeof h), memset(g, 0, sizeof g);
+  for (int i = 0; i < N; ++i) h[i][i / V][i % V] = 1;
+  for (int j = 0; j < LED; ++j)
+    for (int v = 0; v < NV; ++v) h[leading[j]][v] += 0.25 * a[leading[j]][v];
   for (int order = 3; order > 0; --order) {
-    for (int i = 0; i < N; ++i) h[i][i / V][i % V] += 1;
-    for (int i = 0; i < N; ++i) {
-      double row[N];
-      for (int k = 0; k < N; ++k) row[k] = dt / order * by_x[i * N + k];
+    for (int j = 0; j < LED; ++j) {
+      const int i = leading[j];
       memset(f[i], 0, sizeof f[i]);
-      gather(f[i], row, h[0], N, NV);
+      gather(f[i], (const double *)a[i], 1, 1, h[0], NV, N, NV);
     }
-    if (order > 1) memcpy(h, f, sizeof h);
+    for (int j = 0; order > 1 && j < LED; ++j) {
+      const int i = leading[j];
+      for (int v = 0; v < NV; ++v) h[i][v] = 1.0 / order * f[i][v];
+      h[i][i / V][i % V] += 1;
+    }
   }
-  for (int i = 0; i < N; ++i) {
-    f[i][i / V][i % V] += 1;
-    for (int j = 0; j < 6; ++j) g[i][j] = dt * h[i][pushed[j] / V][pushed[j] % V];
-    for (int k = 0; k < N; ++k)
-      for (int j = 0; j < 2; ++j) g[i][6 + j] += dt * h[i][k / V][k % V] * by_wind[k * 2 + j];
-  }
-  memset(f_turned, 0, sizeof f_turned), memset(g_turned, 0, sizeof g_turned);
-  for (int i = 0; i < N; ++i) {
-    for (int k = 0; k < N; ++k) f_turned[k][i / V][i % V] = f[i][k / V][k % V];
-    for (int j = 0; j < A; ++j) g_turned[j][i / V][i % V] = g[i][j];
-  }
+  for (int j = 0; j < 6; ++j)
+    for (int v = 0; v < NV; ++v) g[j][v] = dt * h[pushed[j]][v];
+  for (int j = 0; j < 2; ++j) gather(g[6 + j], by_wind[j], 1, 0, h[0], NV, N, NV);
   /* led: the rows of the states, of all of them; disturbances go on by themselves. */
   for (int j = 0; j < A; ++j)
     for (int v = 0; v < SV; ++v) both[j][v] = j < 6 ? P[N + j][v] + P[N + A + j][v] : P[N + j][v];
-  memset(led, 0, sizeof led);
   for (int i = 0; i < N; ++i) {
-    gather(led[i], (const double *)f[i], P[0], N, SV);
-    gather(led[i], g[i], both[0], A, SV);
+    memcpy(led[i], P[i], sizeof led[i]);
+    gather(led[i], (const double *)f[FROM] + i, NV * V, 0, P[FROM], SV, TILL - FROM, SV);
+    gather(led[i], (const double *)g + i, NV * V, 0, both[0], SV, A, SV);
   }
+  for (int l = 0; l < V; ++l) mixed[l] = l < N % V ? -1 : 0;
   for (int j = 0; j < SV * V; ++j) scale[j / V][j % V] = j >= N && j < N + A ? fade[j - N] : 1;
-  for (int i = 0; i < S; ++i) {
-    vec row[SV];
-    for (int v = 0; v < SV; ++v) row[v] = i < N ? led[i][v] : P[i][v];
-    if (i >= N && i < N + A)
-      for (int v = 0; v < SV; ++v) row[v] *= fade[i - N];
-    if (i < N) {
-      vec state[NV];
-      memset(state, 0, sizeof state);
-      const double *mine = (const double *)led[i];
-      double pushes[A];
-      for (int j = 0; j < A; ++j) pushes[j] = mine[N + j] + (j < 6 ? mine[N + A + j] + white[j] * g[i][j] : 0);
-      gather(state, mine, f_turned[0], N, NV);
-      gather(state, pushes, g_turned[0], A, NV);
-      state[i / V][i % V] += unexcited[i];
-      for (int j = 0; j < N; ++j) row[j / V][j % V] = state[j / V][j % V];
-    }
-    for (int v = 0; v < SV; ++v) row[v] *= scale[v];
-    memcpy(P[i], row, sizeof row);
+  for (int i = 0; i < N; ++i) {
+    const int from = i / V;
+    const double *mine = (const double *)led[i];
+    double pushes[A];
+    vec state[NV];
+    for (int j = 0; j < A; ++j)
+      pushes[j] = mine[N + j] + (j < 6 ? mine[N + A + j] + white[j] * ((const double *)g[j])[i] : 0);
+    memcpy(state, led[i], sizeof state);
+    gather(state + from, mine + FROM, 1, 0, f[FROM] + from, NV, TILL - FROM, NV - from);
+    gather(state + from, pushes, 1, 0, g[0] + from, NV, A, NV - from);
+    state[from][i % V] += unexcited[i];
+    for (int v = N / V; v < SV; ++v) P[i][v] = led[i][v] * scale[v];
+    for (int v = from; v < N / V; ++v) P[i][v] = state[v];
+    if (N % V) P[i][N / V] = (vec)(((bits)state[N / V] & mixed) | ((bits)P[i][N / V] & ~mixed));
   }
-  for (int i = 0; i < L; ++i) P[N + i][(N + i) / V][(N + i) % V] += added[i];
-  for (int i = 0; i < S; ++i)
-    for (int j = 0; j < i; ++j) {
-      const double one = P[i][j / V][j % V], other = P[j][i / V][i % V], even = 0.5 * (one + other);
-      P[i][j / V][j % V] = P[j][i / V][i % V] = i >= N && j < N ? other : even;
-    }
+  for (int i = N; i < S; ++i) {
+    const double kept = i < N + A ? fade[i - N] : 1;
+    for (int v = N / V; v < SV; ++v) P[i][v] *= kept * scale[v];
+    P[i][i / V][i % V] += added[i - N];
+  }
+  for (int j = 0; j < N; ++j)
+    for (int i = j + 1; i < S; ++i) ((double *)P[i])[j] = ((const double *)P[j])[i];
   step(s, w, w, acting, p, cp, dt, root);
   for (int i = 0; i < N; ++i) s[i] += dt * apart[i];
   for (int j = 0; j < A; ++j) s[N + j] *= fade[j];

@@ -12,6 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -52,9 +53,14 @@ class Errors:
     errors: Array
     factor: Array
 
+    @cached_property
+    def inverse(self) -> Array:
+        """L^-1."""
+        return np.asarray(np.linalg.inv(self.factor), dtype=np.float64)
+
     def whitened(self, rows: Array) -> Array:
         """L^-1 times rows (..., n, outputs)."""
-        inverse = np.linalg.inv(self.factor)
+        inverse = self.inverse
         if inverse.ndim == 2:
             return np.asarray((rows.reshape(-1, len(inverse)) @ inverse.T).reshape(rows.shape))
         return np.asarray((inverse @ rows[..., None])[..., 0])
@@ -221,18 +227,17 @@ class Likelihood(ABC):
 
     def _gradient(self, part: MovedErrors, white: Array) -> Array:
         """Slopes of a part's cost (m,), by d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal."""
-        weights, inverse = self._weights(white), np.linalg.inv(part.factor)
+        weights, inverse = self._weights(white), part.inverse
         weighted = white if weights is None else white * weights
         pull = weighted @ inverse if inverse.ndim == 2 else (np.swapaxes(inverse, 1, 2) @ weighted[..., None])[..., 0]
         gradient = part.slopes.reshape(len(part.slopes), -1) @ pull.ravel()
         if part.turned is not None:
-            half = np.tril(part.turned) * (1.0 - 0.5 * np.eye(white.shape[1]))
-            trace = np.trace(part.turned, axis1=-2, axis2=-1)
-            if half.ndim == 3:
-                gradient += 0.5 * len(white) * trace - np.einsum("pij,ij->p", half, weighted.T @ white)
+            lower = np.tril(np.ones((white.shape[1],) * 2)) * (1.0 - 0.5 * np.eye(white.shape[1]))
+            if part.turned.ndim == 3:
+                by_turn = 0.5 * len(white) * np.eye(white.shape[1]) - lower * (weighted.T @ white)
             else:
-                gradient += 0.5 * trace.sum(axis=1)
-                gradient -= np.einsum("pnij,ni,nj->p", half, weighted, white, optimize=True)
+                by_turn = 0.5 * np.eye(white.shape[1]) - lower * (weighted[:, :, None] * white[:, None, :])
+            gradient += part.turned.reshape(len(part.turned), -1) @ by_turn.ravel()
         return np.asarray(gradient)
 
     def _moved_here(self, row: Array) -> Iterator[MovedErrors]:

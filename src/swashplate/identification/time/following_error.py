@@ -15,6 +15,7 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
@@ -23,7 +24,7 @@ from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_code import Followed, Following, RecordSeries, driving_rows
 from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.filtering.riccati import diagonal, steady_gain
+from swashplate.filtering.riccati import covariances_beside, diagonal, steady_gain
 from swashplate.identification.core.likelihood import Errors, Likelihood, MovedErrors, factor_of
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameters import Parameterization
@@ -94,13 +95,8 @@ class FollowingError(FilterError):
         """Slopes are differences of whole runs."""
         runs, places = self._followed([row, *(row + step for step in _STEP * np.eye(len(row)))]), np.arange(len(row))
         for run, counted, part in zip(runs, self.counted, self._counted_errors(runs), strict=True):
-            nu, S = run.innovations[:, counted], run.covariances[:, counted]
-            slopes, Li = (nu[1:] - nu[0]) / _STEP, np.linalg.inv(part.factor)
-            turned = Li @ ((S[1:] - S[0]) / _STEP) @ np.swapaxes(Li, 1, 2)
-            flat = turned.reshape(len(row), -1)
-            yield MovedErrors(
-                part.number, part.errors, part.factor, places, slopes, turned, (None, 0.5 * flat @ flat.T)
-            )
+            nu, S = (np.compress(counted, rows, axis=1) for rows in (run.innovations, run.covariances))
+            yield _with_slopes(part, places, (nu[1:] - nu[0]) / _STEP, (S[1:] - S[0]) / _STEP)
 
     def _moved_here(self, row: Array) -> Iterator[MovedErrors]:
         asked = np.asarray(row, dtype=np.float64).tobytes()
@@ -158,7 +154,7 @@ class CarriedSlopes(Likelihood):
     def __init__(self, base: Likelihood) -> None:
         self.row, self.records, self._base = base.row, base.records, base
         self._tried: tuple[bytes, list[Errors]] | None = None
-        self._at: tuple[Array, list[MovedErrors]] | None = None
+        self._at: tuple[Array, list[MovedErrors], list[Array]] | None = None
 
     def errors_of(self, row: Array) -> list[Errors]:
         asked = np.asarray(row, dtype=np.float64).tobytes()
@@ -168,14 +164,16 @@ class CarriedSlopes(Likelihood):
 
     def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
         if self._at is None:
-            self._at = np.array(row), list(self._base._moved_here(row))
-        before, carried = self._at
+            exact = list(self._base._moved_here(row))
+            self._at = np.array(row), exact, [_spreads_moved(part) for part in exact]
+        before, carried, spreads = self._at
         way = row - before
         if np.any(way):
             weight = way * sum(np.sum(part.slopes**2, axis=(1, 2)) for part in carried)  # far in what shows most
             weight /= way @ weight
-            parts = zip(carried, self.errors_of(row), strict=True)
-            self._at = np.array(row), [_carried(part, now, way, weight) for part, now in parts]
+            parts = zip(carried, spreads, self.errors_of(row), strict=True)
+            further = [_carried(part, dS, now, way, weight) for part, dS, now in parts]
+            self._at = np.array(row), [part for part, _ in further], [dS for _, dS in further]
         return iter(self._at[1])
 
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
@@ -185,18 +183,26 @@ class CarriedSlopes(Likelihood):
         return self._base.comparisons(row)
 
 
-def _carried(part: MovedErrors, now: Errors, way: Array, weight: Array) -> MovedErrors:
-    """The slopes of a part where its errors and covariance are `now`, that way further, changed along it alone."""
+def _with_slopes(part: Errors, places: NDArray[np.intp], slopes: Array, dS: Array) -> MovedErrors:
+    """Errors with their slopes and those of their covariance by sample (entries, n, outputs, outputs)."""
+    turned = part.inverse @ dS @ np.swapaxes(part.inverse, -1, -2)
+    flat = turned.reshape(len(turned), -1)
+    return MovedErrors(part.number, part.errors, part.factor, places, slopes, turned, (None, 0.5 * flat @ flat.T))
+
+
+def _spreads_moved(part: MovedErrors) -> Array:
+    """Slopes of the covariance."""
     assert part.turned is not None
-    before, after = part.factor, now.factor
+    return np.asarray(part.factor @ part.turned @ np.swapaxes(part.factor, -1, -2))
+
+
+def _carried(part: MovedErrors, dS: Array, now: Errors, way: Array, weight: Array) -> tuple[MovedErrors, Array]:
+    """The slopes of a part where its errors and covariance are `now`, that way further, changed along it alone."""
     slopes = part.slopes + np.multiply.outer(weight, now.errors - part.errors - np.tensordot(way, part.slopes, 1))
-    dS = before @ part.turned @ np.swapaxes(before, -1, -2)
-    spread = (factor @ np.swapaxes(factor, -1, -2) for factor in (after, before))
-    dS += np.multiply.outer(weight, next(spread) - next(spread) - np.tensordot(way, dS, 1))
-    Li = np.linalg.inv(after)
-    turned = Li @ dS @ np.swapaxes(Li, -1, -2)
-    flat = turned.reshape(len(way), -1)
-    return MovedErrors(now.number, now.errors, after, part.places, slopes, turned, (None, 0.5 * flat @ flat.T))
+    after, before = (factor @ np.swapaxes(factor, -1, -2) for factor in (now.factor, part.factor))
+    further = np.multiply.outer(weight, after - before - np.tensordot(way, dS, 1))
+    further += dS
+    return _with_slopes(now, part.places, slopes, further), further
 
 
 def searched(likelihood: FollowingError, solver: Solver, *, start: Array) -> Optimum:
@@ -228,7 +234,10 @@ def following_from(model: StochasticModel, numbers: FilterNumbers, first: FirstM
     """
     noise, n = Noise(*numbers.noise.T), len(spread)
     matrices, fade = joined_at(model, numbers, first), model.fade(noise)
-    covariances = np.array([steady_gain(*of_row)[2] for of_row in zip(*matrices, strict=True)])
+    A, C, Q, R = (part[0] for part in matrices)
+    P = steady_gain(A, C, Q, R)[2]
+    beside = [part[1:] for part in matrices]
+    covariances = np.stack([P, *covariances_beside(P, (A, C, Q, R), beside)])
     here, added = slice(n, n + model.n_gusts), np.diagonal(matrices[2], axis1=1, axis2=2)[:, n:]
     covariances[:, :n, :n] += spread
     covariances[:, here, here] += diagonal(added[:, : model.n_gusts] / (1.0 - fade**2))
