@@ -37,10 +37,12 @@ export class Instruments {
     }
     if (cell.textContent !== text) cell.textContent = text;
   }
+  lean({ x }) {
+    const leant = `rotate(${(-DEG * x[6]).toFixed(1)}) translate(0 ${(1.2 * DEG * x[7]).toFixed(1)})`;
+    if (this.leant !== leant) this.ball.setAttribute("transform", (this.leant = leant));
+  }
   show(craft, around, rpm = true) {
     const [, , z, u, v, w, phi, theta, psi] = craft.x;
-    const lean = `rotate(${(-DEG * phi).toFixed(1)}) translate(0 ${(1.2 * DEG * theta).toFixed(1)})`;
-    if (this.lean !== lean) this.ball.setAttribute("transform", (this.lean = lean));
     const climb = u * Math.sin(theta) - Math.cos(theta) * (v * Math.sin(phi) + w * Math.cos(phi));
     this.number("height", `${(-z).toFixed(2)} m`);
     this.number("climb", `${climb.toFixed(2)} m/s`);

@@ -9,7 +9,7 @@ import { Sticks } from "./sticks.js";
 
 const $ = (id) => document.getElementById(id);
 const TOLD_EVERY = 1 / 30; // s of flight between points of charts and trails
-const CHARTS_EVERY = 100, SHOWN_EVERY = 40; // ms: charts, and numbers beside the picture
+const CHARTS_EVERY = 150, HORIZON_EVERY = 50, SHOWN_EVERY = 150; // ms: nobody reads numbers faster
 
 let scene;
 try {
@@ -19,7 +19,7 @@ try {
   $("trouble").textContent = "This browser draws no 3D (WebGL is off); charts, sticks and recordings work.";
 }
 const instruments = new Instruments($("instruments")), pace = new Pace(Boolean(scene?.software));
-let charts = null, hello = null, now = null, before = null, charted = 0, drawn = 0, drawnTime = 0, chartsAt = 0, shownAt = 0;
+let charts = null, hello = null, now = null, before = null, charted = 0, drawn = 0, drawnTime = 0, chartsAt = 0, leantAt = 0, shownAt = 0;
 let fanBegun = null;
 let sent = "";
 
@@ -73,6 +73,10 @@ function draw() {
   for (const name of ["own", "ghost", "logged"]) if (now[name]) rows[name] = ahead(name, late);
   rows.fan = now.fan?.x;
   scene?.draw(rows, now, elapsed);
+  if (begun - leantAt >= HORIZON_EVERY) {
+    leantAt = begun;
+    instruments.lean(now.own);
+  }
   if (begun - shownAt >= SHOWN_EVERY) {
     shownAt = begun;
     panel.show(now);

@@ -66,6 +66,7 @@ function draw(now) {
   }
   draw.time = time;
   index = k;
+  instruments.lean(own);
   instruments.show(own, "", flight.picture.rpm);
   if (now - chartsAt > CHARTS_EVERY || !playing) {
     chartsAt = now;
