@@ -16,14 +16,9 @@ from scipy.optimize import least_squares
 from swashplate.arrays import Array, Complex
 from swashplate.bench.record import BenchRecord
 from swashplate.bench.refusals import refuse_idle
-from swashplate.bench.result import BenchCheck, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchResult, Curve, Procedure
 from swashplate.bench.virtual_bench import RecordSchedule
 from swashplate.errors import BenchError
-
-NAME = "drive_frequency"
-TITLE = "Drive trains by frequency response"
-SOURCE = "Fankhauser et al., eq. 15; periodic excitation as Pintelon and Schoukens (2012), ch. 2"
-COLUMNS = ("motor_lower", "motor_upper", "omega_lower", "omega_upper")
 
 HARMONICS = (1, 2, 3, 5, 8, 13, 21)
 PERIOD = 10.0
@@ -31,7 +26,7 @@ PERIOD = 10.0
 _AMPLITUDE = 0.06
 
 
-def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
+def schedule_response(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Four periods of a multisine on each motor around 0.55, the other at hover; the first period settles."""
     rate, records = 100.0, []
     time = np.arange(round(4 * PERIOD * rate)) / rate
@@ -41,11 +36,15 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     for rotor, other in (("upper", "lower"), ("lower", "upper")):
         driving = {f"motor_{rotor}": 0.55 + wave, f"motor_{other}": np.full(time.size, hover[f"motor_{other}"])}
         about = f"multisine on the {rotor} motor, 0.1 to 2.1 Hz, +-0.06 around 0.55, 4 periods of 10 s"
-        records.append(RecordSchedule(f"multisine_{rotor}", (NAME,), driving, np.ones(time.size), rate, about=about))
+        records.append(
+            RecordSchedule(
+                f"multisine_{rotor}", (DRIVE_FREQUENCY.name,), driving, np.ones(time.size), rate, about=about
+            )
+        )
     return records
 
 
-def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+def estimate_response(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
     """`tau_drive` of the rotors whose motors the records excite.
 
     Raises:
@@ -106,14 +105,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         )
     files = {name: (record.name,) for name, record in zip(names, records, strict=True)}
     return BenchResult.of(
-        (NAME, TITLE, SOURCE),
-        records,
-        checks,
-        curves,
-        names=names,
-        values=values,
-        covariance=variances,
-        records_of=files,
+        DRIVE_FREQUENCY, records, checks, curves, names=names, values=values, covariance=variances, records_of=files
     )
 
 
@@ -130,3 +122,14 @@ def _coefficients(record: BenchRecord, channel: str) -> Complex:
         )
     parts = values[length : periods * length].reshape(periods - 1, length)
     return np.asarray(np.fft.rfft(parts, axis=1)[:, list(HARMONICS)] / length)
+
+
+DRIVE_FREQUENCY = Procedure(
+    "drive_frequency",
+    "Drive trains by frequency response",
+    "Fankhauser et al., eq. 15; periodic excitation as Pintelon and Schoukens (2012), ch. 2",
+    ("motor_lower", "motor_upper", "omega_lower", "omega_upper"),
+    estimate_response,
+    schedule_response,
+    in_time=True,
+)

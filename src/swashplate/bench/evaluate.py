@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from types import ModuleType
 
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.bench import (
-    bar_linkage,
-    bar_motion,
-    drive_frequency,
-    drive_steps,
-    fuselage_drag,
-    phase_lag,
-    servo_steps,
-    single_rotor,
-    speed_map,
-    supply,
-    supply_compensated,
-    swashplate,
-    thrust,
-)
+from swashplate.bench.drive_frequency import DRIVE_FREQUENCY
+from swashplate.bench.fuselage_drag import FUSELAGE_DRAG
 from swashplate.bench.joint import Joint
+from swashplate.bench.lag import BAR_MOTION, DRIVE_STEPS, SERVO_STEPS
+from swashplate.bench.phase_lag import PHASE_LAG
 from swashplate.bench.record import BenchRecord
 from swashplate.bench.refusals import (
     refuse_exchanged,
@@ -33,7 +21,11 @@ from swashplate.bench.refusals import (
     refuse_saturated,
     refuse_stalled,
 )
-from swashplate.bench.result import Bench, BenchDetails, BenchResult
+from swashplate.bench.result import Bench, BenchDetails, BenchResult, Procedure
+from swashplate.bench.speed_map import SPEED_MAP
+from swashplate.bench.supply import COMPENSATED, SUPPLY
+from swashplate.bench.thrust import NAMES, SINGLE_ROTOR, THRUST
+from swashplate.bench.tilt import BAR_LINKAGE, SWASHPLATE
 from swashplate.bench.virtual_bench import RecordSchedule
 from swashplate.errors import BenchError
 from swashplate.identification.core.accuracy import blind_directions
@@ -42,31 +34,17 @@ from swashplate.identification.core.sources import DataSource
 from swashplate.models.card import Card
 from swashplate.models.vehicle import Vehicle
 
-_MODULES: tuple[ModuleType, ...] = (
-    supply,
-    supply_compensated,
-    speed_map,
-    thrust,
-    single_rotor,
-    drive_steps,
-    drive_frequency,
-    phase_lag,
-    swashplate,
-    servo_steps,
-    bar_linkage,
-    bar_motion,
-    fuselage_drag,
+_ORDERED = (
+    *(SUPPLY, COMPENSATED, SPEED_MAP, THRUST, SINGLE_ROTOR, DRIVE_STEPS, DRIVE_FREQUENCY, PHASE_LAG),
+    *(SWASHPLATE, SERVO_STEPS, BAR_LINKAGE, BAR_MOTION, FUSELAGE_DRAG),
 )
-PROCEDURES: Mapping[str, ModuleType] = {module.NAME: module for module in _MODULES}
+PROCEDURES: Mapping[str, Procedure] = {procedure.name: procedure for procedure in _ORDERED}
 """Every procedure, in an order in which each finds what it takes as known already measured."""
-
-_IN_TIME = (drive_steps, drive_frequency, servo_steps, bar_motion)
-"""Procedures that need samples at a fixed rate."""
 
 MEASURED = (
     "k_drive_voltage",
     *(f"{k}_drive_{rotor}" for rotor in ("upper", "lower") for k in ("k", "o")),
-    *thrust.NAMES,
+    *NAMES,
     "tau_drive_upper",
     "tau_drive_lower",
     "k_zeta_lower",
@@ -91,12 +69,7 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
     Args:
         hover: `motor_lower` and `motor_upper` at hover.
     """
-    records: list[RecordSchedule] = []
-    for module in _MODULES:
-        planned: Callable[[Mapping[str, float]], list[RecordSchedule]] | None = getattr(module, "schedules", None)
-        if planned is not None:
-            records += planned(hover)
-    return records
+    return [one for procedure in _ORDERED if procedure.schedules for one in procedure.schedules(hover)]
 
 
 def hover_commands(card: Mapping[str, float], gravity: float = 9.81) -> dict[str, float]:
@@ -190,9 +163,9 @@ def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:
                     where=record.name,
                     hint="Correct the line '# procedure:' of its header.",
                 )
-            if PROCEDURES[name] in _IN_TIME:
+            if PROCEDURES[name].in_time:
                 _ = record.dt  # says that a table of points does not do
-            for column in PROCEDURES[name].COLUMNS:
+            for column in PROCEDURES[name].columns:
                 _ = record[column]  # says what is missing
             by_procedure.setdefault(name, []).append(record)
     return {name: by_procedure[name] for name in PROCEDURES if name in by_procedure}

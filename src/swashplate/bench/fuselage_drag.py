@@ -16,28 +16,23 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.bench.checks import check_line_drift, check_settled, check_structure, check_vibration
 from swashplate.bench.record import BenchRecord
-from swashplate.bench.result import BenchCheck, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchResult, Curve, Procedure
 from swashplate.bench.steady import fit_line, nuisance, steady_points
 from swashplate.bench.virtual_bench import RecordSchedule, points
 from swashplate.errors import BenchError
-
-NAME = "fuselage_drag"
-TITLE = "Fuselage drag in a fan's stream"
-SOURCE = "Fankhauser et al., sec. IV-A6 and eq. 7"
-COLUMNS = ("point", "omega_lower", "omega_upper")
 
 _AXES = (("airspeed_x", "Fx", "drag_x"), ("airspeed_y", "Fy", "drag_y"))
 _STANDING = 30.0  # rad/s
 
 
-def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
+def schedule_drag(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """The fan from the front and from the right at 0 to 4 m/s."""
     records = []
     for axis, side in (("airspeed_x", "front"), ("airspeed_y", "right")):
         speeds = (0.0, 1.0, 2.0, 3.0, 4.0)
         settings = [{axis: v} for v in (*speeds, *speeds[::-1]) * 2]
         text = f"rotors off; fan from the {side} at 0, 1, 2, 3, 4 m/s, up and down, twice"
-        records.append(points(f"fan_{side}", (NAME,), settings, settle=1.0, hold=4.0, about=text))
+        records.append(points(f"fan_{side}", (FUSELAGE_DRAG.name,), settings, settle=1.0, hold=4.0, about=text))
     return records
 
 
@@ -57,7 +52,7 @@ def _refuse_across(record: BenchRecord, speed: str, force: str, drag: float, pus
         )
 
 
-def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+def estimate_drag(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
     """`drag_x` and `drag_y` at the card's air density.
 
     Raises:
@@ -71,7 +66,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 "varies no single stream.", where=record.name, hint="Vary airspeed_x or airspeed_y, one a record."
             )
         speed, force, name = blown[0]
-        steady = steady_points(record, (*COLUMNS[1:], speed, force))
+        steady = steady_points(record, (*FUSELAGE_DRAG.columns[1:], speed, force))
         if max(steady["omega_lower"].max(), steady["omega_upper"].max()) > _STANDING:
             raise BenchError("a rotor turns.", where=record.name, channel="omega", hint="Take it with rotors off.")
         density = record.number("air_density", card["air_density"]) / card["air_density"]
@@ -104,12 +99,15 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     checks.append(BenchCheck("The mount's own drag is in these numbers unless it was measured alone and subtracted."))
     files = {name: (record.name,) for name, record in zip(names, records, strict=True)}
     return BenchResult.of(
-        (NAME, TITLE, SOURCE),
-        records,
-        checks,
-        curves,
-        names=names,
-        values=values,
-        covariance=variances,
-        records_of=files,
+        FUSELAGE_DRAG, records, checks, curves, names=names, values=values, covariance=variances, records_of=files
     )
+
+
+FUSELAGE_DRAG = Procedure(
+    "fuselage_drag",
+    "Fuselage drag in a fan's stream",
+    "Fankhauser et al., sec. IV-A6 and eq. 7",
+    ("point", "omega_lower", "omega_upper"),
+    estimate_drag,
+    schedule_drag,
+)

@@ -19,18 +19,13 @@ from scipy import stats
 from swashplate.arrays import Array
 from swashplate.bench.checks import check_line_drift, check_settled, check_structure, check_vibration
 from swashplate.bench.record import BenchRecord
-from swashplate.bench.result import BenchCheck, BenchFinding, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchFinding, BenchResult, Curve, Procedure
 from swashplate.bench.steady import fit_line, nuisance, steady_points
 from swashplate.bench.virtual_bench import RecordSchedule, points
 from swashplate.errors import BenchError
 
-NAME = "phase_lag"
-TITLE = "Phase lag against rotor speed"
-SOURCE = "Fankhauser et al., sec. IV-A3 and eq. 21"
-COLUMNS = ("point", "motor_lower", "servo_pitch", "omega_lower", "Mx", "My")
 
-
-def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
+def schedule_phase_lag(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Pitch servo at +-0.4 at seven speeds of the lower rotor."""
     settings = [
         {"motor_lower": u, "motor_upper": hover["motor_upper"], "servo_pitch": s}
@@ -38,10 +33,10 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
         for s in (0.4, -0.4, -0.4, 0.4)
     ]
     about = "lower motor 0.45 to 0.75 in steps of 0.05; at each the pitch servo at 0.4, -0.4, -0.4, 0.4; upper at hover"
-    return [points("phase_lag", (NAME,), settings, settle=1.2, about=about)]
+    return [points("phase_lag", (PHASE_LAG.name,), settings, settle=1.2, about=about)]
 
 
-def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+def estimate_phase_lag(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
     """`k_zeta_lower`, and the offset as a finding.
 
     Raises:
@@ -53,7 +48,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     sigmas: list[float] = []
     checks: list[BenchCheck] = []
     for record in records:
-        steady = steady_points(record, COLUMNS[1:])
+        steady = steady_points(record, PHASE_LAG.columns[1:])
         levels = np.unique(np.round(steady["motor_lower"], 6))
         inside = (np.abs(steady["motor_lower"][:, None] - levels) < 1e-5).astype(np.float64)
         slopes = [*(inside * steady["servo_pitch"][:, None]).T]
@@ -102,7 +97,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     curve = Curve("Phase lag of the lower rotor", *axes, omega, np.degrees(lag), ends, fitted)
     offset = BenchFinding("o_zeta_lower on the bench", float(line.values[1]), float(np.sqrt(covariance[1, 1])), "rad")
     return BenchResult.of(
-        (NAME, TITLE, SOURCE),
+        PHASE_LAG,
         records,
         checks,
         (curve,),
@@ -120,3 +115,13 @@ def _promised(omega: Array, sigma: Array, residuals: Array) -> Array:
     square = float(np.sum((residuals / sigma) ** 2))
     wider = square / freedom if stats.chi2.sf(square, freedom) < 0.01 else 1.0
     return np.asarray(wider * np.linalg.inv(matrix.T @ matrix), dtype=np.float64)
+
+
+PHASE_LAG = Procedure(
+    "phase_lag",
+    "Phase lag against rotor speed",
+    "Fankhauser et al., sec. IV-A3 and eq. 21",
+    ("point", "motor_lower", "servo_pitch", "omega_lower", "Mx", "My"),
+    estimate_phase_lag,
+    schedule_phase_lag,
+)

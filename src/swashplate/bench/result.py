@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,9 @@ from swashplate.arrays import Array
 from swashplate.bench.record import BenchRecord
 from swashplate.identification.core.result import Result
 from swashplate.models.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from swashplate.bench.virtual_bench import RecordSchedule
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ class BenchResult:
     @classmethod
     def of(
         cls,
-        procedure: tuple[str, str, str],
+        procedure: Procedure,
         records: Sequence[BenchRecord],
         checks: Sequence[BenchCheck],
         curves: Sequence[Curve],
@@ -132,7 +135,6 @@ class BenchResult:
         """A procedure's result from lists.
 
         Args:
-            procedure: its name, title and source.
             records, checks, curves: as the attributes.
             names, values: of parameters of the card; none where findings are all that there is.
             covariance: of the values, shape (p, p), or their variances, shape (p,).
@@ -140,7 +142,9 @@ class BenchResult:
         """
         table = np.zeros((len(names),) * 2) if covariance is None else np.asarray(covariance, dtype=np.float64)
         return cls(
-            *procedure,
+            procedure.name,
+            procedure.title,
+            procedure.source,
             tuple(names),
             np.asarray(values, dtype=np.float64),
             np.diag(table) if table.ndim == 1 else table,
@@ -158,6 +162,27 @@ class BenchResult:
         """Value and standard deviation of a parameter."""
         place = self.names.index(name)
         return float(self.values[place]), float(self.sigma[place])
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """One measurement of the bench.
+
+    Attributes:
+        name: as in a record's header. title: what it measures. source: author, year and equation of its formula.
+        columns: that its records must have.
+        estimate: its numbers from records and the card's values.
+        schedules: its records by the commands of hover; None where others plan them.
+        in_time: whether it needs samples at a fixed rate.
+    """
+
+    name: str
+    title: str
+    source: str
+    columns: tuple[str, ...]
+    estimate: Callable[[Sequence[BenchRecord], Mapping[str, float]], BenchResult]
+    schedules: Callable[[Mapping[str, float]], list[RecordSchedule]] | None = None
+    in_time: bool = False
 
 
 def weigh(values: Sequence[float], sigmas: Sequence[float]) -> tuple[float, float]:

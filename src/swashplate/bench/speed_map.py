@@ -16,17 +16,13 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.bench.checks import check_settled, check_structure
 from swashplate.bench.record import BenchRecord
-from swashplate.bench.result import BenchCheck, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchResult, Curve, Procedure
 from swashplate.bench.steady import fit_line, steady_points
 from swashplate.bench.virtual_bench import RecordSchedule, points
 from swashplate.errors import BenchError
 
 Mask = NDArray[np.bool_]
 
-NAME = "speed_map"
-TITLE = "Speed maps of the drive trains"
-SOURCE = "Fankhauser et al., sec. IV-A1 and eq. 22"
-COLUMNS = ("point", "motor_lower", "motor_upper", "omega_lower", "omega_upper")
 NOT_RECORDED = "not recorded"
 """What a header's line `voltage` says instead of the column `voltage`."""
 
@@ -35,7 +31,7 @@ BEND = 0.25
 """Share by which the slope between neighbours may differ from the slope of the middle before a point is left out."""
 
 
-def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
+def schedule_maps(hover: Mapping[str, float]) -> list[RecordSchedule]:
     """Sweeps of each motor up and down while the other holds hover; thrust and torque come from the same records."""
     records = []
     for rotor, other in (("upper", "lower"), ("lower", "upper")):
@@ -43,7 +39,13 @@ def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
         sweep = [{**held, f"motor_{rotor}": u} for u in (*LEVELS[1:], *LEVELS[:0:-1])]
         about = f"{rotor} motor 0.30 to 0.85 in steps of 0.05, up and down; {other} at hover; both off first and last"
         records.append(
-            points(f"sweep_{rotor}", (NAME, "thrust"), [{f"motor_{rotor}": 0.0}, *sweep, {}], settle=1.5, about=about)
+            points(
+                f"sweep_{rotor}",
+                (SPEED_MAP.name, "thrust"),
+                [{f"motor_{rotor}": 0.0}, *sweep, {}],
+                settle=1.5,
+                about=about,
+            )
         )
     return records
 
@@ -116,7 +118,7 @@ def fit_map(command: Array, speed: Array, *, where: str = "", rotor: str = "") -
     return line.values, line.covariance, kept, reasons
 
 
-def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+def estimate_maps(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
     """`k_drive` and `o_drive` of the rotors that the records sweep.
 
     Args:
@@ -135,7 +137,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         u, speed, above, where = [], [], [], ", ".join(r.name for r in swept)
         for record in swept:
             known = record.header.get("voltage") != NOT_RECORDED
-            steady = steady_points(record, (*COLUMNS[1:], *(["voltage"] if known else [])))
+            steady = steady_points(record, (*SPEED_MAP.columns[1:], *(["voltage"] if known else [])))
             steady = steady.where_true(steady[f"motor_{rotor}"] > 0.0)
             above.append(steady["voltage"] - card["voltage_nominal"] if known else np.zeros(len(steady)))
             u.append(steady[f"motor_{rotor}"])
@@ -169,7 +171,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     for place, block in enumerate(blocks):
         covariance[2 * place : 2 * place + 2, 2 * place : 2 * place + 2] = block
     return BenchResult.of(
-        (NAME, TITLE, SOURCE),
+        SPEED_MAP,
         records,
         checks,
         curves,
@@ -207,3 +209,13 @@ def _is_sweep(record: BenchRecord, rotor: str) -> bool:
     """Whether this rotor's motor is the one that takes the more levels."""
     counts = {name: np.unique(np.round(record[f"motor_{name}"], 6)).size for name in ("lower", "upper")}
     return counts[rotor] == max(counts.values())
+
+
+SPEED_MAP = Procedure(
+    "speed_map",
+    "Speed maps of the drive trains",
+    "Fankhauser et al., sec. IV-A1 and eq. 22",
+    ("point", "motor_lower", "motor_upper", "omega_lower", "omega_upper"),
+    estimate_maps,
+    schedule_maps,
+)

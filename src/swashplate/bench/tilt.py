@@ -18,12 +18,16 @@ from scipy.optimize import least_squares
 from swashplate.arrays import Array
 from swashplate.bench.checks import check_drift, check_settled, check_structure, check_vibration
 from swashplate.bench.record import BenchRecord
-from swashplate.bench.result import BenchCheck, BenchFinding, BenchResult, Curve
+from swashplate.bench.result import BenchCheck, BenchFinding, BenchResult, Curve, Procedure
 from swashplate.bench.steady import SteadyLine, SteadyPoints, nuisance, steady_points
+from swashplate.bench.virtual_bench import RecordSchedule, points
 from swashplate.errors import BenchError
 from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend
+from swashplate.physics.frames import Euler
 from swashplate.physics.rotor import TipPathPlane
+from swashplate.physics.stabilizer_bar import StabilizerBar, upper_tip_path_plane
+from swashplate.physics.swashplate import swashplate_tilt
 
 _UNLIKE = 0.25
 """Largest share of a channel's square that the fitted tilt may leave."""
@@ -218,26 +222,23 @@ def _checks(points: SteadyPoints, fit: TiltFit, setting: Array) -> list[BenchChe
     return checks
 
 
-def tilt_result(
-    module: tuple[str, str, str],
+def _tilt_result(
+    procedure: Procedure,
     records: Sequence[BenchRecord],
     card: Mapping[str, float],
     deflections: Deflections,
     *,
     rotor_name: str,
-    channels: Sequence[str],
     settings: tuple[str, str],
 ) -> BenchResult:
     """Linkage and hub stiffness of one rotor from its record; the phase lag is a finding.
 
     Args:
-        module: name, title and source of the procedure.
         records: one; more than one would need the lag at each speed.
         card: `k_thrust`, `hub_height` of the rotor and `air_density` are held.
         deflections: what steers the rotor.
         rotor_name: "upper" or "lower".
-        channels: that the steady points need beside the loads.
-        settings: the two of them that are set.
+        settings: the two columns that are set.
 
     Raises:
         BenchError: as `fit_tilt`, or for more than one record.
@@ -247,7 +248,7 @@ def tilt_result(
             f"{len(records)} records, expected one.", where=", ".join(r.name for r in records), hint="Join them."
         )
     (record,) = records
-    points = steady_points(record, (*channels, *CHANNELS))
+    points = steady_points(record, procedure.columns[1:])
     names = (f"linkage_{rotor_name}", f"hub_stiffness_{rotor_name}")
     factor, height = f"k_thrust_{rotor_name}", f"hub_height_{rotor_name}"
     density = record.number("air_density", card["air_density"]) / card["air_density"]
@@ -259,7 +260,9 @@ def tilt_result(
     setting = np.round(points[settings[0]], 3) + 1e3 * np.round(points[settings[1]], 3)
     pair, leans = [0, 2], {factor: fit.by_thrust / card[factor], height: fit.by_height / card[height]}
     return BenchResult(
-        *module,
+        procedure.name,
+        procedure.title,
+        procedure.source,
         names,
         fit.values[pair],
         fit.covariance[np.ix_(pair, pair)],
@@ -277,3 +280,96 @@ def tilt_result(
             ),
         ),
     )
+
+
+def schedule_swashplate(hover: Mapping[str, float]) -> list[RecordSchedule]:
+    """Servos through +-0.75 (6 degrees) on both axes, at hover."""
+    levels = (0.15, 0.3, 0.45, 0.6, 0.75)
+    settings = [{**hover, axis: sign * s} for axis in ("servo_pitch", "servo_roll") for s in levels for sign in (1, -1)]
+    about = "hover; pitch then roll servo at +-0.15 to +-0.75 in steps of 0.15; back through the same points"
+    return [
+        points("swashplate", (SWASHPLATE.name,), [hover, *settings, *settings[::-1], hover], settle=1.0, about=about)
+    ]
+
+
+def estimate_swashplate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+    """`linkage_lower` and `hub_stiffness_lower` from steady commands of the servos; the lag at hover is a finding.
+
+    What spoils it: vibration (told by the samples' scatter), ground effect on the thrust that is held, a CG other than
+    the one that the moments refer to, an airframe that bends, a trim that is not zero (it is taken out as a bias as
+    long as it does not change), and a sensor near its range.
+
+    Args:
+        records: one.
+        card: `k_thrust_lower`, `hub_height_lower`, `air_density` are held.
+    """
+    return _tilt_result(
+        SWASHPLATE, records, card, _by_servos, rotor_name="lower", settings=("servo_roll", "servo_pitch")
+    )
+
+
+def _by_servos(steady: SteadyPoints) -> Steering:
+    roll, pitch = steady["servo_roll"], steady["servo_pitch"]
+
+    def steering(i: int, linkage: float, lag: float) -> TipPathPlane:
+        return swashplate_tilt(float(roll[i]), float(pitch[i]), linkage=linkage, lag=lag, mixing="rotation", xp=XP)
+
+    return steering
+
+
+SWASHPLATE = Procedure(
+    "swashplate",
+    "Swashplate: tilt and flapping of the lower rotor",
+    "Fankhauser et al., sec. IV-A4, eqs 6, 13, 14 and 18, Fig. 6",
+    ("point", "motor_lower", "servo_roll", "servo_pitch", "omega_lower", *CHANNELS),
+    estimate_swashplate,
+    schedule_swashplate,
+)
+
+
+_LEVEL = Euler(0.0, 0.0, 0.0)
+
+
+def schedule_bar_linkage(hover: Mapping[str, float]) -> list[RecordSchedule]:
+    """The bar held at up to 0.2 rad about both axes, at hover."""
+    angles = [(axis, sign * a) for axis in ("bar_alpha", "bar_beta") for a in (0.1, 0.2) for sign in (1.0, -1.0)]
+    settings = [{**hover, axis: angle} for axis, angle in angles]
+    about = "hover; bar held at +-0.1 and +-0.2 rad about x, then about y; back through the same points"
+    return [
+        points("bar_linkage", (BAR_LINKAGE.name,), [hover, *settings, *settings[::-1], hover], settle=1.0, about=about)
+    ]
+
+
+def estimate_bar_linkage(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+    """`linkage_upper` and `hub_stiffness_upper` from a bar that a magnet holds deflected; the lag is a finding.
+
+    (alpha, beta)_up = l_up R (alpha, beta)_bar             (Fankhauser et al., sec. IV-A5, eqs 10, 11 and Fig. 7)
+
+    What spoils it: vibration, ground effect, a magnet that lets the bar wobble, a deflection that is read off with the
+    rotor at rest, and the downwash on the magnet's arm.
+
+    Args:
+        records: one.
+        card: `k_thrust_upper`, `hub_height_upper`, `air_density` are held.
+    """
+    return _tilt_result(BAR_LINKAGE, records, card, _by_bar, rotor_name="upper", settings=("bar_alpha", "bar_beta"))
+
+
+def _by_bar(steady: SteadyPoints) -> Steering:
+    alpha, beta = steady["bar_alpha"], steady["bar_beta"]
+
+    def steering(i: int, linkage: float, lag: float) -> TipPathPlane:
+        bar = StabilizerBar(float(alpha[i]), float(beta[i]))
+        return upper_tip_path_plane(bar, _LEVEL, linkage=linkage, lag=lag, mixing="rotation", xp=XP)
+
+    return steering
+
+
+BAR_LINKAGE = Procedure(
+    "bar_linkage",
+    "Stabilizer bar: linkage to the upper rotor",
+    "Fankhauser et al., sec. IV-A5, eqs 6, 10, 11 and 18, Fig. 7",
+    ("point", "motor_upper", "omega_upper", "bar_alpha", "bar_beta", *CHANNELS),
+    estimate_bar_linkage,
+    schedule_bar_linkage,
+)
