@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
@@ -83,3 +84,12 @@ def step_back(process: int) -> None:
     if hasattr(os, "setpriority"):
         with suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, process, 10)
+
+
+def free_memory() -> None:
+    """Hand memory that nothing uses back to the system, where the C library keeps it for later (glibc)."""
+    if sys.platform == "linux":
+        import ctypes  # not before it is needed
+
+        with suppress(OSError, AttributeError):  # musl has none
+            ctypes.CDLL(None).malloc_trim(0)

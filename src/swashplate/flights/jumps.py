@@ -114,7 +114,8 @@ def _turns(flight: Flight, group: tuple[str, ...]) -> Changes:
     """The rotation from sample to sample [rad] about three axes, blind to flips of sign and to whole turns."""
     table, time = flight.array(group), flight.time(group[0])
     good = np.isfinite(table).all(axis=1)
-    time, table = time[good], table[good]
+    if not good.all():
+        time, table = time[good], table[good]
     turned = np.empty((3, max(time.size - 1, 0)))
     for begin in range(0, turned.shape[1], _BLOCK):
         turned[:, begin : begin + _BLOCK] = _turned(group, table[begin : begin + _BLOCK + 1])
@@ -169,13 +170,17 @@ def _impossible(changes: Changes, kind: str) -> NDArray[np.bool_]:
         return np.zeros(rows.shape[1], dtype=np.bool_)
     steps = np.diff(time)
     steps = np.maximum(steps, np.median(steps))  # stamps that bunch are no acceleration
-    speed = rows / steps
-    if order == 2:
-        from scipy.ndimage import median_filter  # a quarter of a second that a flight without jumps need not wait
-
-        speed = (speed - median_filter(speed, size=(1, 5), mode="nearest")) / steps
     most = _IMPOSSIBLE_TURN if kind in ("attitude", *ATTITUDE) else _IMPOSSIBLE
-    return np.asarray(np.any(np.abs(speed) > most, axis=0))
+    beyond = np.zeros(rows.shape[1], dtype=np.bool_)
+    for row in rows:  # one at a time, as the channels
+        speed = row / steps
+        if order == 2:
+            from scipy.ndimage import median_filter  # a quarter of a second that a flight without jumps need not wait
+
+            speed -= median_filter(speed, size=5, mode="nearest")
+            speed /= steps
+        beyond |= np.abs(speed) > most
+    return beyond
 
 
 def _spikes(

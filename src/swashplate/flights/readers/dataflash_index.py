@@ -24,6 +24,7 @@ FMT = 128
 _FMT_LENGTH = 89
 _CHUNK = 1 << 18  # bytes that are looked through for heads at a time: they stay in the processor's cache
 _HEADS = 1 << 16  # heads that are sorted by type at a time
+_USUAL = 40  # bytes of a message: where they are shorter, the room for heads grows
 _FMT_FIELDS = np.dtype([("type", "u1"), ("length", "u1"), ("name", "S4"), ("format", "S16"), ("columns", "S64")])
 
 # Format letter -> (NumPy type, factor): C types, and integers that stand for hundredths or 1e-7 degrees.
@@ -169,9 +170,8 @@ class Scan:
         joined = _by_type(chain, rows)
         for number, described in self.kinds.items():
             single = np.array(places[number], dtype=np.uint32)
-            described.at = np.concatenate([*joined.pop(number, []), single])
-            if single.size:
-                described.at.sort()
+            together = joined.pop(number, single[:0])
+            described.at = np.sort(np.concatenate([together, single])) if single.size else together
 
     def _walk(self, content: Stored, chain: _Chain) -> tuple[list[list[int]], list[tuple[int, int]]]:
         """Places of single messages by type, and rows of the chain."""
@@ -235,31 +235,43 @@ def _filled(content: Stored, filler: bytes) -> int:
 
 def _heads(content: Stored) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
     """Where the two bytes of a head stand with a byte behind them, and that byte: the type."""
-    heads, numbers = [np.zeros(0, dtype=np.uint32)], [np.zeros(0, dtype=np.uint8)]
+    # Room that is not filled is not taken from the system, and pieces that are joined later would be there twice.
+    room = _HEADS + len(content) // _USUAL
+    heads, numbers = np.empty(room, np.uint32), np.empty(room, np.uint8)
+    count = 0
     for begin in range(0, len(content) - 2, _CHUNK):
         cells = np.frombuffer(part(content, begin, begin + _CHUNK + 2), np.uint8)
         head = cells[:-2] == HEAD[0]
         head &= cells[1:-1] == HEAD[1]
         inside = np.flatnonzero(head)
-        numbers.append(cells[2:].take(inside))
-        heads.append((inside + begin).astype(np.uint32))
-    return np.concatenate(heads), np.concatenate(numbers)
+        if count + inside.size > heads.size:
+            room = 2 * room + inside.size
+            for row in (heads, numbers):
+                row.resize(room, refcheck=False)
+        here = slice(count, count + inside.size)
+        numbers[here] = cells[2:].take(inside)
+        np.add(inside, begin, out=heads[here], casting="unsafe")
+        count = here.stop
+    for row in (heads, numbers):
+        row.resize(count, refcheck=False)
+    return heads, numbers
 
 
-def _by_type(chain: _Chain, rows: list[tuple[int, int]]) -> dict[int, list[NDArray[np.uint32]]]:
-    """Places of the heads in rows of the chain, in pieces in order, by type."""
+def _by_type(chain: _Chain, rows: list[tuple[int, int]]) -> dict[int, NDArray[np.uint32]]:
+    """Places of the heads in rows of the chain, in order, by type."""
     chosen = np.zeros(chain.heads.size, dtype=np.bool_)
     for start, stop in rows:
         chosen[start:stop] = True
-    by_type: dict[int, list[NDArray[np.uint32]]] = {}
-    for start in range(0, chosen.size, _HEADS):
-        here = slice(start, start + _HEADS)
-        numbers, heads = chain.numbers[here], chain.heads[here]
-        if not chosen[here].all():
-            numbers, heads = numbers[chosen[here]], heads[chosen[here]]
+    parts = [slice(start, start + _HEADS) for start in range(0, chosen.size, _HEADS)]
+    counts = [np.bincount(chain.numbers[here][chosen[here]], minlength=256) for here in parts]
+    total = np.sum(np.array(counts, np.int64).reshape(-1, 256), axis=0)
+    by_type = {number: np.empty(size, np.uint32) for number, size in enumerate(total.tolist()) if size}
+    filled = np.zeros(256, np.int64)
+    for here, count in zip(parts, counts, strict=True):
+        numbers, heads = chain.numbers[here][chosen[here]], chain.heads[here][chosen[here]]
         heads = heads[np.argsort(numbers, kind="stable")]
-        counts = np.bincount(numbers, minlength=256)
-        ends = np.cumsum(counts)
-        for number in np.flatnonzero(counts).tolist():
-            by_type.setdefault(number, []).append(heads[ends[number] - counts[number] : ends[number]])
+        ends, before = np.cumsum(count), filled.copy()
+        filled += count
+        for number in np.flatnonzero(count).tolist():
+            by_type[number][before[number] : filled[number]] = heads[ends[number] - count[number] : ends[number]]
     return by_type

@@ -136,7 +136,7 @@ class _Binary(LogFields):
                 continue
             for which, at in sensors[name]:
                 called = name if which is None else f"{name}[{which}]"
-                self._parts[called] = _Part(kind, at, stamp, units.get(name, {}))
+                self._parts[called] = _Part(replace(kind, at=at), at, stamp, units.get(name, {}))
         rates = self._rates(content)
         fields = [
             LogField(name, field, part.units.get(field, ("", 1.0))[0], part.at.size, rates[name])

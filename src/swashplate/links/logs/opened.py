@@ -27,6 +27,7 @@ from swashplate.links.logs.code_lines import Read, inspected
 from swashplate.links.logs.drawn_channels import DrawnChannel, DrawnChannels
 from swashplate.links.logs.kept_mappings import kept
 from swashplate.links.logs.remedies import remedy
+from swashplate.systems import free_memory
 
 READING, READY, FAILED = "reading", "ready", "failed"
 CHECKING = "check of a log"
@@ -96,6 +97,7 @@ class Opened:
             read = read.with_mapping(str(mapped))
         else:
             flight, problem, hint = self._read(read)
+        free_memory()  # of a long log's reading half as much again as the flight has
         self.read = read
         self.foreign = self._is_foreign(flight, problem)
         self.flight, self.inspection, self.problem, self.hint = flight, None, problem, hint
@@ -145,6 +147,7 @@ class Opened:
     def _check(self, flight: Flight) -> None:
         """List what else the log holds and inspect what was read, unless it has been read anew meanwhile."""
         fields = log_fields(self.path)
+        free_memory()
         if self.flight is flight:
             self.fields, self.listed = fields, True
             self._groups = [*self._groups, *field_groups(fields)]
@@ -156,6 +159,7 @@ class Opened:
         except Exception as error:  # a thread's end is heard by nobody else
             _LOG.error("A check failed: %s: %s", type(error).__name__, error)
             problem = f"could not be checked ({type(error).__name__}: {error})."
+        free_memory()
         if self.flight is flight:
             self.inspection, self.problem, self.hint = inspection, problem, hint
             if problem:

@@ -48,3 +48,10 @@ def test_damage_by_chance(seed: int) -> None:
         else:
             content[at:] = b"\xff" * len(content[at:]) if random.random() < 0.3 else content[at : len(content) - length]
     assert scanned(bytes(content)) == walked(bytes(content))
+
+
+def test_heads_nearer_than_messages_usually_are_have_room() -> None:
+    content = (dataflash_index.HEAD + b"\x07") * (3 * dataflash_index._HEADS) + dataflash_index.HEAD
+    heads, numbers = dataflash_index._heads(content)
+    assert np.array_equal(heads, 3 * np.arange(3 * dataflash_index._HEADS))
+    assert np.array_equal(np.unique(numbers), [7])
