@@ -5,7 +5,8 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -111,14 +112,8 @@ def serve_ardupilot(asked: Link) -> Linked:
         _tell_where("UDP", bound.getsockname(), asked.listen, plant)
         session = ArduPilotSession(plant, linked_sensing(asked, plant), notices)
         session.prepare()
-        saved: tuple[Path, ...] = ()
-        try:
-            serve(bound, session, idle_exit=asked.idle_exit)
-        except KeyboardInterrupt:
-            pass
-        finally:
-            saved = finish_link(plant, recorder, session.progress.exchanges, notices.summary())
-    return Linked(session.progress.exchanges, plant.time, notices.summary(), saved, _known(plant))
+        serving = partial(serve, bound, session, idle_exit=asked.idle_exit)
+        return _until_interrupt(serving, plant, recorder, notices, lambda: session.progress.exchanges)
 
 
 def serve_px4(asked: Link) -> Linked:
@@ -131,14 +126,8 @@ def serve_px4(asked: Link) -> Linked:
     session = Px4Session(plant, linked_sensing(asked, plant), notices, seed=asked.seed)
     with listen_tcp(asked.listen, asked.port) as listening:
         _tell_where("TCP", listening.getsockname(), asked.listen, plant)
-        saved: tuple[Path, ...] = ()
-        try:
-            serve(listening, session, notices, idle_exit=asked.idle_exit)
-        except KeyboardInterrupt:
-            pass
-        finally:
-            saved = finish_link(plant, recorder, session.exchanges, notices.summary())
-    return Linked(session.exchanges, plant.time, notices.summary(), saved, _known(plant))
+        serving = partial(serve, listening, session, notices, idle_exit=asked.idle_exit)
+        return _until_interrupt(serving, plant, recorder, notices, lambda: session.exchanges)
 
 
 def write_ardupilot_parameters(
@@ -163,12 +152,17 @@ def write_ardupilot_parameters(
     Raises:
         SwashError: where the folder is missing or there is no servo mapping.
     """
-    file = Path(path)
-    if not file.absolute().parent.is_dir():
-        raise SwashError("the folder does not exist.", where=file.parent, channel="--out")
+    file = _to_write(path)
     mapping = mapping_of(vehicle, servos, name=name, suffix="")
     settings = parameters(mapping, vehicle, trim) | gains_to_write(mapping, vehicle, trim, notice=notice)
     return write_text(file, parameter_file(settings, title=vehicle.card.title))
+
+
+def _to_write(path: str | Path) -> Path:
+    file = Path(path)
+    if not file.absolute().parent.is_dir():
+        raise SwashError("the folder does not exist.", where=file.parent, channel="--out")
+    return file
 
 
 def gains_to_write(mapping: ServoMapping, vehicle: Vehicle, trim: Trim, *, notice: Say) -> Parameters:
@@ -248,18 +242,27 @@ def _tell_where(kind: str, at: tuple[str, int], listen: str, plant: Plant) -> No
     notice_unless_quiet(f"{plant.vehicle.card.title}: waiting for an autopilot on {kind} {at[0]}:{at[1]}. Ctrl-C ends.")
 
 
-def _known(plant: Plant) -> tuple[KnownNow, ...]:
-    return () if plant.estimating is None else plant.estimating.known
-
-
-def finish_link(plant: Plant, recorder: Recorder | None, exchanges: int, counts: str) -> tuple[Path, ...]:
-    """Tell what the link did, and keep its flights."""
-    notice_unless_quiet(repr(Linked(exchanges, plant.time, counts, (), _known(plant))))
-    saved = () if recorder is None else recorder.finish()
-    if recorder is not None:
-        told = f"written: {', '.join(map(str, saved))}" if saved else "nothing was flown, nothing is written."
-        notice_unless_quiet(told)
-    return saved
+def _until_interrupt(
+    serving: Callable[[], None],
+    plant: Plant,
+    recorder: Recorder | None,
+    notices: Notices,
+    exchanges: Callable[[], int],
+) -> Linked:
+    """Serve until an interrupt; whatever happens tell what the link did, and keep its flights."""
+    saved: tuple[Path, ...] = ()
+    try:
+        with suppress(KeyboardInterrupt):
+            serving()
+    finally:
+        known = () if plant.estimating is None else plant.estimating.known
+        done = Linked(exchanges(), plant.time, notices.summary(), (), known)
+        notice_unless_quiet(repr(done))
+        if recorder is not None:
+            saved = recorder.finish()
+            told = f"written: {', '.join(map(str, saved))}" if saved else "nothing was flown, nothing is written."
+            notice_unless_quiet(told)
+    return replace(done, saved=saved)
 
 
 def serve_betaflight(asked: LinkBetaflight, *, swash: str = "120") -> Linked:
@@ -284,14 +287,8 @@ def serve_betaflight(asked: LinkBetaflight, *, swash: str = "120") -> Linked:
             session.sticks = hovering(pilot_for(linearize(flying, hover), plant.standing_depth))
         notice_unless_quiet("waiting for a SITL of Betaflight or Rotorflight (TCP 5761)")
         wait_for_sitl(asked.wait)
-        saved: tuple[Path, ...] = ()
-        try:
-            serve(bound, session, idle_exit=asked.idle_exit)
-        except KeyboardInterrupt:
-            pass
-        finally:
-            saved = finish_link(plant, recorder, session.exchanged.motors, notices.summary())
-    return Linked(session.exchanged.motors, plant.time, notices.summary(), saved)
+        serving = partial(serve, bound, session, idle_exit=asked.idle_exit)
+        return _until_interrupt(serving, plant, recorder, notices, lambda: session.exchanged.motors)
 
 
 def write_betaflight_configuration(vehicle: Vehicle, path: str | Path) -> Path:
@@ -300,9 +297,7 @@ def write_betaflight_configuration(vehicle: Vehicle, path: str | Path) -> Path:
     Raises:
         SwashError: where the folder is missing, the vehicle is no multirotor, or no gains keep their margins.
     """
-    file = Path(path)
-    if not file.absolute().parent.is_dir():
-        raise SwashError("the folder does not exist.", where=file.parent, channel="--out")
+    file = _to_write(path)
     mapping, flying = MotorMapping(vehicle), airborne(vehicle)
     gains = betaflight_gains(linearize(flying, trim(flying)), mapping)
     return write_text(file, configuration(mapping, gains.settings))
