@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.errors import FlightError
+from swashplate.flights.readers import mat_objects
 from swashplate.flights.readers.source import Source, refuse_oversized
 
 _HEADER = 128
@@ -57,9 +58,10 @@ class _Element:
 
 @dataclass(frozen=True)
 class Unread:
-    """A variable of a kind that is not read: what it is, in words."""
+    """A variable of a kind that is not read: what it is in words, and the class of an object, a cell or structs."""
 
     what: str
+    kind: str = ""
 
 
 def _element(data: memoryview, at: int, order: str) -> _Element:
@@ -142,7 +144,7 @@ def _variable(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
         title = _element(data, at, order)
         kind = _element(data, title.next, order)
         called = bytes(_element(data, kind.next, order).data).decode("latin-1")
-        return bytes(title.data).decode("latin-1"), Unread(f"a MATLAB object of class {called}")
+        return bytes(title.data).decode("latin-1"), Unread(f"a MATLAB object of class {called}", called)
     dimensions = _element(data, at, order)
     shape = _dimensions(dimensions, order)
     title = _element(data, dimensions.next, order)
@@ -219,10 +221,10 @@ def _version_7_3(source: Source) -> dict[str, Any]:
             elif stored.values.dtype.kind in "fiub" and kind in _PLAIN:
                 at[key] = stored.values.T.squeeze()
             elif kind in _PLAIN:  # references: the parts stand elsewhere in the file
-                at[key] = Unread("a MATLAB array of structs")
+                at[key] = Unread("a MATLAB array of structs", mat_objects.STRUCTS)
             else:
                 held = "a MATLAB cell" if kind == "cell" else f"a MATLAB object of class {kind}"
-                at[key] = Unread("text" if kind == "char" else held)
+                at[key] = Unread("text") if kind == "char" else Unread(held, kind)
     return variables
 
 

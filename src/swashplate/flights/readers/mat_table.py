@@ -17,7 +17,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import coax56, mat, table_time
+from swashplate.flights.readers import coax56, mat, mat_objects, table_time
 from swashplate.flights.readers.clocked import Remarks
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
@@ -105,17 +105,20 @@ def _table(variables: Mapping[str, Any], source: Source, options: Options) -> Ma
     remarks = Remarks()
     arrays: dict[str, Array] = {}
     strange: list[str] = []
+    objects: dict[str, str] = {}
     for path, value in _flat(variables):
         numbers = mat.numbers(value)
         if numbers is not None and numbers.size and numbers.ndim <= 3:
             arrays[path] = np.atleast_1d(numbers)
         else:
             strange.append(f"{path} ({value.what})" if isinstance(value, mat.Unread) else path)
+            objects |= {path: value.kind} if isinstance(value, mat.Unread) else {}
+    line = mat_objects.to_type(objects, source.name)
     if not arrays:
         raise FlightError(
-            f"holds {', '.join(variables) or 'nothing'}; expected arrays of numbers: time, and one for each channel.",
+            f"holds {', '.join(strange) or 'nothing'}; expected arrays of numbers: time, and one for each channel.",
             where=source.name,
-            hint="Save the numbers themselves: objects, cells and texts are not read.",
+            hint=f"Type in MATLAB: {line}" if line else "Save the numbers themselves: texts and the like are not read.",
         )
     names = _names(list(arrays))
     n = _length(arrays, names, options)
@@ -126,6 +129,8 @@ def _table(variables: Mapping[str, Any], source: Source, options: Options) -> Ma
     for what, why in ((lost, f"not {n} numbers long"), (strange, "no array of numbers")):
         if what:
             remarks.notes.append(f"{', '.join(what)}: {why}: not read")
+    if line:
+        remarks.notes.append(f"to have them read, type in MATLAB: {line}")
     header = [names.get(path, path) for path in columns]
     aliases = {path: index for index, path in enumerate(columns)}
     return MatTable(source.name, header, list(columns.values()), aliases, remarks=remarks)
