@@ -13,6 +13,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
+from swashplate.flights.averaged_spectra import power_density
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import channel as schema_of
 from swashplate.shown import Shown
@@ -199,15 +200,13 @@ def spectrum(flight: Flight, channel: str, *, start: float | None = None, stop: 
     Raises:
         FlightError: no such channel, or too few samples.
     """
-    from scipy.signal import welch  # half a second to import, and reports import this module
-
     grid, values, rate = _piece(flight, channel, start, stop)
     size = min(values.size, max(_SHORTEST, 2 * values.size // (WINDOWS + 1))) // 2 * 2
-    frequency, density = welch(values, fs=rate, nperseg=size, detrend="constant")
+    frequency, power = power_density(values, rate=rate, window=size)
     count = 1 + (values.size - size) // (size - size // 2)
     unit = _unit(flight, channel)
     return Spectrum(
-        channel, unit, frequency, density, count, size / rate, float(grid[0]), float(grid[-1]), rate
+        channel, unit, frequency, power, count, size / rate, float(grid[0]), float(grid[-1]), rate
     )  # fmt: skip
 
 
@@ -223,7 +222,7 @@ def spectrogram(
     Raises:
         FlightError: no such channel, or too few samples.
     """
-    from scipy import signal  # see `spectrum`
+    from scipy import signal  # half a second to import, and reports import this module
 
     grid, values, rate = _piece(flight, channel, start, stop)
     size = int(np.clip(values.size // 40, _SHORTEST, 1024))

@@ -9,13 +9,14 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import continuous
+from swashplate.flights.conditioning.butterworth import both_ways, butterworth_sections
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import QUATERNION
 from swashplate.flights.storage import timed
 
 
 def shortest(order: int, *, band: bool = False) -> int:
-    """Fewest samples that a filter of this order takes (the padding of `sosfiltfilt` plus one)."""
+    """Fewest samples that a filter of this order takes: three times its memory, and one."""
     sections = order if band else (order + 1) // 2
     at_origin = 0 if band or order % 2 == 0 else 1
     return 3 * (2 * sections + 1 - at_origin) + 1
@@ -33,8 +34,6 @@ def filtered(values: Array, *, rate: float, cutoff: float | tuple[float, float],
     Raises:
         FlightError: the corner is not below half the rate, or the record is too short.
     """
-    from scipy.signal import butter, sosfiltfilt
-
     band = isinstance(cutoff, tuple)
     corners = np.atleast_1d(np.asarray(cutoff, dtype=np.float64))
     if not (np.all(corners > 0) and np.all(corners < rate / 2) and np.all(np.diff(corners) > 0)):
@@ -50,15 +49,14 @@ def filtered(values: Array, *, rate: float, cutoff: float | tuple[float, float],
             f"{needed} samples ({needed / rate:.3f} s) at {rate:g} Hz.",
             hint="Use a longer record, or condition with cutoff=0 (no filter).",
         )
-    sos = butter(order, cutoff, btype="bandpass" if band else "lowpass", fs=rate, output="sos")
-    return np.asarray(sosfiltfilt(sos, values, axis=0), dtype=np.float64)
+    return both_ways(butterworth_sections(order, corners, rate=rate), values, padding=needed - 1)
 
 
 def within(values: Array, *, rate: float, band: tuple[float, float]) -> Array:
     """What of a uniform record lies in a band: a second-order Butterworth band-pass run both ways, by its spectrum.
 
-    It is `filtered` for looking at a log, without loading SciPy's filters; they differ at the ends, where this one
-    mirrors the record for a period of the lower corner.
+    It is `filtered` for looking at a log; they differ at the ends, where this one mirrors the record for a period of
+    the lower corner.
 
     Args:
         values: shape (n,) or (n, m), along the first axis.

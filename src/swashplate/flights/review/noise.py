@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.flights.averaged_spectra import power_density
 from swashplate.flights.flight import Flight
 from swashplate.flights.review.filters import Filter, gyro_response
 from swashplate.flights.review.stretches import armed, common
@@ -113,8 +114,6 @@ def gyro_noise(flight: Flight, chosen: tuple[Filter, ...]) -> tuple[tuple[GyroNo
 
 def _density(flight: Flight, name: str) -> tuple[Array, Array] | None:
     """Lines [Hz] and densities [(deg/s)^2/Hz] of a channel while the motors are armed."""
-    from scipy.signal import welch  # half a second to import
-
     time, values = flight.time(name), np.degrees(flight.values(name))
     steps = np.diff(time)
     rate = 1.0 / float(np.median(steps))
@@ -126,9 +125,9 @@ def _density(flight: Flight, name: str) -> tuple[Array, Array] | None:
         grid = start + np.arange(int((stop - start) * rate)) / rate
         if grid.size < size:
             continue
-        lines, density = welch(np.interp(grid, time, values), fs=rate, nperseg=size, detrend="linear")
+        lines, power = power_density(np.interp(grid, time, values), rate=rate, window=size, line=True)
         windows = 1 + (grid.size - size) // (size - size // 2)
-        total = windows * density + (0.0 if total is None else total)
+        total = windows * power + (0.0 if total is None else total)
         count += windows
     return None if total is None or count < _LEAST else (lines, total / count)
 
@@ -156,7 +155,7 @@ def _of(flight: Flight, name: str, chosen: tuple[Filter, ...]) -> GyroNoise | No
 
 
 def _peaks(flight: Flight, frequency: Array, density: Array) -> tuple[Peak, ...]:
-    from scipy.ndimage import median_filter  # see `_density`
+    from scipy.ndimage import median_filter  # a quarter of a second to import
 
     around = np.maximum(median_filter(density, size=_BESIDE, mode="nearest"), np.finfo(np.float64).tiny)
     above = 10.0 * np.log10(np.maximum(density, np.finfo(np.float64).tiny) / around)

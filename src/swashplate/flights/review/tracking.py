@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swashplate.flights.averaged_spectra import cross_density
 from swashplate.flights.review.stretches import Stretch
 
 _WINDOW = 4.0  # s
@@ -41,8 +42,6 @@ def tracking(pieces: Sequence[Stretch]) -> tuple[tuple[Octave, ...], float]:
     Args:
         pieces: target and motion side by side [rad/s].
     """
-    from scipy.signal import csd  # half a second to import
-
     if not pieces:
         return (), 0.0
     rate = float(np.median([piece.rate for piece in pieces]))
@@ -54,7 +53,7 @@ def tracking(pieces: Sequence[Stretch]) -> tuple[tuple[Octave, ...], float]:
             continue
         x, y = piece.values[:, 0], piece.values[:, 1]
         for k, (a, b) in enumerate(((x, x), (y, y), (x, y), (y - x, y - x))):
-            frequency, density = csd(a, b, fs=rate, nperseg=size, detrend="constant")
+            frequency, density = cross_density(a, b, rate=rate, window=size)
             sums[k] += windows * density
         count += windows
     if count < _LEAST:

@@ -14,6 +14,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.filtering.disturbances import Noise
+from swashplate.flights.averaged_spectra import power_density
 from swashplate.flights.conditioning.resample import ANTI_ALIAS
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
@@ -54,9 +55,7 @@ def refuse_lowpassed(flights: Iterable[Flight]) -> None:
 
 def without_floor(values: Array) -> float:
     """By how much [dB] a channel's spectrum falls from 0.15-0.3 to 0.5-0.7 of half the sample rate."""
-    from scipy.signal import welch
-
-    frequency, power = welch(values - values.mean(), nperseg=min(_SEGMENT, values.size), detrend="linear")
+    frequency, power = power_density(values - values.mean(), rate=1.0, window=min(_SEGMENT, values.size), line=True)
     part = 2.0 * frequency
     low, high = (float(np.median(power[(part >= a) & (part <= b)])) for a, b in (_LOW, _HIGH))
     tiny = np.finfo(np.float64).tiny

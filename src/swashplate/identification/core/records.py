@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
+from swashplate.flights.conditioning.local_polynomials import local_polynomials
 from swashplate.flights.flight import Flight, did_you_mean
 from swashplate.flights.schema import ATTITUDE, POSITION, RATES
 from swashplate.models.surroundings import environment_of
@@ -278,7 +279,5 @@ _STILL = 1e-6
 
 def _slow(voltage: Array, dt: float, seconds: float) -> Array:
     """A logged voltage without its noise: straight lines over some seconds each way (Savitzky and Golay 1964)."""
-    from scipy.signal import savgol_filter
-
     window = min(2 * round(seconds / dt) + 1, voltage.size - (voltage.size + 1) % 2)
-    return np.asarray(savgol_filter(voltage, window, 1), dtype=np.float64)
+    return local_polynomials(voltage, window, 1)

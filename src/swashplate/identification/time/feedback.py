@@ -15,6 +15,8 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
+from swashplate.flights.averaged_spectra import cross_density, power_density
+from swashplate.flights.conditioning.filters import filtered
 from swashplate.flights.excitation import CONTROLLER, Excitation, of_inputs
 from swashplate.flights.feedback import ANSWER, NOTHING, AnswerShares, told_by_motion
 from swashplate.identification.core.parameters import Parameterization
@@ -123,12 +125,9 @@ def excitation(vehicle: Vehicle, record: Record, states: Array) -> tuple[AxisExc
 
 
 def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array]) -> AxisExcitation:
-    from scipy.signal import butter, sosfiltfilt
-
     rate = 1.0 / record.dt
     high = min(_BAND[1], 0.4 * rate)
-    sos = butter(2, (_BAND[0], high), "bandpass", fs=rate, output="sos")
-    power = float(np.std(sosfiltfilt(sos, command)))
+    power = float(np.std(filtered(command, rate=rate, cutoff=(_BAND[0], high), order=2)))
     still = power < _MOVED
     shares, peak, phase = NOTHING, 0.0, float("nan")
     if not still:
@@ -164,11 +163,10 @@ def _called(inputs: Mapping[str, float]) -> str:
 
 
 def _coherence(command: Array, response: Array, rate: float, high: float) -> tuple[float, float]:
-    from scipy.signal import coherence, csd
-
     length = int(min(command.size, 4.0 * rate))
-    frequency, squared = coherence(command, response, rate, nperseg=length)
-    cross = csd(command, response, rate, nperseg=length)[1]
+    frequency, cross = cross_density(command, response, rate=rate, window=length)
+    both = [power_density(values, rate=rate, window=length)[1] for values in (command, response)]
+    squared = np.abs(cross) ** 2 / (both[0] * both[1])
     band = (frequency >= _BAND[0]) & (frequency <= high)
     best = np.flatnonzero(band)[np.argmax(squared[band])]
     return float(squared[best]), float(np.angle(cross[best]))

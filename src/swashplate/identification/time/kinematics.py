@@ -9,6 +9,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.conditioning.attitude import euler_from_quaternion
+from swashplate.flights.conditioning.local_polynomials import local_polynomials
 from swashplate.flights.schema import RATES
 from swashplate.identification.core.records import Record
 from swashplate.physics.backend import ArrayBackend
@@ -37,8 +38,6 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
     so each uses samples after its own time too: this is what predictions are held against, never what they start from.
     Rates are a gyroscope's where the record has them, smoothed over five samples.
     """
-    from scipy.signal import savgol_filter
-
     names = list(record.output_names)
     pose = record.outputs[:, [names.index(name) for name in ("x", "y", "z", "phi", "theta", "psi")]].copy()
     pose[:, 3] -= float(nuisance.level_phi)
@@ -54,8 +53,8 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
     lever = Vector(float(nuisance.lever_x), float(nuisance.lever_y), float(nuisance.lever_z))
     pose[:, :3] -= np.stack(body_to_local(lever, Euler(*pose[:, 3:].T), _XP), axis=1)
     length = samples_smoothed(record.dt, window)
-    smooth = savgol_filter(pose, length, 3, axis=0)
-    slope = savgol_filter(pose, length, 3, deriv=1, delta=record.dt, axis=0)
+    smooth = local_polynomials(pose, length, 3)
+    slope = local_polynomials(pose, length, 3, slope=record.dt)
     phi, theta = smooth[:, 3], smooth[:, 4]
     phi_dot, theta_dot, psi_dot = slope[:, 3], slope[:, 4], slope[:, 5]
     velocity = np.stack(local_to_body(Vector(*slope[:, :3].T), Euler(*smooth[:, 3:].T), _XP), axis=1)
@@ -69,7 +68,7 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
     )
     if set(RATES) <= set(names):
         gyro = record.outputs[:, [names.index(name) for name in RATES]]
-        rates = savgol_filter(gyro, 5, 2, axis=0)
+        rates = local_polynomials(gyro, 5, 2)
     return np.concatenate([smooth[:, :3], velocity, smooth[:, 3:], rates], axis=1)
 
 
