@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.shown import Shown
+from swashplate.validation.saved import SavedWhole
 from swashplate.validation.verification import Trace, Verification
 from swashplate.validation.verify import verified, verify
 
@@ -137,7 +136,7 @@ def along_inputs(
 
 
 @dataclass(frozen=True, repr=False)
-class ModelComparison(Shown):
+class ModelComparison(SavedWhole):
     """Models beside one flight.
 
     Attributes:
@@ -162,12 +161,6 @@ class ModelComparison(Shown):
         """Fits and warnings as JSON types."""
         warnings = {name: list(v.warnings) for name, v in self.found.items() if v.warnings}
         return {"kind": "comparison", "fit": self.fits(), "warnings": warnings}
-
-    def save(self, path: str | Path) -> Path:
-        """Write it as a JSON file, whole: `swashplate.load` reads it back."""
-        from swashplate.validation import saved
-
-        return saved.save(self, self.to_document(), path)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Fit [%], one row an output and one column a model."""

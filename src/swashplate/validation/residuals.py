@@ -6,10 +6,8 @@ is the noise's and tells nothing against it (Ljung 1999, System Identification, 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,8 +16,8 @@ from scipy.special import ndtri
 from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
-from swashplate.shown import Shown
 from swashplate.validation.along_inputs import along_inputs
+from swashplate.validation.saved import SavedWhole
 from swashplate.validation.verification import Verification
 
 if TYPE_CHECKING:
@@ -59,7 +57,7 @@ class Correlation:
 
 
 @dataclass(frozen=True, repr=False)
-class Residuals(Shown):
+class Residuals(SavedWhole):
     """What a model leaves of a flight.
 
     Attributes:
@@ -106,12 +104,6 @@ class Residuals(Shown):
             for c in self.cross
         ]
         return {"kind": "residuals", "verdict": self.headline, "white": self.white, "pairs": pairs}
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write it as a JSON file, whole: `swashplate.load` reads it back."""
-        from swashplate.validation import saved
-
-        return saved.save(self, self.to_document(), path)
 
     def to_dataframe(self) -> pd.DataFrame:
         """The residuals over time [s], one column an output, inside units."""

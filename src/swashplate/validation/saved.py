@@ -16,6 +16,7 @@ from swashplate.identification.core.result_file import model_document, model_fro
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry
+from swashplate.shown import Shown
 
 Judged = Any
 """A `Validation`, `Verification`, `ModelComparison` or `Residuals`."""
@@ -36,22 +37,19 @@ _MODELS, _VERIFICATIONS = ("model", "vehicle", "published"), ("inside", "verific
 """Fields that hold a model, and those that hold a `Verification`."""
 
 
-def save(judged: Judged, document: Mapping[str, Any], path: str | os.PathLike[str]) -> Path:
-    """Write a judgement as a JSON file.
+class SavedWhole(Shown):
+    """A judgement whose file is read back whole; its `to_document` gives `kind` and figures, for other programs."""
 
-    Args:
-        judged: what is written whole.
-        document: what readers and other programs look at: its `kind` and figures.
-        path: the file.
-    """
-    return write_json(path, {**document, "schema": SCHEMA, "saved": _plain_value(judged)})
+    def save(self, path: str | os.PathLike[str], /) -> Path:
+        """Write it as a JSON file: `swashplate.load` reads it back."""
+        return write_json(path, {**self.to_document(), "schema": SCHEMA, "saved": _plain_value(self)})
 
 
 def from_document(document: Mapping[str, Any], *, where: str, equations: Vehicle | None = None) -> Judged:
     """The judgement of a document.
 
     Args:
-        document: of a file that `save` wrote.
+        document: of a file that `SavedWhole.save` wrote.
         where: its name, for messages.
         equations: the vehicle whose equations its models have, for equations that are no part of the package.
 

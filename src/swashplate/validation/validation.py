@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,11 +13,11 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
-from swashplate.shown import Shown
 from swashplate.validation.bands import Band, in_brief, widened_words
 from swashplate.validation.contact import Contact
 from swashplate.validation.controller_law import Law
 from swashplate.validation.floors import ROWS, Floor
+from swashplate.validation.saved import SavedWhole
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
 
@@ -116,7 +114,7 @@ class Example:
 
 
 @dataclass(frozen=True)
-class Validation(Shown):
+class Validation(SavedWhole):
     """Predictions of unseen flights, judged.
 
     Attributes:
@@ -205,12 +203,6 @@ class Validation(Shown):
                 for record, constants in zip(self.records, self.calibrated, strict=False)
             ],
         }
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write it as a JSON file, whole: `swashplate.load` reads it back."""
-        from swashplate.validation import saved
-
-        return saved.save(self, self.to_document(), path)
 
     def __repr__(self) -> str:
         fits = {(s.channel, s.horizon, s.predictor): s.fit for s in self.scores}

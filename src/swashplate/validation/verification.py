@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +12,9 @@ from swashplate.arrays import Array
 from swashplate.identification.core.sources import DataSource
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
-from swashplate.shown import Shown
 from swashplate.validation.floors import Floor
 from swashplate.validation.refutation import STANDS, Judgement
+from swashplate.validation.saved import SavedWhole
 
 GOOD_J, GOOD_TIC = 2.0, 0.30
 """J_rms and Theil's coefficient up to which a rotorcraft model is called good (Tischler and Remple 2012)."""
@@ -52,7 +50,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Verification(Shown):
+class Verification(SavedWhole):
     """How an identified model follows unseen records.
 
     Attributes:
@@ -144,12 +142,6 @@ class Verification(Shown):
             "band_hz": self.settings.get("band_hz"),
             "inside_band": None if self.inside is None else self.inside.to_document() | {"flights": []},
         }
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write it as a JSON file, whole: `swashplate.load` reads it back."""
-        from swashplate.validation import saved
-
-        return saved.save(self, self.to_document(), path)
 
     def __repr__(self) -> str:
         band = self.settings.get("band_hz")
