@@ -44,6 +44,6 @@ def export_log(
     flight = read_log(log, units=units, mapping=mapped, bad_stamps=bad_stamps)
     read = Read(path.name, Remedy(dict(units or {}), bad_stamps == "drop"), os.fspath(mapped) if mapped else "")
     made = f"Made by {program_and_commit()}, from a log with the SHA-256 {flight.provenance.sha256}."
-    page = sent_page(flight, path, read=read, keep=keep, made=made, say=say)
+    page = sent_page(flight, path, read=read, keep=keep, maker=made, say=say)
     size = f"{len(page.text.encode()) / 1e6:.1f} MB, opened by double-click."
     return Export({f"{name or 'log'}.html": page.text.encode()}, (*page.remarks, size))

@@ -31,13 +31,13 @@ def off_axis(responses: FrequencyResponse, chosen: Channels, others: Sequence[st
         counted = (coherence >= _SEEN) & np.isfinite(share)
         if counted.any():
             largest = int(np.argmax(np.where(counted, share, -np.inf)))
-            words = (
+            remark = (
                 f"{chosen.input} moves {other} by at most {share[largest]:.1f} dB of {chosen.output} (at "
                 f"{hertz[largest]:.2g} Hz); {counted.sum()} of {counted.size} lines are coherent enough to tell."
             )
         else:
-            words = f"What {chosen.input} does to {other} is not told: no line has a coherence of {_SEEN:g}."
-        drawn.append({"output": other, "share": np.where(counted, share, np.nan), "words": words})
+            remark = f"What {chosen.input} does to {other} is not told: no line has a coherence of {_SEEN:g}."
+        drawn.append({"output": other, "share": np.where(counted, share, np.nan), "words": remark})
     return drawn
 
 
@@ -64,15 +64,15 @@ def alone(
         np.interp(omega, joint.omega, np.log(np.abs(wanted))),
         np.interp(omega, joint.omega, np.unwrap(np.angle(wanted))),
     )
-    seen = (coherence >= _SEEN) & (np.interp(omega, joint.omega, trusted) >= _SEEN) & np.isfinite(h)
-    if not seen.any():
+    coherent = (coherence >= _SEEN) & (np.interp(omega, joint.omega, trusted) >= _SEEN) & np.isfinite(h)
+    if not coherent.any():
         return {"cost": float(fit.cost), "words": "One input alone gives no response that counts."}
     size = 20.0 / np.log(10.0) * np.abs(np.log(np.abs(h)) - there[0])
     turn = np.degrees(np.abs(np.angle(h * np.exp(-1j * there[1]))))
-    worst, turned = int(np.argmax(np.where(seen, size, -1.0))), int(np.argmax(np.where(seen, turn, -1.0)))
+    worst, turned = int(np.argmax(np.where(coherent, size, -1.0))), int(np.argmax(np.where(coherent, turn, -1.0)))
     hertz = omega / (2.0 * np.pi)
-    words = (
+    remark = (
         f"{chosen.input} alone gives J = {fit.cost:.1f}, and is off by up to {size[worst]:.1f} dB (at "
         f"{hertz[worst]:.2g} Hz) and {turn[turned]:.0f} deg (at {hertz[turned]:.2g} Hz)."
     )
-    return {"cost": float(fit.cost), "decibels": float(size[worst]), "degrees": float(turn[turned]), "words": words}
+    return {"cost": float(fit.cost), "decibels": float(size[worst]), "degrees": float(turn[turned]), "words": remark}

@@ -28,7 +28,7 @@ from swashplate.links.web.serving import page
 from swashplate.links.web.work import in_thread
 
 PAGE = Path(__file__).parent / "page"
-_LOG = ask.whole(1, 10_000)
+_LOG = ask.integer(1, 10_000)
 _NAME = ask.text(200)
 _MOST_TRACES = 400
 
@@ -41,9 +41,9 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             content = await ask.body(request, longest=PIECE)
             path = desk.uploads.add(request.path_params["token"], request.path_params["at"], content)
             if path is None:
-                return ask.told({})
+                return ask.json_response({})
             opened = await in_thread(desk.open, path=path)
-            return ask.told({"log": opened.number})
+            return ask.json_response({"log": opened.number})
         except (Exception, asyncio.CancelledError) as error:
             return ask.refused(error)
 
@@ -81,7 +81,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
         Mount("/page", StaticFiles(directory=SHARED)),
         Mount("/open", StaticFiles(directory=PAGE)),
         Route("/logs", ask.get(desk.to_document)),
-        _post("/upload", begin, name=ask.text(1000), size=ask.whole(0, 1 << 50)),
+        _post("/upload", begin, name=ask.text(1000), size=ask.integer(0, 1 << 50)),
         Route("/upload/{token}/{at:number}", piece, methods=["POST"]),
         _post("/example", lambda file: {"log": desk.open_example(file).number}, file=_NAME),
         _post("/fly", desk.cockpit.begin),
@@ -91,7 +91,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             "/traces",
             traces,
             wanted=ask.rows(_MOST_TRACES, _LOG, _NAME, ask.number, ask.number),
-            bins=ask.whole(2, BINS),
+            bins=ask.integer(2, BINS),
         ),
         _post(
             "/plot-code",
@@ -112,7 +112,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             "/map-columns",
             lambda log, rows, rate: apply_columns(desk.log(log), rows, rate),
             log=_LOG,
-            rows=ask.rows(300, ask.whole(0, 10_000), _NAME, ask.text(60, least=0), ask.number, ask.number),
+            rows=ask.rows(300, ask.integer(0, 10_000), _NAME, ask.text(60, least=0), ask.number, ask.number),
             rate=ask.number,
         ),
         _post("/review", lambda log: review_of(desk.log(log)), log=_LOG),
@@ -123,7 +123,7 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             "/identify",
             lambda log, sweep, input, output: desk.identify(log, sweep, input, output),
             log=_LOG,
-            sweep=ask.whole(0, 1000),
+            sweep=ask.integer(0, 1000),
             input=ask.text(200, least=0),
             output=ask.text(200, least=0),
         ),

@@ -48,23 +48,23 @@ def extremes(values: NDArray[np.generic], bins: int) -> NDArray[np.int64]:
     if n == 0:
         return np.zeros(0, dtype=np.int64)
     size = -(-n // bins)
-    whole = n // size * size
-    table = values[:whole].reshape(-1, size)
+    full = n // size * size
+    table = values[:full].reshape(-1, size)
     with np.errstate(invalid="ignore", over="ignore"):
-        plain = bool(np.isfinite(table.sum()))  # one pass: NaN and infinity show in a sum
-    if plain:
+        all_finite = bool(np.isfinite(table.sum()))  # one pass: NaN and infinity show in a sum
+    if all_finite:
         low, high = table.argmin(axis=1), table.argmax(axis=1)
     else:
         finite = np.isfinite(table)
         low = np.where(finite, table, np.inf).argmin(axis=1)
         high = np.where(finite, table, -np.inf).argmax(axis=1)
-    begin = np.arange(0, whole, size)
+    begin = np.arange(0, full, size)
     indices = [begin + low, begin + high]
-    if whole < n:
-        rest = values[whole:]
+    if full < n:
+        rest = values[full:]
         finite_rest = np.isfinite(rest)
-        indices.append(whole + np.array([np.argmin(np.where(finite_rest, rest, np.inf))]))
-        indices.append(whole + np.array([np.argmax(np.where(finite_rest, rest, -np.inf))]))
+        indices.append(full + np.array([np.argmin(np.where(finite_rest, rest, np.inf))]))
+        indices.append(full + np.array([np.argmax(np.where(finite_rest, rest, -np.inf))]))
     return np.unique(np.concatenate(indices))
 
 

@@ -46,22 +46,22 @@ def _rate(stamps: Array) -> float:
 
 def groups(flight: Flight) -> list[dict[str, Any]]:
     """Groups with their channels, as the page lists them; a group without a channel is left out."""
-    made: dict[str, list[dict[str, Any]]] = {title: [] for title in (*(title for title, _ in _GROUPS), OTHER)}
+    by_title: dict[str, list[dict[str, Any]]] = {title: [] for title in (*(title for title, _ in _GROUPS), OTHER)}
     rates = {home: round(_rate(data["time"].values), 1) for home, data in flight.streams.items()}
     for name in flight.channels:
         unit, _ = shown_unit(flight, name)
         about, samples = channel(name).description, int(flight.time(name).size)
         rate = rates[flight.stream_of(name)]
         entry = {"name": name, "unit": unit, "rate": rate, "samples": samples, "about": about}
-        made[group_of(name)].append(entry)
-    return [{"title": title, "channels": channels} for title, channels in made.items() if channels]
+        by_title[group_of(name)].append(entry)
+    return [{"title": title, "channels": channels} for title, channels in by_title.items() if channels]
 
 
 def field_groups(fields: LogFields | None) -> list[dict[str, Any]]:
     """The log's own fields, a group for each message."""
-    made: dict[str, list[dict[str, Any]]] = {}
+    by_message: dict[str, list[dict[str, Any]]] = {}
     for name, field in (fields.listed if fields else {}).items():
         about = f"{field.message} message, field {field.field}, as the log has it"
         entry = {"name": name, "unit": field.unit, "rate": field.rate, "samples": field.samples, "about": about}
-        made.setdefault(field.message, []).append(entry)
-    return [{"title": title, "channels": channels, "raw": True} for title, channels in sorted(made.items())]
+        by_message.setdefault(field.message, []).append(entry)
+    return [{"title": title, "channels": channels, "raw": True} for title, channels in sorted(by_message.items())]

@@ -48,13 +48,13 @@ class Cockpit:
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
-        late = threading.Timer(_PATIENCE, process.kill)
-        late.start()
+        watchdog = threading.Timer(_PATIENCE, process.kill)
+        watchdog.start()
         try:
             assert process.stdout is not None
             address = next((m for line in process.stdout if (m := re.search(rb"http://\S+", line))), None)
         finally:
-            late.cancel()
+            watchdog.cancel()
         if address is None:
             raise SwashError(
                 f"the live page of {VEHICLE} did not start.", hint=f"`swash live {VEHICLE}` in a terminal says why."

@@ -39,10 +39,10 @@ class Read:
     log: int | None = None
 
     @property
-    def words(self) -> str:
+    def option_text(self) -> str:
         """The options of a command that reads this log."""
         mapping = f"--mapping {shlex.quote(self.mapping)}" if self.mapping else ""
-        return " ".join(part for part in (mapping, self.options.words) if part)
+        return " ".join(part for part in (mapping, self.options.option_text) if part)
 
     def named(self, start: float | None = None, stop: float | None = None) -> str:
         """The log as a command's argument, or the part of it from start to stop [s]."""
@@ -82,7 +82,7 @@ IMPORT = "import swashplate as sp"
 
 def inspected(read: Read) -> Code:
     """Looking at a log."""
-    shell = " ".join(part for part in ("swash inspect", read.named(), read.words) if part)
+    shell = " ".join(part for part in ("swash inspect", read.named(), read.option_text) if part)
     return Code(
         f"Read {PurePath(read.file).name}", shell, "\n".join([IMPORT, read.python(), "print(sp.inspect(flight))"])
     )
@@ -90,7 +90,7 @@ def inspected(read: Read) -> Code:
 
 def reviewed(read: Read) -> Code:
     """What a flight tells without a sweep."""
-    shell = " ".join(part for part in ("swash inspect", read.named(), read.words) if part)
+    shell = " ".join(part for part in ("swash inspect", read.named(), read.option_text) if part)
     return Code(
         f"Review {PurePath(read.file).name}", shell, "\n".join([IMPORT, read.python(), "print(sp.review(flight))"])
     )
@@ -108,11 +108,11 @@ def plotted(reads: Sequence[Read], channels: Sequence[Sequence[str]], span: tupl
         lines.append(f'figure.savefig("{"flight" if len(reads) == 1 else f"flight-{k + 1}"}.pdf")')
     named = [read.named(*span) if k == 0 and span is not None else read.named() for k, read in enumerate(reads)]
     every = ",".join(dict.fromkeys(name for names in channels for name in names))
-    words = {read.words for read in reads}
+    options = {read.option_text for read in reads}
     # One command has one set of options: logs that were read differently, or lack a channel, have none.
-    alike = len(words) == 1 and len({tuple(names) for names in channels}) == 1
+    alike = len(options) == 1 and len({tuple(names) for names in channels}) == 1
     shell = (
-        f"swash inspect {' '.join(named)} --channels {every} --out flight.pdf {words.pop()}".strip() if alike else ""
+        f"swash inspect {' '.join(named)} --channels {every} --out flight.pdf {options.pop()}".strip() if alike else ""
     )
     return Code("Plot", shell, "\n".join(lines))
 
@@ -133,14 +133,14 @@ def spectra(read: Read, channel: str, start: float, stop: float, *, rotor: bool)
     if rotor:
         lines.append(f"print(sp.harmonics(flight, {part}))")
     asked = f"--channels {channel} --figure spectrum --out spectrum.pdf"
-    shell = f"swash inspect {read.named(start, stop)} {asked} {read.words}"
+    shell = f"swash inspect {read.named(start, stop)} {asked} {read.option_text}"
     return Code(f"Spectrum of {channel}", shell.strip(), "\n".join(lines))
 
 
-def tracked(read: Read, channels: Sequence[str], *, whole: bool) -> Code:
+def tracked(read: Read, channels: Sequence[str], *, replayable: bool) -> Code:
     """The channels of the track over time; where place and attitude are whole, `swash live --replay` draws it too."""
     lines = [IMPORT, read.python(), f"figure = flight.plot(channels={list(channels)!r})", 'figure.savefig("track.pdf")']
-    shell = f"swash live --replay {read.named()} {read.words}".strip() if whole else ""
+    shell = f"swash live --replay {read.named()} {read.option_text}".strip() if replayable else ""
     return Code("Track", shell, "\n".join(lines))
 
 
@@ -149,26 +149,26 @@ def identified(
     chosen: Sequence[tuple[str, str, str]],
     references: Sequence[str],
     band: tuple[float, float],
-    seen: Sequence[tuple[Read, float, float, bool]],
+    hold_outs: Sequence[tuple[Read, float, float, bool]],
     fits: Sequence[tuple[str, tuple[float, float], bool]],
 ) -> Code:
     """From sweeps to gains, axis by axis.
 
     Args:
         parts: of the logs that are fitted. chosen: input, output and reference of each axis.
-        seen: what each axis' model is flown along, and whether the fit has not seen that; else the lines say so.
+        hold_outs: what each axis' model is flown along, and whether the fit has not seen that; else the lines say so.
         fits: form, band [Hz] and whether gains are asked for, by axis.
     """
     inputs, outputs = ([one[k] for one in chosen] for k in (0, 1))
-    told = "# The fit has seen this stretch: it verifies nothing."
+    warning = "# The fit has seen this stretch: it verifies nothing."
     reads: list[Read] = []
     for read, *_ in parts:
         reads += [read] if read not in reads else []
-    words = " ".join(dict.fromkeys(read.words for read in reads if read.words))
+    options = " ".join(dict.fromkeys(read.option_text for read in reads if read.option_text))
     logs = " ".join(read.named(start, stop) for read, start, stop in parts)
     asked = f"--inputs {','.join(inputs)} --outputs {','.join(outputs)}"
     given = f" --references {','.join(references)}" if references else ""
-    shell = [f"swash respond {logs} {asked}{given} --band {band[0]:g}-{band[1]:g} --out responses {words}".rstrip()]
+    shell = [f"swash respond {logs} {asked}{given} --band {band[0]:g}-{band[1]:g} --out responses {options}".rstrip()]
     names, lines = [*inputs, *outputs, *references], [IMPORT]
     flights = ["flight" if len(reads) == 1 else f"flight_{k + 1}" for k in range(len(reads))]
     lines += [read.python(name) for read, name in zip(reads, flights, strict=True)]
@@ -177,21 +177,21 @@ def identified(
     lines.append(f"records = sp.uniform_records({listed}, {names!r})")
     given = f"references={list(references)!r}, " if references else ""
     lines.append(f"responses = sp.respond(records, inputs={inputs!r}, outputs={outputs!r}, {given}band={band!r})")
-    for k, (axis, stretch, fit) in enumerate(zip(chosen, seen, fits, strict=True)):
-        (moved, answer, _), (other, start, stop, unseen), (form, (low, high), wanted) = axis, stretch, fit
+    for k, (axis, stretch, fit) in enumerate(zip(chosen, hold_outs, fits, strict=True)):
+        (driven, answer, _), (other, start, stop, unseen), (form, (low, high), wanted) = axis, stretch, fit
         end = "" if len(chosen) == 1 else f"-{answer}"
-        shell += [] if unseen else [told]
-        asked = f"--input {moved} --outputs {answer} --form {form} --band {low:g}-{high:g}{' --gains' * wanted}"
-        unseen_part = f"--hold-out {other.named(start, stop)} --out study{end} {other.words}".rstrip()
+        shell += [] if unseen else [warning]
+        asked = f"--input {driven} --outputs {answer} --form {form} --band {low:g}-{high:g}{' --gains' * wanted}"
+        unseen_part = f"--hold-out {other.named(start, stop)} --out study{end} {other.option_text}".rstrip()
         shell.append(f"swash identify --responses responses {asked} {unseen_part}")
         called, study = "unseen" if unseen else "fitted", "study" if len(chosen) == 1 else f"study_{k + 1}"
-        lines += [other.python("other"), *([] if unseen else [told])]
+        lines += [other.python("other"), *([] if unseen else [warning])]
         lines += [
             f"{called} = other.between({start:.10g}, {stop:.10g})",
-            f"{study} = sp.fit_tf(responses, input={moved!r}, outputs=[{answer!r}], form={form!r}, "
+            f"{study} = sp.fit_tf(responses, input={driven!r}, outputs=[{answer!r}], form={form!r}, "
             f"band=({low:g}, {high:g}), gains={wanted}, hold_out={called})",
             f"print({study})",
             f'{study}.save("study{end}")',
         ]
-    title = ", ".join(f"{answer} / {moved}" for moved, answer, _ in chosen)
+    title = ", ".join(f"{answer} / {driven}" for driven, answer, _ in chosen)
     return Code(f"Identify {title}", "\n".join(shell), "\n".join(lines))

@@ -60,8 +60,8 @@ def apply_columns(opened: Opened, rows: Sequence[Row], rate: float) -> dict[str,
     Raises:
         SwashError: where the file is no table.
     """
-    table, told = _table(opened)
-    names = {guess.index: guess.name for guess in told}
+    table, guesses = _table(opened)
+    names = {guess.index: guess.name for guess in guesses}
     chosen = [Guess(i, names.get(i, ""), name, unit, factor, offset) for i, name, unit, factor, offset in rows]
     twice = {guess.channel for guess in chosen if [g.channel for g in chosen].count(guess.channel) > 1}
     if twice:
@@ -85,10 +85,10 @@ def _faults(error: SwashError) -> list[str]:
 
 
 def _table(opened: Opened) -> tuple[ColumnTable, list[Guess]]:
-    told = guessed(open_source(opened.path))
-    if told is None:
+    layout = guessed(open_source(opened.path))
+    if layout is None:
         raise SwashError("is no table: its channels are known.", where=opened.read.file)
-    return told
+    return layout
 
 
 def _as_kept(guess: Guess, kept: dict[str, Any]) -> Guess:

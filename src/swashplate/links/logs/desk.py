@@ -57,8 +57,8 @@ class Desk:
                     f"{MOST_LOGS} logs are open, and no more fit.", where=read.file, hint="Close one of them first."
                 )
             number = max(self._logs, default=0) + 1
-            self._logs[number] = made = Opened(number, path, read)
-        return made
+            self._logs[number] = opened = Opened(number, path, read)
+        return opened
 
     def open(self, path: Path, name: str = "") -> Opened:
         """A file that was dropped, read under its name, or under that by which a command finds it.
@@ -66,9 +66,9 @@ class Desk:
         Raises:
             SwashError: where too many logs are open.
         """
-        made = self._put(path, Read(name or path.name))
-        made.load(made.read)
-        return made
+        opened = self._put(path, Read(name or path.name))
+        opened.load(opened.read)
+        return opened
 
     def open_example(self, file: str) -> Opened:
         """A log that comes with the package.
@@ -129,13 +129,13 @@ class Desk:
         Raises:
             SwashError: naming a log that is not open, or a channel that it lacks.
         """
-        made = []
+        curves = []
         for number, name, start, stop in wanted:
             shown = self.log(number).shown(name)
             drawn = trace(
                 shown.time, shown.numbers, start=start, stop=stop, bins=max(2, min(bins, BINS)), breaks=shown.breaks
             )
-            made.append(
+            curves.append(
                 {
                     "log": number,
                     "channel": name,
@@ -145,7 +145,7 @@ class Desk:
                     "thinned": drawn.thinned,
                 }
             )
-        return made
+        return curves
 
     def plot_code(self, wanted: Sequence[tuple[int, str]], span: tuple[float, float] | None) -> dict[str, str]:
         """The lines that draw the same channels; fields that are no channels have no such lines."""
@@ -190,8 +190,8 @@ class Desk:
 
         def work(folder: Path, tell: Tell) -> Identified:
             one = inspection.sweeps[sweep]
-            own = bool(input or output)
-            return identify_sweep(opened, one, chosen, others=others, folder=folder, tell=tell, alone_only=own)
+            by_hand = bool(input or output)
+            return identify_sweep(opened, one, chosen, others=others, folder=folder, tell=tell, alone_only=by_hand)
 
         return {"number": self.job.start(work), "channels": chosen._asdict()}
 
@@ -199,9 +199,9 @@ class Desk:
         """Channels that several logs share, and a sentence where they share none."""
         ready = [log for log in (self.log(number) for number in numbers) if log.state == READY]
         shared = [name for name in (ready[0].ready.channels if ready else ()) if all(name in x.ready for x in ready)]
-        words = ""
+        remark = ""
         if len(ready) > 1 and not shared:
             names = ", ".join(log.read.file for log in ready)
             near = did_you_mean(ready[0].ready.channels[0], ready[1].ready.channels)
-            words = f"{names} share no channel: each is drawn for itself. {near or ''}".strip()
-        return {"channels": shared, "words": words}
+            remark = f"{names} share no channel: each is drawn for itself. {near or ''}".strip()
+        return {"channels": shared, "words": remark}

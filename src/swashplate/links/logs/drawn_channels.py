@@ -25,14 +25,14 @@ class DrawnChannel:
         numbers: in the unit of the screen, as the log stores them where it has few bits, shape (n,).
         unit: of the screen.
         breaks: samples before which there is a gap.
-        own: what of it is held here alone, and no flight has.
+        unshared: what of it is held here alone, and no flight has.
     """
 
     time: Array
     numbers: Array | StoredColumn
     unit: str
     breaks: NDArray[np.int64]
-    own: tuple[NDArray[np.generic], ...] = ()
+    unshared: tuple[NDArray[np.generic], ...] = ()
 
     @property
     def values(self) -> Array:
@@ -70,5 +70,5 @@ class DrawnChannels:
     @property
     def size(self) -> int:
         """Bytes that are kept beside the flight."""
-        arrays = {id(array): array.nbytes for drawn in self._kept.values() for array in drawn.own}
+        arrays = {id(array): array.nbytes for drawn in self._kept.values() for array in drawn.unshared}
         return sum(arrays.values())

@@ -23,19 +23,20 @@ def review_of(opened: Opened) -> dict[str, Any]:
     """
     flight = opened.ready
     kind = aircraft_kind(flight)
-    told = review(flight, swept=opened.inspection.sweeps if opened.inspection else None)
+    findings = review(flight, swept=opened.inspection.sweeps if opened.inspection else None)
     return {
-        "tells": told.tells,
-        "vehicle": told.vehicle,
+        "tells": findings.tells,
+        "vehicle": findings.vehicle,
         "made_for": kind.made_for if kind is not None else "",
-        "lists": [[heading, list(lines)] for heading, lines in told.lists()],
+        "lists": [[heading, list(lines)] for heading, lines in findings.lists()],
         "incidents": [
-            {"kind": each.kind, "start": each.start, "stop": each.stop, "text": each.text} for each in told.incidents
+            {"kind": each.kind, "start": each.start, "stop": each.stop, "text": each.text}
+            for each in findings.incidents
         ],
-        "loops": [_loop(each) for each in told.loops],
-        "noise": [_noise(each) for each in told.noise],
-        "next": [_next(each) for each in told.next],
-        "about_next": told.about_next,
+        "loops": [_loop(each) for each in findings.loops],
+        "noise": [_noise(each) for each in findings.noise],
+        "next": [_next(each) for each in findings.next],
+        "about_next": findings.about_next,
         "code": code_lines.reviewed(opened.read).to_document(),
     }
 

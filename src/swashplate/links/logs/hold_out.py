@@ -28,7 +28,7 @@ class Part(NamedTuple):
     read: Read
     start: float
     stop: float
-    words: str
+    description: str
     unseen: bool
     flight: Flight
 
@@ -51,17 +51,17 @@ def hold_out(opened: Opened, sweep: Sweep, input: str, output: str, others: Sequ
         if apart and other.flight is not None and input in other.flight and output in other.flight:
             stretch = _longest(other.flight, input, output, [], _MOVES * spread)
             if stretch:
-                words = f"another log, {other.read.file}, {stretch[0]:.1f} to {stretch[1]:.1f} s"
-                return Part(other.read, *stretch, words, True, other.flight)
+                description = f"another log, {other.read.file}, {stretch[0]:.1f} to {stretch[1]:.1f} s"
+                return Part(other.read, *stretch, description, True, other.flight)
     stretch = _longest(flight, input, output, [(begin, end)], _MOVES * spread)
     if stretch:
-        words = f"another part of the log, {stretch[0]:.1f} to {stretch[1]:.1f} s"
-        return Part(opened.read, *stretch, words, True, flight)
-    words = (
+        description = f"another part of the log, {stretch[0]:.1f} to {stretch[1]:.1f} s"
+        return Part(opened.read, *stretch, description, True, flight)
+    description = (
         "the sweep itself, which the fit has seen: this is NO verification. No other part of the open logs has "
         f"{input} moved from outside for {_SHORTEST:g} s; open a log with such a part, and it is used."
     )
-    return Part(opened.read, begin, end, words, False, flight)
+    return Part(opened.read, begin, end, description, False, flight)
 
 
 def _spread(flight: Flight, name: str, start: float, stop: float) -> float:
@@ -89,18 +89,18 @@ def _longest(
     stretches = []
     for start, stop in pairwise(rising):
         free = not any(start < end and begin < stop for begin, end in taken)
-        whole = all(_whole(flight.time(name), start, stop) for name in (input, output))
-        if stop - start >= _SHORTEST and free and whole and _spread(flight, input, start, stop) > least:
+        gapless = all(_is_gapless(flight.time(name), start, stop) for name in (input, output))
+        if stop - start >= _SHORTEST and free and gapless and _spread(flight, input, start, stop) > least:
             stretches.append((round(start + 0.001, 3), round(stop - 0.001, 3)))
     stretches.sort(key=lambda pair: pair[0] - pair[1])
-    return next((pair for pair in stretches if _moved(flight.between(*pair), input, output)), None)
+    return next((pair for pair in stretches if _is_excited(flight.between(*pair), input, output)), None)
 
 
-def _moved(part: Flight, input: str, output: str) -> bool:
+def _is_excited(part: Flight, input: str, output: str) -> bool:
     return any(one.outside for one in excitations(part, [input], outputs=[output]))
 
 
-def _whole(time: Array, start: float, stop: float) -> bool:
+def _is_gapless(time: Array, start: float, stop: float) -> bool:
     """Whether the channel has samples all along and no gap between."""
     inside = time[(time >= start) & (time <= stop)]
     return inside.size > 10 and not gaps(inside).size

@@ -87,7 +87,7 @@ def identify_sweep(
         references=references,
         band=band,
     )
-    axes, studies, seen = [], [], []
+    axes, studies, hold_outs = [], [], []
     for k, one in enumerate(swept):
         begin, width = 0.12 + 0.73 * k / len(swept), 0.73 / len(swept)
 
@@ -105,24 +105,24 @@ def identify_sweep(
             tell(doing, begin + width * done / (total or 1e9))
 
         held = hold_out(one.opened, one.sweep, one.chosen.input, one.chosen.output, others)
-        made = _study(responses, one.chosen, held.flight.between(held.start, held.stop), say)
-        axes.append(_axis(one, responses, made.study, held, made.gained))
+        fitted = _study(responses, one.chosen, held.flight.between(held.start, held.stop), say)
+        axes.append(_axis(one, responses, fitted.study, held, fitted.gained))
         if len(swept) > 1:
-            own = (_digits(one.sweep.low), _digits(one.sweep.high))
+            sweep_band = (_digits(one.sweep.low), _digits(one.sweep.high))
             axes[-1]["off"] = off_axis(responses, one.chosen, [o for o in outputs if o != one.chosen.output])
-            axes[-1]["alone"] = alone(records[k], one.chosen, responses, band=own, form=made.form)
-        studies.append(made)
-        seen.append(held)
+            axes[-1]["alone"] = alone(records[k], one.chosen, responses, band=sweep_band, form=fitted.form)
+        studies.append(fitted)
+        hold_outs.append(held)
     tell("closing the loops with the gains", 0.88)
     code = code_lines.identified(
         [(one.opened.read, one.start, one.stop) for one in swept],
         [one.chosen for one in swept],
         references,
         band,
-        [(held.read, held.start, held.stop, held.unseen) for held in seen],
-        [(made.form, made.band, not made.gained) for made in studies],
+        [(held.read, held.start, held.stop, held.unseen) for held in hold_outs],
+        [(fitted.form, fitted.band, not fitted.gained) for fitted in studies],
     )
-    files = _files([made.study for made in studies], responses, records, swept, folder)
+    files = _files([fitted.study for fitted in studies], responses, records, swept, folder)
     document = {
         "words": " ".join(f"{one.sweep}." for one in swept),
         "joined": _joined(swept),
@@ -186,14 +186,14 @@ def _study(responses: Any, chosen: Channels, part: Flight, say: Callable[..., No
     ends = fitted.targets[0].omega[[0, -1]] / (2.0 * np.pi)
     band = (float(np.floor(1e3 * ends[0]) / 1e3), float(np.ceil(1e3 * ends[1]) / 1e3))
     held = (part,) if study.structure is not None else ()
-    words, gains = "", True
+    refusal, gains = "", True
     try:
         resolve("suggest_gains")(study.fit, responses)
     except SwashError as error:
-        words, gains = f"{error.problem} {error.hint or ''}", False
+        refusal, gains = f"{error.problem} {error.hint or ''}", False
     # Once more with the form that was chosen: the same fit, with what is asked of it.
-    made = resolve("fit_tf")(responses, **asked, form=form, band=band, gains=gains, hold_out=held)
-    return _Chosen(made, words, form, band)
+    final = resolve("fit_tf")(responses, **asked, form=form, band=band, gains=gains, hold_out=held)
+    return _Chosen(final, refusal, form, band)
 
 
 def _decibels(h: Complex) -> Array:
@@ -240,18 +240,18 @@ def _fit(study: Any) -> dict[str, Any]:
     return {"formula": repr(fitted.solution[0]), "cost": fitted.cost, "rows": rows, "form": fitted.details.form.text}
 
 
-def _verified(study: Any, chosen: Channels, seen: Part) -> dict[str, Any] | None:
+def _verified(study: Any, chosen: Channels, part: Part) -> dict[str, Any] | None:
     verification = study.verification
     if verification is None:
         return None
     factor, k = channel(chosen.output).shown_factor, 0
     time = np.concatenate([trace.time for trace in verification.traces])
     return {
-        "on": seen.words,
-        "unseen": seen.unseen,
+        "on": part.description,
+        "unseen": part.unseen,
         "headline": list(verification.headline),
         "warnings": list(verification.warnings),
-        "verdict": verification.verdict if seen.unseen else "not a verification",
+        "verdict": verification.verdict if part.unseen else "not a verification",
         "unit": channel(chosen.output).shown_unit,
         "time": time,
         "flight": factor * np.concatenate([trace.flight[:, k] for trace in verification.traces]),
@@ -284,11 +284,11 @@ def _files(
 
     def parameters() -> Path:
         gains = [one for study in studies for one in study.material.gains]
-        told = [(name, value) for one in gains for name, value in one.parameters.items()]
+        settings = [(name, value) for one in gains for name, value in one.parameters.items()]
         if spoken:
-            lines = [*(f"set {name} = {value:.0f}" for name, value in told), "save"]
+            lines = [*(f"set {name} = {value:.0f}" for name, value in settings), "save"]
         else:
-            lines = [f"{name},{value:.6g}" for name, value in told]
+            lines = [f"{name},{value:.6g}" for name, value in settings]
         return write_text(folder / named, "\n".join(lines) + "\n")
 
     def measured() -> Path:

@@ -66,8 +66,8 @@ class PageJob:
         folder = self._folder / str(number)
         try:
             folder.mkdir(parents=True)
-            made = work(folder, tell)
-            self._put(number, {"state": "done", "result": made.document}, made.files)
+            identified = work(folder, tell)
+            self._put(number, {"state": "done", "result": identified.document}, identified.files)
         except _StoppedError:
             self._put(number, {"state": "cancelled"})
         except SwashError as error:
@@ -75,8 +75,8 @@ class PageJob:
             self._put(number, {"state": "failed", "problem": f"{place}{error.problem}", "hint": error.hint or ""})
         except Exception as error:  # a thread's end is heard by nobody else
             _LOG.error("An identification failed: %s: %s", type(error).__name__, error)
-            words = f"This went wrong inside swash ({type(error).__name__}: {error})."
-            self._put(number, {"state": "failed", "problem": words, "hint": "Please report it with the log."})
+            problem = f"This went wrong inside swash ({type(error).__name__}: {error})."
+            self._put(number, {"state": "failed", "problem": problem, "hint": "Please report it with the log."})
 
     def _put(self, number: int, state: dict[str, Any], files: Mapping[str, Make] | None = None) -> None:
         with self._lock:

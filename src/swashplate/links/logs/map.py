@@ -31,7 +31,7 @@ def map_of(opened: Opened) -> dict[str, Any]:
     if "x" in flight and "y" in flight and flight.stream_of("x") == flight.stream_of("y"):
         names = ("x", "y")
         time, north, east = flight.time("x"), flight.values("x"), flight.values("y")
-        words = "The track as the log's x and y have it."
+        remark = "The track as the log's x and y have it."
     else:
         names = _fields(opened)
         if names is None:
@@ -42,7 +42,7 @@ def map_of(opened: Opened) -> dict[str, Any]:
             )
         latitude, longitude = opened.shown(names[0]), opened.shown(names[1])
         time, north, east = _metres(latitude.time, latitude.values, longitude.values)
-        words = f"The track of {names[0]} and {names[1]}."
+        remark = f"The track of {names[0]} and {names[1]}."
     good = np.isfinite(north) & np.isfinite(east)
     if good.sum() < 2:
         raise FlightError("has fewer than two places.", where=opened.read.file)
@@ -55,8 +55,8 @@ def map_of(opened: Opened) -> dict[str, Any]:
         "time": time,
         "north": np.round(north, 3),
         "east": np.round(east, 3),
-        "words": words,
-        "code": code_lines.tracked(opened.read, drawn, whole=False).to_document() if drawn else None,
+        "words": remark,
+        "code": code_lines.tracked(opened.read, drawn, replayable=False).to_document() if drawn else None,
     }
 
 

@@ -79,9 +79,9 @@ class Opened:
         Raises:
             SwashError: where it cannot be checked.
         """
-        made = cls(1, path, read, READY, flight, inspect(flight), listed=True, version=1)
-        made._groups = groups(flight)
-        return made
+        opened = cls(1, path, read, READY, flight, inspect(flight), listed=True, version=1)
+        opened._groups = groups(flight)
+        return opened
 
     def load(self, read: Read) -> None:
         """Read the log, then check it in a thread; what cannot be read is said in `problem`, never raised.
@@ -121,7 +121,7 @@ class Opened:
                 log=read.log,
             )
         except SwashError as error:
-            return None, *_told(error)
+            return None, *_problem_and_hint(error)
         except (OSError, MemoryError) as error:
             return None, f"cannot be read: {error or 'it does not fit into memory'}.", ""
         if not flight.channels:
@@ -135,10 +135,10 @@ class Opened:
         if flight is None and "no such file" in problem:
             return False
         try:
-            told = guessed(open_source(self.path))
+            layout = guessed(open_source(self.path))
         except SwashError:
             return False
-        return told is not None and sum(guess.why != "no numbers" for guess in told[1]) > 1
+        return layout is not None and sum(guess.why != "no numbers" for guess in layout[1]) > 1
 
     def read_mapping(self) -> dict[str, Any]:
         """The mapping that it is read by, {} for none."""
@@ -155,7 +155,7 @@ class Opened:
         try:
             inspection = inspect(flight)
         except SwashError as error:
-            problem, hint = _told(error)
+            problem, hint = _problem_and_hint(error)
         except Exception as error:  # a thread's end is heard by nobody else
             _LOG.error("A check failed: %s: %s", type(error).__name__, error)
             problem = f"could not be checked ({type(error).__name__}: {error})."
@@ -188,8 +188,8 @@ class Opened:
             if name not in flight and self.fields is not None and name in self.fields.listed:
                 time, column = self.fields.column(name)
                 time = channels.same_times(time - (flight.epoch or 0.0))
-                own = (time, column.stored)
-                drawn = DrawnChannel(time, column, self.fields.listed[name].unit, gaps(time), own)
+                unshared = (time, column.stored)
+                drawn = DrawnChannel(time, column, self.fields.listed[name].unit, gaps(time), unshared)
             else:
                 drawn = self._channel(flight, name)
             channels.keep(name, drawn)
@@ -215,8 +215,8 @@ class Opened:
         code = inspected(self.read).to_document()
         if self.state == FAILED:
             mend = remedy(self.hint)
-            told = {"problem": self.problem, "hint": self.hint, "remedy": mend and mend.to_document()}
-            return {**head, **told, "code": code}
+            refusal = {"problem": self.problem, "hint": self.hint, "remedy": mend and mend.to_document()}
+            return {**head, **refusal, "code": code}
         if self.flight is None or self.state == READING:
             return head
         return {**head, **self._content, "code": code}
@@ -233,7 +233,7 @@ class Opened:
             "vehicle": origin.vehicle,
             "reader": origin.reader,
             "simulated": origin.simulated,
-            "options": self.read.options.words,
+            "options": self.read.options.option_text,
             "groups": self._groups,
             "checked": look is not None,
             "listed": self.listed,
@@ -249,7 +249,7 @@ class Opened:
         }
 
 
-def _told(error: SwashError) -> tuple[str, str]:
+def _problem_and_hint(error: SwashError) -> tuple[str, str]:
     """What went wrong, and the hint."""
     return f"{f'{error.channel}: ' if error.channel else ''}{error.problem}", error.hint or ""
 

@@ -59,7 +59,7 @@ def stripped(flight: Flight, path: Path, *, keep: Collection[str] = ()) -> Strip
     secret = [pattern for kind, pattern in _PARAMETERS.items() if kind in gone]
     settings = [name for name in origin.parameters if any(pattern.search(name) for pattern in secret)]
 
-    def told(event: Event) -> bool:
+    def is_kept(event: Event) -> bool:
         name = str(event.details.get("name", "")) if event.kind == "parameter" else ""
         return not ("messages" in gone and event.kind == "message") and not any(p.search(name) for p in secret)
 
@@ -75,10 +75,10 @@ def stripped(flight: Flight, path: Path, *, keep: Collection[str] = ()) -> Strip
         "date": "the date",
         "others": f"{len(unknown)} channels of unknown meaning" if unknown else "",
     }
-    words = [left_out[kind] for kind in gone if left_out[kind]]
-    words += [f"{len(settings)} parameters"] if settings else []
+    removed = [left_out[kind] for kind in gone if left_out[kind]]
+    removed += [f"{len(settings)} parameters"] if settings else []
     clean = _cleaner(flight, path, vehicle) if "names" in gone else str
-    made = Provenance(
+    provenance = Provenance(
         called,
         origin.sha256,
         origin.reader,
@@ -88,7 +88,7 @@ def stripped(flight: Flight, path: Path, *, keep: Collection[str] = ()) -> Strip
         tuple(map(clean, origin.notes)),
         tuple(map(clean, origin.damage)),
         {name: value for name, value in origin.parameters.items() if name not in settings},
-        tuple(filter(told, origin.events)),
+        tuple(filter(is_kept, origin.events)),
         tuple(replace(problem, text=clean(problem.text)) for problem in origin.problems),
         0.0 if "date" in gone else origin.epoch,
         origin.firmware,
@@ -97,7 +97,7 @@ def stripped(flight: Flight, path: Path, *, keep: Collection[str] = ()) -> Strip
     streams = {name: data.drop_vars([v for v in away if v in data.data_vars]) for name, data in flight.streams.items()}
     kept = {name: data for name, data in streams.items() if data.data_vars}
     return Stripped(
-        replace(flight, streams=kept, provenance=made, history=()), called, tuple(words), (*unknown, *settings)
+        replace(flight, streams=kept, provenance=provenance, history=()), called, tuple(removed), (*unknown, *settings)
     )
 
 

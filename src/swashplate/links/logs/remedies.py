@@ -23,14 +23,14 @@ class Remedy:
     drop_bad_stamps: bool = False
 
     @property
-    def words(self) -> str:
+    def option_text(self) -> str:
         """The options as the command line has them."""
         given = [f"--unit {name}={unit}" for name, unit in self.units.items()]
         return " ".join([*given, *([_DROP] if self.drop_bad_stamps else [])])
 
     def to_document(self) -> dict[str, object]:
         """As the page has it."""
-        return {"words": self.words, "units": dict(self.units), "drop_bad_stamps": self.drop_bad_stamps}
+        return {"words": self.option_text, "units": dict(self.units), "drop_bad_stamps": self.drop_bad_stamps}
 
 
 def remedy(text: str) -> Remedy | None:

@@ -59,7 +59,7 @@ def fields(content: bytes, form: Form) -> dict[str, Any]:
     return message
 
 
-def told(result: Any, *, status: int = 200) -> Response:
+def json_response(result: Any, *, status: int = 200) -> Response:
     """A result as JSON; NaN becomes null."""
     return JSONResponse(plain(result), status_code=status)
 
@@ -67,15 +67,15 @@ def told(result: Any, *, status: int = 200) -> Response:
 def refused(error: BaseException) -> Response:
     """An error in words, without a traceback: those of a user's input as they are, others by their kind."""
     if isinstance(error, asyncio.CancelledError):
-        return told({"problem": "swash has been ended.", "hint": ""}, status=503)
+        return json_response({"problem": "swash has been ended.", "hint": ""}, status=503)
     if isinstance(error, RequestError):
-        return told({"problem": error.problem, "hint": ""}, status=400)
+        return json_response({"problem": error.problem, "hint": ""}, status=400)
     if isinstance(error, SwashError):
         place = f"{error.channel}: " if error.channel else ""
-        return told({"problem": f"{place}{error.problem}", "hint": error.hint or ""}, status=422)
+        return json_response({"problem": f"{place}{error.problem}", "hint": error.hint or ""}, status=422)
     _LOG.error("A request failed: %s: %s", type(error).__name__, error)
-    words = f"This went wrong inside swash ({type(error).__name__}: {error}). The other views go on working."
-    return told({"problem": words, "hint": "Please report it with the log."}, status=500)
+    problem = f"This went wrong inside swash ({type(error).__name__}: {error}). The other views go on working."
+    return json_response({"problem": problem, "hint": "Please report it with the log."}, status=500)
 
 
 def post(form: Form, work: Callable[..., Any]) -> Callable[[Request], Any]:
@@ -84,7 +84,7 @@ def post(form: Form, work: Callable[..., Any]) -> Callable[[Request], Any]:
     async def answer(request: Request) -> Response:
         try:
             message = fields(await body(request, longest=LONGEST), form)
-            return told(await in_thread(work, **message))
+            return json_response(await in_thread(work, **message))
         except (Exception, asyncio.CancelledError) as error:  # whatever it is, the page hears it in words
             return refused(error)
 
@@ -96,7 +96,7 @@ def get(work: Callable[[], Any]) -> Callable[[Request], Any]:
 
     async def answer(_: Request) -> Response:
         try:
-            return told(await in_thread(work))
+            return json_response(await in_thread(work))
         except (Exception, asyncio.CancelledError) as error:
             return refused(error)
 
@@ -104,7 +104,7 @@ def get(work: Callable[[], Any]) -> Callable[[Request], Any]:
 
 
 # ---- what a field may be ---------------------------------------------------------------------------------------------
-def whole(low: int, high: int) -> Check:
+def integer(low: int, high: int) -> Check:
     """A whole number between two, both included."""
     return lambda value: isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
 

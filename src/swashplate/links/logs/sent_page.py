@@ -65,7 +65,7 @@ def sent_page(
     *,
     read: Read | None = None,
     keep: Collection[str] = (),
-    made: str = "",
+    maker: str = "",
     say: Callable[[str], None] = lambda _: None,
 ) -> SentPage:
     """A log as a page that is sent to others.
@@ -74,7 +74,7 @@ def sent_page(
         flight: as it was read from `path`.
         read: how; its words stand beside what can be done again.
         keep: what of `personal.KINDS` stays in it.
-        made: what made it, in a line.
+        maker: what made it, in a line.
         say: hears what is being done.
 
     Raises:
@@ -112,8 +112,8 @@ def sent_page(
 
     def page(curves: _Curves) -> SentPage:
         remarks = tuple(filter(None, (inside, curves.thinned, gone)))
-        about = "".join(f"<p>{html.escape(line)}</p>" for line in (*remarks, made))
-        told = f'<details id="sent"><summary>A flight log, sent as a page: what is in it</summary>{about}</details>'
+        about = "".join(f"<p>{html.escape(line)}</p>" for line in (*remarks, maker))
+        details = f'<details id="sent"><summary>A flight log, sent as a page: what is in it</summary>{about}</details>'
         text = single_file(
             PAGE / "open.html",
             entry="/open/sent.js",
@@ -124,7 +124,7 @@ def sent_page(
             instead={"/open/server.js": "/open/kept.js"},
             within={
                 '<body data-view="plots">': '<body data-view="plots" data-sent>',
-                '<nav id="views"': f'{told}\n<nav id="views"',
+                '<nav id="views"': f'{details}\n<nav id="views"',
             },
         )
         return SentPage(text, (*remarks, f"These channels and parameters: {', '.join(named)}.") if named else remarks)
@@ -151,9 +151,11 @@ def _kept(ask: Callable[[], Any]) -> dict[str, Any]:
 
 
 def _spectra(log: Opened, name: str) -> dict[str, Any]:
-    told = spectra(log, name, log.ready.start, log.ready.stop)
-    told["frequency"], told["density"] = ([float(f"{v:.6g}") for v in told[key]] for key in ("frequency", "density"))
-    return {**told, "words": f"Of the whole log. {told['words']}"}
+    spectrum = spectra(log, name, log.ready.start, log.ready.stop)
+    spectrum["frequency"], spectrum["density"] = (
+        [float(f"{v:.6g}") for v in spectrum[key]] for key in ("frequency", "density")
+    )
+    return {**spectrum, "words": f"Of the whole log. {spectrum['words']}"}
 
 
 def _jobs(log: Opened, say: Callable[[str], None]) -> dict[str, Any]:
@@ -242,8 +244,8 @@ def _curves(log: Opened, bins: int) -> _Curves:
                 "thinned": drawn.thinned,
             }
         )
-    words = ""
+    remark = ""
     if thinned:
         share = f"{left:,} of {samples:,} samples stay"
-        words = f"Thinned to the lowest and the highest of {bins:,} bins a channel: {', '.join(thinned)} ({share})."
-    return _Curves(b"".join(pieces), listed, words)
+        remark = f"Thinned to the lowest and the highest of {bins:,} bins a channel: {', '.join(thinned)} ({share})."
+    return _Curves(b"".join(pieces), listed, remark)

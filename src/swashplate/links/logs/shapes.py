@@ -61,23 +61,23 @@ def shape_of(flight: Flight) -> tuple[dict[str, Any], str]:
     kind = aircraft_kind(flight)
     if kind is None:
         return _packaged(HELICOPTER, "The log does not say what flew")
-    words = f"The log is of {kind.noun} ({kind.source})"
+    remark = f"The log is of {kind.noun} ({kind.source})"
     if kind.main_rotors:
-        return _packaged(USUAL if kind.coaxial else HELICOPTER, words)
+        return _packaged(USUAL if kind.coaxial else HELICOPTER, remark)
     if kind.rotors in BY_ROTORS:
-        return _packaged(BY_ROTORS[kind.rotors], words)
+        return _packaged(BY_ROTORS[kind.rotors], remark)
     if kind.multirotor:
-        return plain(kind.rotors or 4), f"{words}: a plain one is drawn."
+        return generic_shape(kind.rotors or 4), f"{remark}: a plain one is drawn."
     if kind.noun in _FORMS:
-        return {**plain(0), "parts": _FORMS[kind.noun]}, f"{words}: a plain one is drawn."
-    return plain(0), f"{words}: no shape of its kind is known here, a plain body shows how it stood."
+        return {**generic_shape(0), "parts": _FORMS[kind.noun]}, f"{remark}: a plain one is drawn."
+    return generic_shape(0), f"{remark}: no shape of its kind is known here, a plain body shows how it stood."
 
 
-def _packaged(name: str, words: str) -> tuple[dict[str, Any], str]:
-    return picture(vehicle(name)), f"{words}: the shape of {name} is drawn."
+def _packaged(name: str, remark: str) -> tuple[dict[str, Any], str]:
+    return picture(vehicle(name)), f"{remark}: the shape of {name} is drawn."
 
 
-def plain(rotors: int) -> dict[str, Any]:
+def generic_shape(rotors: int) -> dict[str, Any]:
     """A body with so many rotors around it, the first ahead to the right; nothing but the body where there are none."""
     angles = 2.0 * np.pi * (np.arange(rotors) + 0.5) / max(rotors, 1)
     radius = min(0.45 * _ARM, 0.9 * _ARM * float(np.sin(np.pi / max(rotors, 2))))

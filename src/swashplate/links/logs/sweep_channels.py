@@ -28,15 +28,15 @@ def channels_of(flight: Flight, sweep: Sweep, *, input: str = "", output: str = 
     Raises:
         FlightError: where the log has none that fits.
     """
-    words = sweep.axis.replace("_", " ").lower().split()
-    axis = next((name for name in _RATES if name in words), "collective" if set(words) & set(_HEAVE) else "")
-    moved = input or next(
+    terms = sweep.axis.replace("_", " ").lower().split()
+    axis = next((name for name in _RATES if name in terms), "collective" if set(terms) & set(_HEAVE) else "")
+    driven = input or next(
         (name for pattern in _INPUTS if axis and (name := pattern.format(axis)) in flight),
         sweep.channel if sweep.channel in flight and sweep.channel != _INJECTED else "",
     )
     answers = (_RATES[axis],) if axis in _RATES else ("az", "w", "vz") if axis else ("p", "q", "r")
     answer = output or next((name for name in answers if name in flight), "")
-    for name, role in ((moved, "input"), (answer, "output")):
+    for name, role in ((driven, "input"), (answer, "output")):
         if not name or name not in flight:
             raise FlightError(
                 f"no {role} is known for a sweep of '{sweep.axis}'; the log has {', '.join(flight.channels)}.",
@@ -45,4 +45,4 @@ def channels_of(flight: Flight, sweep: Sweep, *, input: str = "", output: str = 
                 hint="Choose input and output yourself.",
             )
     injected = _INJECTED if sweep.source == "log" and _INJECTED in flight else ""
-    return Channels(moved, answer, injected)
+    return Channels(driven, answer, injected)

@@ -42,20 +42,20 @@ def together(opened: Opened, sweep: Sweep, chosen: Channels, others: Sequence[Op
 
     Sweeps of the same input in other logs are left for the verification.
     """
-    made = [Swept(opened, sweep, *part_of(opened.ready, sweep), chosen)]
+    sweeps = [Swept(opened, sweep, *part_of(opened.ready, sweep), chosen)]
     alike = [other for other in others if _same_vehicle(opened, other)]
     for log in (opened, *alike):
         for one in log.inspection.sweeps if log.inspection else ():
-            taken = {swept.chosen.input for swept in made} | {swept.chosen.output for swept in made}
+            taken = {swept.chosen.input for swept in sweeps} | {swept.chosen.output for swept in sweeps}
             try:
                 channels = channels_of(log.ready, one)
             except FlightError:
                 continue
             if channels.input not in taken and channels.output not in taken:
-                made.append(Swept(log, one, *part_of(log.ready, one), channels))
-    names = {name for swept in made for name in swept.chosen[:2]}
-    whole = [swept for swept in made if names <= set(swept.opened.ready.channels)]
-    return whole if made[0] in whole else made[:1]
+                sweeps.append(Swept(log, one, *part_of(log.ready, one), channels))
+    names = {name for swept in sweeps for name in swept.chosen[:2]}
+    complete = [swept for swept in sweeps if names <= set(swept.opened.ready.channels)]
+    return complete if sweeps[0] in complete else sweeps[:1]
 
 
 def _same_vehicle(one: Opened, other: Opened) -> bool:

@@ -57,10 +57,10 @@ def track(opened: Opened) -> dict[str, Any]:
         notes.append("The log has no place: the attitude is drawn at one point.")
     if angled is None:
         notes.append("The log has no attitude: the track is drawn level, with the nose to the north.")
-    whole = not notes
+    replayable = not notes
     drawn = [name for name in (*POSITION, *ATTITUDE, *QUATERNION) if name in flight]
-    shape, words = shape_of(flight)
-    notes += [words] * bool(words)
+    shape, remark = shape_of(flight)
+    notes += [remark] * bool(remark)
     depth = shape["skids"]["depth"] if shape["skids"] else 0.25 * shape["size"]
     return {
         "time": time,
@@ -72,7 +72,7 @@ def track(opened: Opened) -> dict[str, Any]:
         "rotors": len(shape["rotors"]),
         "tail": shape["tail"] is not None,
         "notes": notes,
-        "code": code_lines.tracked(opened.read, drawn, whole=whole).to_document(),
+        "code": code_lines.tracked(opened.read, drawn, replayable=replayable).to_document(),
     }
 
 

@@ -119,6 +119,6 @@ def test_the_track(desk: Desk, folder: Path) -> None:
 def test_every_option_of_a_reading_is_in_both() -> None:
     read = Read("a b.bbl", Remedy({"p": "deg/s"}, True), "m.toml", 2)
     assert read.named(1.0, 2.5) == "'a b.bbl#2@1-2.5'"
-    assert read.words == "--mapping m.toml --unit p=deg/s --drop-bad-stamps"
+    assert read.option_text == "--mapping m.toml --unit p=deg/s --drop-bad-stamps"
     line = read.python()
     assert line == "flight = sp.read('a b.bbl', units={'p': 'deg/s'}, mapping='m.toml', bad_stamps=\"drop\", log=2)"

@@ -78,7 +78,7 @@ def test_browsing_every_field_stays_within_its_room(opened: Opened, monkeypatch:
     opened._channels = DrawnChannels(room=20_000)
     for name in opened.fields.listed:
         first = opened.shown(name)
-        assert opened._channels.size <= max(20_000, sum(array.nbytes for array in first.own))
+        assert opened._channels.size <= max(20_000, sum(array.nbytes for array in first.unshared))
     names = list(opened.fields.listed)
     assert opened._channels.get(names[0]) is None, "the first has gone"
     again = opened.shown(names[0])

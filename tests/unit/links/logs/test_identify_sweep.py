@@ -165,7 +165,7 @@ def test_without_another_part_it_says_that_nothing_was_verified(made: tuple[Desk
     sweep = short.inspection.sweeps[0]
     alone = hold_out(short, sweep, "mixer_roll", "p", [])
     assert not alone.unseen
-    assert "NO verification" in alone.words
+    assert "NO verification" in alone.description
     other = hold_out(short, sweep, "mixer_roll", "p", [long])
     assert other.unseen
     assert other.flight is long.flight
@@ -205,7 +205,7 @@ def test_a_part_in_which_only_another_input_was_moved_verifies_nothing(tmp_path:
     assert np.std(pitch.flight.values("mixer_roll")) > 0.1 * np.std(roll.ready.values("mixer_roll"))
     found = hold_out(roll, sweep, "mixer_roll", "p", [pitch])
     assert not found.unseen
-    assert "mixer_roll moved from outside" in found.words
+    assert "mixer_roll moved from outside" in found.description
     assert hold_out(roll, sweep, "mixer_roll", "p", [pitch, both]).flight is both.flight
     desk.close()
 

@@ -25,7 +25,7 @@ from swashplate.links.logs.remedies import Remedy, remedy
 def test_options_are_found_in_a_message(text: str, units: dict[str, str], drop: bool) -> None:
     found = remedy(text)
     assert found == Remedy(units, drop)
-    assert found.words
+    assert found.option_text
 
 
 def test_a_message_without_an_option_has_no_remedy() -> None:
@@ -49,5 +49,5 @@ def test_a_finding_of_the_program_is_mended_by_its_remedy(tmp_path) -> None:  # 
 
 def test_remedies_add_up() -> None:
     read = Read("a.csv").with_remedy(Remedy({"p": "deg/s"})).with_remedy(Remedy({"q": "-rad/s"}, True))
-    assert read.words == "--unit p=deg/s --unit q=-rad/s --drop-bad-stamps"
+    assert read.option_text == "--unit p=deg/s --unit q=-rad/s --drop-bad-stamps"
     assert read.python() == "flight = sp.read('a.csv', units={'p': 'deg/s', 'q': '-rad/s'}, bad_stamps=\"drop\")"

@@ -127,7 +127,7 @@ def test_nothing_personal_is_in_its_bytes_unless_it_is_asked_for() -> None:
 
 
 def test_it_lists_what_is_inside_and_what_was_left_out() -> None:
-    made = page(flight(), made="Made by swashplate.")
+    made = page(flight(), maker="Made by swashplate.")
     inside, gone, named = made.remarks
     assert inside.startswith(
         "Inside: 4 channels of 20.0 s; 2 parameters; 1 events; findings and review; spectra of p, q, r"
@@ -154,7 +154,7 @@ def test_it_lists_what_is_inside_and_what_was_left_out() -> None:
 
 
 def test_a_hostile_name_is_text() -> None:
-    made = page(flight(), keep=("others",), made=HOSTILE)
+    made = page(flight(), keep=("others",), maker=HOSTILE)
     assert "<b onclick" not in made.text
     assert HOSTILE in curves(made.text)
 

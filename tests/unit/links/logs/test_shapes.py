@@ -8,7 +8,7 @@ import pytest
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.links.live.picture import picture
-from swashplate.links.logs.shapes import plain, shape_of
+from swashplate.links.logs.shapes import generic_shape, shape_of
 from swashplate.models.catalogue import vehicle as packaged
 
 
@@ -52,7 +52,7 @@ KINDS = {"ArduPlane V4.5.7": "a plane", "ArduRover V4.5.7": "a rover", "ArduSub 
 def test_what_no_rotor_carries_has_a_form_of_its_own(vehicle: str, kind: str) -> None:
     shape, words = shape_of(log(vehicle, "ardupilot", 0))
     parts = shape.pop("parts")
-    assert shape == plain(0)
+    assert shape == generic_shape(0)
     assert (shape["rotors"], shape["tail"], shape["skids"]) == ([], None, None)
     assert words == f"The log is of {kind} ({vehicle}): a plain one is drawn."
     others = [shape_of(log(other, "ardupilot", 0))[0]["parts"] for other in KINDS if other != vehicle]
