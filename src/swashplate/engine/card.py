@@ -91,7 +91,7 @@ def rates_by_jax(equations: Equations) -> Callable[[Traced, Traced, Traced], Tra
         known = columns_of(_NAMES, (x, w, p))
         for name, call, reads, _ in steps:
             known[name] = call(*[known[read] if isinstance(read, str) else read for read in reads])
-        told = [value_of(known, code.outputs[0, i]) for i in range(function.size1_out(0))]
-        return jnp.stack([jnp.broadcast_to(jnp.asarray(value, x.dtype), x.shape[1:]) for value in told])
+        derivatives = [value_of(known, code.outputs[0, i]) for i in range(function.size1_out(0))]
+        return jnp.stack([jnp.broadcast_to(jnp.asarray(value, x.dtype), x.shape[1:]) for value in derivatives])
 
     return rates

@@ -55,12 +55,12 @@ def comment_text(text: str) -> str:
 
     Quotes, backslashes, trigraphs and the marks of comments are what could, and are replaced.
     """
-    plain = "".join(c if " " <= c <= "~" else " " if c.isspace() else "?" for c in text)
-    plain = plain.replace("\\", "|").replace('"', "'")
+    printable = "".join(c if " " <= c <= "~" else " " if c.isspace() else "?" for c in text)
+    printable = printable.replace("\\", "|").replace('"', "'")
     for mark in ("*/", "/*", "??", "//"):
-        while mark in plain:
-            plain = plain.replace(mark, " ".join(mark))
-    return " ".join(plain.split())
+        while mark in printable:
+            printable = printable.replace(mark, " ".join(mark))
+    return " ".join(printable.split())
 
 
 def identifier(text: str) -> str:
@@ -69,10 +69,10 @@ def identifier(text: str) -> str:
     Raises:
         ExportError: where nothing is left of it.
     """
-    made = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
-    if not made:
+    name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
+    if not name:
         raise ExportError(f"'{text}' gives no name that C could use.", channel="--name", hint="Give --name heli.")
-    return f"model_{made}" if made[0].isdigit() or made in _KEYWORDS else made
+    return f"model_{name}" if name[0].isdigit() or name in _KEYWORDS else name
 
 
 def print_array(name: str, values: Iterable[float], precision: Precision, *, kind: str) -> str:
@@ -258,12 +258,12 @@ def print_lane_searches(code: Statements, steps: Sequence[int], precision: Preci
 
     lines = [f"  lanes kept_{name};\n" for name in sorted(crossing)]
     for number, search in enumerate(order):
-        plain, inner = (number, False), (number, True)
-        told = [f"kept_{s.name}[l] = {s.name};" for s in search.before if s.name in crossing]
+        outer, inner = (number, False), (number, True)
+        stores = [f"kept_{s.name}[l] = {s.name};" for s in search.before if s.name in crossing]
         if search is order[-1]:
-            told += [f"rates[{place}][l] = {_of_lane(text)};" for place, text in rates.items()]
+            stores += [f"rates[{place}][l] = {_of_lane(text)};" for place, text in rates.items()]
         lines.append(
-            _lane_loop([*taken(read[plain], plain), *(_lane_line(s, precision) for s in search.before), *told])
+            _lane_loop([*taken(read[outer], outer), *(_lane_line(s, precision) for s in search.before), *stores])
         )
         if search.sought:
             begin, inside = taken(search.start, inner), [*_reads(search.inside), *search.value, *search.slope]
@@ -271,8 +271,8 @@ def print_lane_searches(code: Statements, steps: Sequence[int], precision: Preci
     return "".join(lines)
 
 
-def _reads(made: Iterable[Statement]) -> Iterable[str]:
-    return chain.from_iterable(s.reads for s in made)
+def _reads(block: Iterable[Statement]) -> Iterable[str]:
+    return chain.from_iterable(s.reads for s in block)
 
 
 def _searched(search: Search, steps: Sequence[int], begin: list[str], taken: list[str], precision: Precision) -> str:
@@ -319,14 +319,14 @@ class Tangents:
         name, places = self._arrays[entry[1]]
         return f"{name}[{entry[2]}]" if places is None or int(entry[2]) in places else None
 
-    def body(self, made: Sequence[Statement]) -> list[str]:
+    def body(self, block: Sequence[Statement]) -> list[str]:
         """Statements with their tangents."""
         lines = []
-        for s in made:
+        for s in block:
             lines.append(_line(s, "double", "double"))
-            moved = _moved(s, [self.of(text) for text in s.reads])
-            if moved is not None:
-                lines.append(f"const vec d_{s.name} = {moved};")
+            tangent = _tangent(s, [self.of(text) for text in s.reads])
+            if tangent is not None:
+                lines.append(f"const vec d_{s.name} = {tangent};")
                 self._made[s.name] = f"d_{s.name}"
         return lines
 
@@ -346,18 +346,18 @@ class Tangents:
             lines += self.body([_by_root_name(s) for s in search.before])
             lines += self.body([_by_root_name(s) for s in search.inside])
             for i, value, slope in zip(search.sought, search.value, search.slope, strict=True):
-                moved = self.of(_root_name(value))
-                if moved is not None:
-                    lines.append(f"const vec d_root{i} = {moved} * (-1 / {_root_name(slope)});")
+                tangent = self.of(_root_name(value))
+                if tangent is not None:
+                    lines.append(f"const vec d_root{i} = {tangent} * (-1 / {_root_name(slope)});")
                     self._made[f"root{i}"] = f"d_root{i}"
         return lines, Statements((), {place: _root_name(text) for place, text in code.outputs.items()})
 
 
-def _moved(s: Statement, moved: Sequence[str | None]) -> str | None:
+def _tangent(s: Statement, tangents: Sequence[str | None]) -> str | None:
     """The tangent of a statement from those of what it reads."""
     first, second, factor = _SLOPES.get(s.operation, ("", "", ""))
     texts = {"t": s.name, "a": s.reads[0], "b": s.reads[-1]}
-    parts = [form.format(d=d, **texts) for form, d in ((first, moved[0]), (second, moved[-1])) if form and d]
+    parts = [form.format(d=d, **texts) for form, d in ((first, tangents[0]), (second, tangents[-1])) if form and d]
     total = " + ".join(parts)
     return f"({total}) * ({factor.format(**texts)})" if total and factor else total or None
 

@@ -48,7 +48,7 @@ class Steering:
         asked: `REFERENCES`, shape (rows, 8, 1 or vehicles).
         added: to the commands, shape (rows, inputs, 1 or vehicles).
         limits: lowest, highest and whole step (0: none) of each input, shape (3, inputs).
-        late: steps that commands are late, shape (inputs, vehicles).
+        delay_steps: steps that commands are late, shape (inputs, vehicles).
         before: what the actuators get until the first command arrives, shape (inputs,).
         draws: of the law's own sensors, shape (decisions, draws, vehicles).
         noise: of the states that it is told, shape (decisions, states, vehicles); None: none.
@@ -60,7 +60,7 @@ class Steering:
     asked: Array
     added: Array
     limits: Array
-    late: NDArray[np.int_]
+    delay_steps: NDArray[np.int_]
     before: Array
     draws: Array
     noise: Array | None = None
@@ -146,19 +146,19 @@ def fly(
         ExportError: for equations or a law that CasADi cannot trace.
         MissingLibraryError: without CasADi.
     """
-    states, inputs = _flown(vehicle, plan, precision, quaternion=quaternion or False)
+    states, inputs = _fly_plan(vehicle, plan, precision, quaternion=quaternion or False)
     if vehicle.traits.linear or quaternion is not None:
         return states, inputs
     lost = np.flatnonzero(steep_at(states[:, _PITCH]))
     if lost.size:
-        again = _flown(vehicle, plan.of(lost), precision, quaternion=True)
+        again = _fly_plan(vehicle, plan.of(lost), precision, quaternion=True)
         states[..., lost] = again[0]
         if plan.steering is not None:
             inputs[..., lost] = again[1]
     return states, inputs
 
 
-def _flown(
+def _fly_plan(
     vehicle: Vehicle, plan: FlightPlan, precision: Precision, *, quaternion: bool
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     if not can_compile():
@@ -228,21 +228,24 @@ class _Program:
             "rows": plan.rows,
         }
         widths = {"rows_wide": plan.rows.shape[-1], "numbers_wide": plan.numbers.shape[-1]}
-        late, place, depth, n_inputs = np.zeros(0, dtype=np.int_), np.zeros(0, dtype=np.int_), 1, 0
+        delay_steps, place, depth, n_inputs = np.zeros(0, dtype=np.int_), np.zeros(0, dtype=np.int_), 1, 0
         if steering is not None:
             assert self._law is not None
             n_inputs = len(steering.before)
             names = ("asked", "added", "limits", "before", "memory", "draws", "noise")
             given |= {name: getattr(steering, name) for name in names if getattr(steering, name) is not None}
             widths |= {"asked_wide": steering.asked.shape[-1], "added_wide": steering.added.shape[-1]}
-            late, place = steering.late, self._law.places
-            depth = int(late.max(initial=0)) + 1
+            delay_steps, place = steering.delay_steps, self._law.places
+            depth = int(delay_steps.max(initial=0)) + 1
         tables = {name: np.ascontiguousarray(table, self._dtype) for name, table in given.items()}
-        whole = {"late": np.ascontiguousarray(late, np.dtype("l")), "place": np.ascontiguousarray(place, np.dtype("l"))}
+        integers = {
+            "late": np.ascontiguousarray(delay_steps, np.dtype("l")),
+            "place": np.ascontiguousarray(place, np.dtype("l")),
+        }
         states = np.empty((plan.kept, shown.shape[0], total), self._dtype)
         inputs = np.empty((plan.kept, n_inputs, total), self._dtype)
         out = {"states": states, "inputs": inputs}
-        pointers = {name: table.ctypes.data for name, table in {**tables, **whole, **out}.items()}
+        pointers = {name: table.ctypes.data for name, table in {**tables, **integers, **out}.items()}
         every = 1 if steering is None else steering.every
         counts = {"samples": plan.steps_and_one, "keep": plan.keep, "hold": plan.hold, "every": every, "depth": depth}
 
@@ -294,8 +297,8 @@ def flight_code(
         MissingLibraryError: without CasADi.
     """
     vehicle, real = equations.vehicle, REAL[precision]
-    moved = equations_of(tumbling(vehicle)) if quaternion else equations
-    traced = traced_rates(moved)
+    stepped = equations_of(tumbling(vehicle)) if quaternion else equations
+    traced = traced_rates(stepped)
     function, steps = traced.function, traced.steps
     code = statements(function, precision=precision, inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
     of_card, rest = split(code, moving=("x[", "w[", *ROOTS), fixed="cp")
@@ -304,7 +307,7 @@ def flight_code(
     force, angles = "", ""
     if feels:
         force = print_graph(
-            traced_force(moved), real="real", precision=precision, inputs=["x", "w", "p"], outputs=["felt"]
+            traced_force(stepped), real="real", precision=precision, inputs=["x", "w", "p"], outputs=["felt"]
         )
     if quaternion:
         angles = print_graph(traced_angles(), real="real", precision=precision, inputs=["q"], outputs=["angles"])
@@ -317,7 +320,7 @@ def flight_code(
             "PI": literal(np.pi, precision),
             "LANES": lanes,
             "ALIGNED": min(64, lanes * (8 if precision == "double" else 4)),
-            "STATES": len(moved.vehicle.state_names),
+            "STATES": len(stepped.vehicle.state_names),
             "SEEN": len(vehicle.state_names),
             "DRIVING": len(vehicle.input_names) + len(SURROUNDINGS),
             "NUMBERS": len(vehicle.parameter_names) + len(CONSTANTS),

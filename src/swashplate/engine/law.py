@@ -31,15 +31,17 @@ def runnable(function: Graph) -> Callable[..., list[Array]]:
 
     def called(*given: Array) -> list[Array]:
         work = np.empty(max(1, int(function.sz_w())))  # each call its own: several threads may run it
-        whole = np.empty(max(1, int(function.sz_iw())), dtype=np.intc)
+        integer_work = np.empty(max(1, int(function.sz_iw())), dtype=np.intc)
         rows = [
             np.asfortranarray(np.reshape(part, size, order="F"), float) for part, size in zip(given, sizes, strict=True)
         ]
-        told = [np.empty(function.size_out(i), order="F") for i in range(function.n_out())]
+        results = [np.empty(function.size_out(i), order="F") for i in range(function.n_out())]
         arg = (_DOUBLES * max(len(rows), int(function.sz_arg())))(*(part.ctypes.data_as(_DOUBLES) for part in rows))
-        res = (_DOUBLES * max(len(told), int(function.sz_res())))(*(part.ctypes.data_as(_DOUBLES) for part in told))
-        run(arg, res, whole.ctypes.data_as(ctypes.POINTER(ctypes.c_int)), work.ctypes.data_as(_DOUBLES), 0)
-        return told
+        res = (_DOUBLES * max(len(results), int(function.sz_res())))(
+            *(part.ctypes.data_as(_DOUBLES) for part in results)
+        )
+        run(arg, res, integer_work.ctypes.data_as(ctypes.POINTER(ctypes.c_int)), work.ctypes.data_as(_DOUBLES), 0)
+        return results
 
     return called
 
@@ -63,8 +65,8 @@ class LawGraph:
 
     Attributes:
         function: of CasADi, of (memory, measured, reference) to memory and commands in one column.
-        measured: what it is told, in order: of `told`.
-        told: all that a flight can tell: the vehicle's states, `FELT`, "voltage" and its draws.
+        measured: what it is told, in order: of `signals`.
+        signals: all that a flight can tell: the vehicle's states, `FELT`, "voltage" and its draws.
         memory: how many numbers it carries.
         draws: how many its own sensors draw at each step.
         fixed: how many numbers at the end of what it carries never change.
@@ -72,15 +74,15 @@ class LawGraph:
 
     function: Graph = field(repr=False)
     measured: tuple[str, ...]
-    told: tuple[str, ...]
+    signals: tuple[str, ...]
     memory: int
     draws: int
     fixed: int = 0
 
     @property
     def places(self) -> NDArray[np.int_]:
-        """Where in `told` each measured number stands."""
-        return np.array([self.told.index(name) for name in self.measured], dtype=np.int_)
+        """Where in `signals` each measured number stands."""
+        return np.array([self.signals.index(name) for name in self.measured], dtype=np.int_)
 
     @property
     def feels(self) -> bool:
@@ -105,17 +107,17 @@ def print_function(function: Graph, real: str) -> tuple[str, dict[str, int]]:
     import casadi
 
     with scratch_folder() as folder:
-        made = casadi.CodeGenerator("traced.c", {"casadi_real": real, "casadi_int": "int"})
-        made.add(function)
+        generator = casadi.CodeGenerator("traced.c", {"casadi_real": real, "casadi_int": "int"})
+        generator.add(function)
         try:
-            printed = Path(made.generate(f"{folder}/")).read_text(encoding="utf-8")
+            printed = Path(generator.generate(f"{folder}/")).read_text(encoding="utf-8")
         except (RuntimeError, OSError) as error:  # CasADi says no more than that it has no stream
             raise WriteError(
                 "CasADi's code cannot be written there.", where=folder.parent, hint="Check the folder and the disk."
             ) from error
     calls = {name: len(re.findall(rf"(?<![\w]){name}\(", printed)) for name in ("sin", "cos", "sqrt", "atan2")}
-    for name, own in _OWN.items():
-        printed = printed.replace(f"return {name};", f"return {own};")
+    for name, expression in _OWN.items():
+        printed = printed.replace(f"return {name};", f"return {expression};")
     if real == "float":  # no constant and no function may lift the arithmetic to double
         printed = re.sub(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?)(?![\w.])", r"\1f", printed)
         printed = re.sub(r"(?<![\w])(sin|cos|sqrt|atan2)\(", r"\1f(", printed)

@@ -69,15 +69,15 @@ Step = tuple[str, Callable[..., Any], list[Any], list[str]]
 
 def in_order(code: Statements, wide: dict[str, Callable[..., Any]]) -> list[Step]:
     """The statements as calls, with numbers in place of their texts."""
-    made = {statement.name for statement in code.body}
+    computed = {statement.name for statement in code.body}
     last: dict[str, int] = {}
     for i, statement in enumerate(code.body):
         last.update(dict.fromkeys(statement.reads, i))
-    passing = made - set(code.outputs.values())
+    passing = computed - set(code.outputs.values())
     steps: list[Step] = []
     for i, statement in enumerate(code.body):
         spent = [name for name in dict.fromkeys(statement.reads) if last[name] == i and name in passing]
-        reads = [text if text in made or "[" in text else float(text.strip("()")) for text in statement.reads]
+        reads = [text if text in computed or "[" in text else float(text.strip("()")) for text in statement.reads]
         steps.append((statement.name, wide[statement.operation], reads, spent))
     return steps
 

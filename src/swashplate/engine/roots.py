@@ -74,5 +74,5 @@ class Looping(CasadiBackend):
         symbols = [column(*(getattr(root, name) for root in self.roots)) for name in ("guess", "root")]
         sought = [column(*(getattr(root, name) for root in self.roots)) for name in ("start", "value", "slope")]
         inputs, outputs = [*given, *symbols], [*results, *sought]
-        made = self._casadi.Function("f", inputs, [self._casadi.densify(o) for o in outputs], {"cse": True})
-        return Looped(made, tuple(root.steps for root in self.roots))
+        function = self._casadi.Function("f", inputs, [self._casadi.densify(o) for o in outputs], {"cse": True})
+        return Looped(function, tuple(root.steps for root in self.roots))

@@ -72,10 +72,10 @@ def with_slopes(f: Scalars, x: Expression, w: Expression, p: Expression) -> tupl
     roots, guesses = (casadi.vertcat(*(getattr(root, name) for root in left.roots)) for name in ("root", "guess"))
     residuals = casadi.substitute(casadi.vertcat(*(root.value for root in left.roots)), guesses, roots)
     by_moving, by_root = casadi.jacobian(residuals, moving), casadi.jacobian(residuals, roots)
-    moved = casadi.SX(0, moving.shape[0])
+    root_slopes = casadi.SX(0, moving.shape[0])
     for i in range(roots.shape[0]):  # a root depends on earlier ones
-        moved = casadi.vertcat(moved, -(by_moving[i, :] + by_root[i, :i] @ moved) / by_root[i, i])
-    slopes = casadi.jacobian(open_values, moving) + casadi.jacobian(open_values, roots) @ moved
+        root_slopes = casadi.vertcat(root_slopes, -(by_moving[i, :] + by_root[i, :i] @ root_slopes) / by_root[i, i])
+    slopes = casadi.jacobian(open_values, moving) + casadi.jacobian(open_values, roots) @ root_slopes
     at_roots = casadi.Function("at_roots", [x, w, p, roots], [open_values, slopes], {"cse": True})
     return tuple(at_roots(x, w, p, casadi.vertcat(*recording.roots)))
 

@@ -100,7 +100,7 @@ def statements(function: Graph, *, precision: Precision, inputs: Sequence[str]) 
     """
     known = _operations()
     now: dict[int, str] = {}
-    made: list[Statement] = []
+    body: list[Statement] = []
     places = [_places(function.sparsity_out(i)) for i in range(function.n_out())]
     outputs: dict[tuple[int, int], str] = {}
     for i in range(function.n_instructions()):
@@ -118,22 +118,22 @@ def statements(function: Graph, *, precision: Precision, inputs: Sequence[str]) 
         elif operation == "OUTPUT":
             outputs[writes[0], places[writes[0]][writes[1]]] = now[reads[0]]
         else:
-            made.append(Statement(f"t{i}", operation, tuple(now[r] for r in reads)))
+            body.append(Statement(f"t{i}", operation, tuple(now[r] for r in reads)))
             now[writes[0]] = f"t{i}"
-    return Statements(tuple(_cheaper(made)), outputs)
+    return Statements(tuple(_cheaper(body)), outputs)
 
 
-def _cheaper(made: Sequence[Statement]) -> list[Statement]:
+def _cheaper(body: Sequence[Statement]) -> list[Statement]:
     """What several are divided by is divided by once, and a tangent is made of the sine and cosine that there are.
 
     A division takes four times what a product takes, a tangent a call more; results change in their last bit.
     """
-    shared = {by for by, count in Counter(s.reads[1] for s in made if s.operation == "DIV").items() if count > 1}
-    turned = {(s.operation, s.reads): s.name for s in made if s.operation in ("SIN", "COS")}
-    later = {s.name: place for place, s in enumerate(made)}
+    shared = {by for by, count in Counter(s.reads[1] for s in body if s.operation == "DIV").items() if count > 1}
+    turned = {(s.operation, s.reads): s.name for s in body if s.operation in ("SIN", "COS")}
+    later = {s.name: place for place, s in enumerate(body)}
     inverted: set[str] = set()
     cheaper: list[Statement] = []
-    for place, s in enumerate(made):
+    for place, s in enumerate(body):
         if s.operation == "DIV" and s.reads[1] in shared:
             by = s.reads[1]
             inverse = "i_" + "".join(c if c.isalnum() else "_" for c in by)
@@ -169,22 +169,22 @@ def split(code: Statements, *, moving: tuple[str, ...] = _MOVING, fixed: str = F
     """
     first: list[Statement] = []
     rest: list[Statement] = []
-    moved: set[str] = set()
+    dependent: set[str] = set()
     for s in code.body:
-        if not any(name in moved or name.startswith(moving) for name in s.reads):
+        if not any(name in dependent or name.startswith(moving) for name in s.reads):
             first.append(s)
             continue
-        moved.add(s.name)
+        dependent.add(s.name)
         over, by = (s.reads[0], s.reads[-1])
-        if s.operation == "DIV" and not (by in moved or by.startswith(moving)):
+        if s.operation == "DIV" and not (by in dependent or by.startswith(moving)):
             inverse = Statement(f"i_{s.name}", "INV", (by,))
             first.append(inverse)
             rest.append(Statement(s.name, "MUL", (over, inverse.name)))
         else:
             rest.append(s)
-    made = {s.name for s in first}
+    computed = {s.name for s in first}
     asked = [*(name for s in rest for name in s.reads), *code.outputs.values()]
-    kept = {name: f"{fixed}[{i}]" for i, name in enumerate(dict.fromkeys(name for name in asked if name in made))}
+    kept = {name: f"{fixed}[{i}]" for i, name in enumerate(dict.fromkeys(name for name in asked if name in computed))}
     return (
         Statements(tuple(first), {(0, i): name for i, name in enumerate(kept)}),
         Statements(
@@ -224,13 +224,13 @@ def searches(code: Statements, count: int, *, first: int) -> list[Search]:
         roots, _ = needs.get(name, (frozenset(), frozenset()))
         return max((rounds[r] for r in roots), default=0)
 
-    made = []
+    ordered = []
     for number in range(max(rounds, default=0) + 1):
         sought = tuple(i for i in range(count) if rounds[i] == number + 1)
         texts = (tuple(t[i] for i in sought) for t in (start, value, slope))
         before = tuple(s for s in code.body if not needs[s.name][1] and known_after(s.name) == number)
-        made.append(Search(before, sought, tuple(s for s in code.body if needs[s.name][1] & set(sought)), *texts))
-    return made
+        ordered.append(Search(before, sought, tuple(s for s in code.body if needs[s.name][1] & set(sought)), *texts))
+    return ordered
 
 
 _Needs = dict[str, tuple[frozenset[int], frozenset[int]]]

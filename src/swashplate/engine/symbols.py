@@ -112,9 +112,9 @@ def expression_of(value: Operand) -> Expression:
 
 def symbols(column: Expression) -> Symbols:
     """The entries of a column of CasADi as an array (n,)."""
-    made = np.empty(column.shape[0], dtype=object)
-    made[:] = [Symbol(column[i]) for i in range(column.shape[0])]
-    return made
+    entries = np.empty(column.shape[0], dtype=object)
+    entries[:] = [Symbol(column[i]) for i in range(column.shape[0])]
+    return entries
 
 
 def expressions(values: Operand) -> Expression:

@@ -82,7 +82,7 @@ def _derivatives(
     xp: Backend,
 ) -> Any:
     body: TumblingBody = state.body
-    rates = free(state._replace(body=seen(body, xp)), inputs, par, env, xp)
+    rates = free(state._replace(body=with_euler_angles(body, xp)), inputs, par, env, xp)
     turned = quaternion_rates(_rotation(body), Vector(body.p, body.q, body.r))
     return rates._replace(body=TumblingBody._make((*rates.body[:_PHI], *turned, *rates.body[_P:])))
 
@@ -90,14 +90,14 @@ def _derivatives(
 def _specific_force(
     free: Callable[..., Vector], state: Tumbling, inputs: object, par: object, env: Environment, xp: Backend
 ) -> Vector:
-    return free(state._replace(body=seen(state.body, xp)), inputs, par, env, xp)
+    return free(state._replace(body=with_euler_angles(state.body, xp)), inputs, par, env, xp)
 
 
 def _rotation(body: TumblingBody) -> Quaternion:
     return Quaternion(body.q0, body.q1, body.q2, body.q3)
 
 
-def seen(body: TumblingBody, xp: Backend) -> RigidBody:
+def with_euler_angles(body: TumblingBody, xp: Backend) -> RigidBody:
     """The body with roll, pitch and yaw, roll and yaw within half a turn."""
     return RigidBody(*body[:_PHI], *euler_of(_rotation(body), xp), body.p, body.q, body.r)
 

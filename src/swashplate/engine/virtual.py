@@ -30,22 +30,22 @@ def fly_virtually(
     vehicle: Vehicle, plan: FlightPlan, precision: Precision, *, quaternion: bool
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """As `fly.fly`, with Euler angles or a quaternion; single precision is rounded at the end."""
-    moved = tumbling(vehicle) if quaternion else vehicle
+    stepped = tumbling(vehicle) if quaternion else vehicle
     steering, total, samples = plan.steering, plan.vehicles, plan.steps_and_one
-    seen = np.array(plan.start, dtype=np.float64)
-    x = np.stack([from_euler(column) for column in seen.T], axis=1) if quaternion else seen.copy()
-    states = np.empty((plan.kept, *seen.shape))
+    shown = np.array(plan.start, dtype=np.float64)
+    x = np.stack([from_euler(column) for column in shown.T], axis=1) if quaternion else shown.copy()
+    states = np.empty((plan.kept, *shown.shape))
     inputs = np.empty((plan.kept, 0 if steering is None else len(steering.before), total))
-    step = rk4_graph(equations_of(moved)).map(total)
+    step = rk4_graph(equations_of(stepped)).map(total)
     p = np.broadcast_to(plan.numbers, (len(plan.numbers), total))
-    loop = None if steering is None else _Loop(steering, equations_of(moved), total)
+    loop = None if steering is None else _Loop(steering, equations_of(stepped), total)
     for k in range(samples):
         row = k // plan.hold
-        seen = _as_seen(x, seen) if quaternion else x
+        shown = _as_shown(x, shown) if quaternion else x
         if k % plan.keep == 0:
-            states[k // plan.keep] = seen
+            states[k // plan.keep] = shown
         if loop is not None:
-            w0 = loop.driving(k, row, x, seen, plan.rows[row], p)
+            w0 = loop.driving(k, row, x, shown, plan.rows[row], p)
             w1 = w2 = w0
             if k % plan.keep == 0:
                 inputs[k // plan.keep] = w0[: inputs.shape[1]]
@@ -77,7 +77,7 @@ def rk4_graph(equations: Equations) -> Graph:
     return casadi.Function("step", [x, w, middle, end, p, dt], [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
 
 
-def _as_seen(x: Array, before: Array) -> Array:
+def _as_shown(x: Array, before: Array) -> Array:
     """States with roll, pitch and yaw in place of the quaternion, whole turns counted on from the sample before."""
     angles = np.asarray(_angles(x.shape[1])(x[_PHI : _PHI + 4]))
     full, last = 2.0 * np.pi, before[_PHI : _PHI + _ANGLES]
@@ -100,26 +100,26 @@ class _Loop:
         self._felt = traced_force(equations).map(total) if steering.law.feels else None
         self._memory = np.array(steering.memory, dtype=np.float64)
         self._acting = np.repeat(steering.before[:, None], total, axis=1)
-        self._sent = np.repeat(self._acting[None], int(steering.late.max(initial=0)) + 1, axis=0)
+        self._sent = np.repeat(self._acting[None], int(steering.delay_steps.max(initial=0)) + 1, axis=0)
         self._command = np.zeros_like(self._acting)
 
-    def driving(self, k: int, row: int, x: Array, seen: Array, around: Array, p: Array) -> Array:
+    def driving(self, k: int, row: int, x: Array, shown: Array, around: Array, p: Array) -> Array:
         """Inputs as they act and surroundings, shape (inputs + 4, vehicles)."""
         s = self._s
         around = np.broadcast_to(around, (len(SURROUNDINGS), self._total))
         if k % s.every == 0:
             turn = k // s.every
-            told = seen if s.noise is None else seen + s.noise[turn]
+            measured = shown if s.noise is None else shown + s.noise[turn]
             felt = np.zeros((3, self._total))
             if self._felt is not None:
                 felt = np.asarray(self._felt(x, np.concatenate([self._acting, around]), p))
-            every = np.concatenate([told, felt, around[-1:], s.draws[turn]])
+            every = np.concatenate([measured, felt, around[-1:], s.draws[turn]])
             asked = np.broadcast_to(s.asked[row], (s.asked.shape[1], self._total))
             after = np.asarray(self._law(self._memory, every[s.law.places], asked))
             self._memory, self._command = after[: s.law.memory], after[s.law.memory :]
         low, high, unit = s.limits[:, :, None]
         wanted = self._command + s.added[row]
-        whole = np.where(unit > 0.0, unit * np.rint(wanted / np.where(unit > 0.0, unit, 1.0)), wanted)
-        self._sent = np.concatenate([np.clip(whole, low, high)[None], self._sent[:-1]])
-        self._acting = np.take_along_axis(self._sent, s.late[None], axis=0)[0]
+        rounded = np.where(unit > 0.0, unit * np.rint(wanted / np.where(unit > 0.0, unit, 1.0)), wanted)
+        self._sent = np.concatenate([np.clip(rounded, low, high)[None], self._sent[:-1]])
+        self._acting = np.take_along_axis(self._sent, s.delay_steps[None], axis=0)[0]
         return np.concatenate([self._acting, around])

@@ -14,7 +14,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
 from swashplate.engine.trace import unrolled_rates
-from swashplate.engine.tumbling import TumblingBody, counted_on, from_euler, seen, tumbling
+from swashplate.engine.tumbling import TumblingBody, counted_on, from_euler, tumbling, with_euler_angles
 from swashplate.engine.virtual import rk4_graph
 from swashplate.errors import DivergenceError
 from swashplate.models.surroundings import environment_of
@@ -185,7 +185,7 @@ def motion_row(states: Sequence[Scalar], rates: Sequence[Scalar], g: Scalar, xp:
         The vehicle's own state row with roll and yaw [rad] within half a turn, velocity north-east-down [m/s], and
         specific force in body axes [m/s^2], 6 + n_states numbers.
     """
-    body = seen(TumblingBody._make(states[: len(TumblingBody._fields)]), xp)
+    body = with_euler_angles(TumblingBody._make(states[: len(TumblingBody._fields)]), xp)
     change, pull = Vector._make(rates[_SPEEDS]), gravity(1.0, g, body.attitude, xp)
     force = change + body.rates.cross(body.velocity) + pull.scaled(-1.0)
     rest = states[len(TumblingBody._fields) :]
