@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from swashplate.api.controllers import flown_by
 from swashplate.api.languages import in_seconds
+from swashplate.control.kinds import kind_of
 from swashplate.control.laws.hold import hover_hold
 from swashplate.control.laws.state_hold import state_hold
 from swashplate.errors import SwashError
@@ -149,7 +150,9 @@ def holding(
 
     def make(vehicle: Vehicle, trim: Trim) -> Controller:
         if callable(controller):
-            return controller(vehicle, trim)
+            made = controller(vehicle, trim)
+            kind_of(made)  # says what is no controller
+            return made
         if controller is not None:
             return flown_by(controller, vehicle, trim, seed=seed)[0]
         return hover_hold(vehicle, trim) if vehicle.traits.coaxial else state_hold(vehicle, trim)

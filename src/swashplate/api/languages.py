@@ -241,6 +241,20 @@ def _judged_delays(value: Mapping[str, float] | float, called: str) -> Mapping[s
     return value
 
 
+def _three(value: Any, called: str) -> Any:
+    """A wind towards north, east and down, each a finite number or a series of them."""
+    import numpy as np
+
+    count = len(value) if isinstance(value, Sequence) or getattr(value, "ndim", 0) else 0
+    if count != 3:
+        given = f"has {count} parts" if count else f"is {value}"
+        raise SwashError(f"{given}, expected three: towards north, east and down [m/s].", channel=called)
+    for part, name in zip(value, ("north", "east", "down"), strict=True):
+        if not np.all(np.isfinite(np.asarray(part, dtype=float))):
+            raise SwashError(f"towards {name} is not finite.", channel=called)
+    return value
+
+
 def in_seconds(milliseconds: Any) -> Any:
     """One number, or several by name; None where there is none."""
     if isinstance(milliseconds, Mapping):
@@ -316,7 +330,7 @@ _LANGUAGES: Mapping[str, Language] = {
     "Texts": Language(lambda texts, _: tuple(texts), repeated=True, metavar="TEXT"),
     "Numbers": Language(lambda text, called: tuple(numbers(text, called)), metavar="NUMBER,..."),
     "Speeds": Language(speeds, metavar="V"),
-    "Wind": Language(lambda text, called: tuple(numbers(text, called, count=3)), metavar="N,E,D"),
+    "Wind": Language(lambda text, called: tuple(numbers(text, called, count=3)), metavar="N,E,D", judge=_three),
     "Band": Language(band, metavar="LOW-HIGH"),
     "Bands": Language(_bands, repeated=True, metavar="[PAIR=]LOW-HIGH"),
     "Stretches": Language(_stretches, repeated=True, metavar="START,STOP"),

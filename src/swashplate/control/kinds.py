@@ -121,7 +121,13 @@ CONTROLLERS: Registry[ControllerKind[Any]] = Registry(
 
 
 def kind_of(controller: Controller) -> ControllerKind[Any]:
-    """The kind of a controller, by its `type`."""
+    """The kind of a controller, by its `type`.
+
+    Raises:
+        ControllerError: what is no controller.
+    """
+    if not isinstance(controller, Controller):
+        raise ControllerError(f"is {controller!r}, expected a controller or its file.", channel="controller")
     return CONTROLLERS[controller.type] if controller.type else PLAIN
 
 

@@ -122,6 +122,11 @@ def test_simulate_flies_a_maneuver_under_a_hold_or_inputs_as_they_are() -> None:
         ({"maneuver": {}, "controller": sp.hover_hold}, r"controller: is for a maneuver"),
         ({"maneuver": "hover:1s", "interpolation": "cubic"}, r"interpolation: 'cubic' is unknown"),
         ({"maneuver": "hover:1s", "lead": -1.0}, r"lead: is -1, expected at least 0 s"),
+        ({"maneuver": "hover:1s", "wind": 5.0}, r"wind: is 5.0, expected three"),
+        ({"maneuver": "hover:1s", "wind": (1.0, 2.0)}, r"wind: has 2 parts, expected three"),
+        ({"maneuver": "hover:1s", "wind": (0.0, np.nan, 0.0)}, r"wind: towards east is not finite"),
+        ({"maneuver": "hover:1s", "controller": 5}, r"controller: is 5, expected a controller or its file"),
+        ({"maneuver": "hover:1s", "controller": lambda vehicle, trim: 3}, r"controller: is 3, expected a controller"),
     ],
 )
 def test_simulate_refuses_what_suits_the_other_kind_of_flight(given: dict[str, Any], said: str) -> None:
