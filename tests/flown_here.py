@@ -26,10 +26,34 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.controller import Controller
 from swashplate.simulation.record import check_divergence
-from swashplate.simulation.wind import Turbulence
+from swashplate.simulation.wind import Gusts, filters_of_gusts
 
 _LEAN = np.radians(60.0)
 """Roll or pitch at which the flight of a linear model ends: its angles are small ones."""
+
+
+class Turbulence:
+    """The same turbulence, one sample at a time, for a simulation whose end is not known.
+
+    Args:
+        gusts: the setting.
+        rate: samples per second [Hz].
+        seed: of the noise.
+    """
+
+    def __init__(self, gusts: Gusts, *, rate: float, seed: int) -> None:
+        self._random = np.random.default_rng(seed)
+        self._filters = filters_of_gusts(gusts, rate)
+        self._x = [part.start @ self._random.standard_normal(part.step.shape[0]) for part in self._filters]
+
+    def sample(self) -> Array:
+        """Wind towards north, east and down [m/s], shape (3,), and on to the next."""
+        now = np.array([part.output @ x for part, x in zip(self._filters, self._x, strict=True)])
+        self._x = [
+            part.step @ x + part.noise @ self._random.standard_normal(x.size)
+            for part, x in zip(self._filters, self._x, strict=True)
+        ]
+        return now
 
 
 @dataclass

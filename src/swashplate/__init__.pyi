@@ -2,7 +2,6 @@
 
 from swashplate.api.campaigns.plan import plan_campaign as plan_campaign
 from swashplate.api.campaigns.results import campaign_results as campaign_results
-from swashplate.api.controllers import load_controller as load_controller
 from swashplate.api.gains import suggest_gains as suggest_gains
 from swashplate.api.load import load as load
 from swashplate.api.verbs.campaign import campaign as campaign
@@ -28,6 +27,7 @@ from swashplate.api.verbs.validate import compare as compare
 from swashplate.api.verbs.validate import validate as validate
 from swashplate.api.verbs.vehicle import stitch as stitch
 from swashplate.control.analysis.stability import loop_margins as loop_margins
+from swashplate.control.kinds import load_controller as load_controller
 from swashplate.control.laws.autopilot import autopilot as autopilot
 from swashplate.control.laws.hold import hover_hold as hover_hold
 from swashplate.control.laws.state_hold import state_hold as state_hold

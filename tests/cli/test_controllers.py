@@ -12,7 +12,7 @@ from commands import saying, swash
 import swashplate as sp
 from made_results import result
 from report_pages import whole
-from swashplate.control.kinds import read_controller, save_controller
+from swashplate.control.kinds import load_controller, save_controller
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.errors import ControllerError
 
@@ -51,7 +51,7 @@ def test_a_controller_comes_back_from_its_file(tmp_path: Path) -> None:
     coax = sp.vehicle("coax")
     made = autopilot(coax, sp.trim(coax), mode="speed", lag="motor", rate=50.0)
     save_controller(made, tmp_path / "c.toml")
-    again = read_controller(tmp_path / "c.toml")
+    again = load_controller(tmp_path / "c.toml")
     assert again == made
     np.testing.assert_array_equal(again.gains, made.gains)
 
@@ -143,7 +143,7 @@ def test_bad_files_are_named_with_their_entry(tmp_path: Path) -> None:
         assert change[0] in text
         bad.write_text(text.replace(*change))
         with pytest.raises(ControllerError, match=said):
-            read_controller(bad)
+            load_controller(bad)
     bad.write_text(text.replace('vehicle = "coax"', 'vehicle = "raptor"'))
     command = ("simulate", "--vehicle", "coax", "--maneuver", "step:pitch,1s", "--controller", bad)
     outcome = swash(*command, "--out", tmp_path / "f.nc")

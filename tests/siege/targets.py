@@ -22,7 +22,7 @@ from made_results import result
 from made_telemetry import telemetry
 from swashplate.bench.record_files import is_bench, read_bench
 from swashplate.control.draws.variations import draw_models
-from swashplate.control.kinds import read_controller, save_controller
+from swashplate.control.kinds import load_controller, save_controller
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.lqg.design import design
 from swashplate.errors import SwashError
@@ -284,8 +284,8 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     "card of a helicopter": _documents("toml", lambda: _packaged("models/data", "raptor50.toml"), _vehicle),
     "structure": _documents("toml", lambda: _packaged("models/linear/structures", "thirteen_state.toml"), _vehicle),
     "stitched model": _documents("toml", lambda: (_stitched(),), _vehicle),
-    "autopilot": _documents("toml", lambda: (_autopilot(),), read_controller),
-    "LQG": _documents("toml", lambda: (_lqg(),), read_controller),
+    "autopilot": _documents("toml", lambda: (_autopilot(),), load_controller),
+    "LQG": _documents("toml", lambda: (_lqg(),), load_controller),
     "servo map": _documents("toml", lambda: _packaged("links/mappings", "raptor50.toml"), _flown),
     "fit of a vehicle": _documents("json", lambda: (_fit_of_vehicle(),), _drawn("coax")),
     "fit of a model": _documents("json", lambda: (_fit_of_model(),), _drawn("structure")),

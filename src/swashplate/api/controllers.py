@@ -5,23 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from swashplate.control.kinds import kind_of, read_controller
+from swashplate.control.kinds import kind_of, load_controller
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.controller import Controller
 from swashplate.simulation.trim import Trim
-
-
-def load_controller(path: str | Path) -> Controller:
-    """A controller from its file, of any type that is known here or in another package.
-
-    Args:
-        path: what `swash control decouple --out`, `swash control design --out` or `save` of their results wrote.
-
-    Raises:
-        ControllerError: naming the file and the entry that is missing, unknown or of the wrong size.
-    """
-    return read_controller(path)
 
 
 def from_file(path: str | Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Controller]:
@@ -34,7 +22,7 @@ def from_file(path: str | Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], C
     Raises:
         ControllerError: as `load_controller`; later, where it is for another vehicle.
     """
-    saved = read_controller(path)
+    saved = load_controller(path)
 
     def make(vehicle: Vehicle, trim: Trim) -> Controller:
         try:

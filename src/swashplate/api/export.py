@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from swashplate.api.asking import drawn, linear_model, strings
 from swashplate.api.saying import Say
-from swashplate.control.kinds import read_controller
+from swashplate.control.kinds import load_controller
 from swashplate.documents import kind_of
 from swashplate.engine.emit import identifier
 from swashplate.errors import ExportError, SwashError
@@ -51,7 +51,7 @@ def export_asked(asked: ExportModel, say: Say) -> Export:
         trim=at,
         precision="single" if asked.precision == "float" else "double",
         delays=asked.delays,
-        controller=read_controller(flown) if isinstance(flown, str | Path) else flown,
+        controller=load_controller(flown) if isinstance(flown, str | Path) else flown,
         draws=_draws(asked, model),
         flight=asked.logged(),
     )
@@ -88,7 +88,7 @@ def _controller(asked: ExportModel, path: str | Path, name: str | None) -> Expor
     only_vehicles = {"--speed": asked.speed, "--set": asked.changes, "delays": asked.delays}
     if refused := [option for option, value in only_vehicles.items() if value is not None]:
         raise SwashError("is for vehicles, and this is a controller.", where=path, channel=", ".join(refused))
-    code = controller_code(read_controller(path), precision=asked.precision)  # pyrefly: ignore[bad-argument-type]
+    code = controller_code(load_controller(path), precision=asked.precision)  # pyrefly: ignore[bad-argument-type]
     told = f"One step: {code.operations} operations, {code.work_bytes} bytes of temporaries."
     return Export({f"{identifier(name or Path(path).stem)}.c": code.source.encode()}, (told,))
 

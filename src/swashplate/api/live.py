@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from swashplate.api.asking import drawn, strings
 from swashplate.api.saying import Say, announce, notice, ready
-from swashplate.control.kinds import read_controller
+from swashplate.control.kinds import load_controller
 from swashplate.errors import SwashError
 from swashplate.links.live.replay import Replay, as_json, replay
 from swashplate.models.catalogue import vehicle as find
@@ -27,7 +27,7 @@ def serve_live(asked: Live, vehicle: Vehicle, say: Say) -> None:
     from swashplate.links.web.libraries import check_page
 
     given = asked.controller
-    chosen = read_controller(given) if isinstance(given, str | Path) else given
+    chosen = load_controller(given) if isinstance(given, str | Path) else given
     draws = drawn(vehicle, asked.posterior, count=asked.draws)
     check_page()
     with serving.listen(asked.host, asked.port or 0, allow_remote=asked.allow_remote) as listening:

@@ -140,11 +140,14 @@ def save_controller(controller: Controller, path: str | Path) -> None:
     write_text(path, tomli_w.dumps(kind_of(controller).to_document(controller)))
 
 
-def read_controller(path: str | Path) -> Controller:
-    """A controller from its file.
+def load_controller(path: str | Path) -> Controller:
+    """A controller from its file, of any type that is known here or in another package.
+
+    Args:
+        path: what `swash control decouple --out`, `swash control design --out` or `save` of their results wrote.
 
     Raises:
-        ControllerError: naming the file and the entry that is missing, unknown or no number.
+        ControllerError: naming the file and the entry that is missing, unknown or of the wrong size.
     """
     document = documents.read_document(path, form="toml", error=ControllerError)
     if document.get("kind") != "controller":

@@ -172,12 +172,6 @@ def _fly_plan(
     return flight(plan)
 
 
-def compile_flight(vehicle: Vehicle, law: LawGraph | None = None) -> None:
-    """Compile what flies one vehicle, so that its first flight does not wait; nothing without a compiler."""
-    if can_compile():
-        _program(equations_of(vehicle), law, "double", 1, False)
-
-
 @lru_cache(maxsize=32)
 def _open_program(equations: Equations, precision: Precision, lanes: int, quaternion: bool) -> _Program:
     return _program(equations, None, precision, lanes, quaternion)
@@ -344,4 +338,4 @@ def flight_code(
     )
 
 
-__all__ = ["FELT", "FlightPlan", "Steering", "compile_flight", "flight_code", "fly"]
+__all__ = ["FELT", "FlightPlan", "Steering", "flight_code", "fly"]

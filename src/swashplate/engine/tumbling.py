@@ -121,12 +121,8 @@ def counted_on(angle: float, before: float) -> float:
     return angle + 2.0 * math.pi * float(np.rint((before - angle) / (2.0 * math.pi)))
 
 
-def steep(states: Array) -> bool:
-    """Whether rows of states with Euler angles, shape (n, n_states), come so near to the vertical that these lose
-    digits: beyond 80 degrees the rates of roll and yaw are six times those of the body and more."""
-    return bool(np.any(steep_at(states[:, _PHI + 1])))
-
-
 def steep_at(pitch: Array) -> Any:
-    """The same of series of pitch [rad], shape (n, ...), one by one of what comes behind; not finite: not."""
+    """Whether series of pitch [rad], shape (n, ...), come so near to the vertical that Euler angles lose digits, one by
+    one of what comes behind: beyond 80 degrees the rates of roll and yaw are six times those of the body and more. What
+    is not finite does not."""
     return np.any(np.where(np.isfinite(pitch), np.abs(pitch), 0.0) > _STEEP, axis=0)

@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
-from pathlib import Path
 
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Figure, Points, Report, Section
 from swashplate.reporting.theme import BLUE, axis_number, kept, line, quantity, stacked
 
 _PANEL = 118
 """Height of one panel [px]."""
 _RATES, _VELOCITY = ("p", "q", "r"), ("u", "v", "w")
-
-
-def flight_page(vehicle: Vehicle, flight: Flight, *, path: str | os.PathLike[str], remarks: Sequence[str] = ()) -> Path:
-    """Write one self-contained HTML page; arguments as of `compose_flight`.
-
-    Raises:
-        SwashError: where the place cannot be written to.
-    """
-    return write_page(path, compose_flight(vehicle, flight, remarks=remarks))
 
 
 def compose_flight(

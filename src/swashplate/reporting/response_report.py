@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 from swashplate.errors import SwashError
 from swashplate.identification.core.sources import problem_words, scale_words
 from swashplate.identification.frequency.search_result import StructureSearch
 from swashplate.identification.frequency.state_space_result import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
-from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Cell, Points, Report, Section, tabulate
@@ -32,15 +28,6 @@ def search_section(search: StructureSearch) -> Section:
     return Section(
         "structures", "Which structures were tried?", (why, tabulate("Structures", head, cells)), folded=True
     )
-
-
-def response_report(material: ResponseMaterial, *, path: str | os.PathLike[str], title: str | None = None) -> Path:
-    """Write one self-contained HTML file; it appears by rename when it is complete.
-
-    Raises:
-        SwashError: nothing to report, or a place that cannot be written to.
-    """
-    return write_page(path, compose_responses(material, title=title))
 
 
 def compose_responses(material: ResponseMaterial, *, title: str | None = None) -> Report:

@@ -11,7 +11,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.api.verbs.simulate import Simulate
-from swashplate.control.kinds import CONTROLLERS, PLAIN, ControllerKind, kind_of, read_controller, save_controller
+from swashplate.control.kinds import CONTROLLERS, PLAIN, ControllerKind, kind_of, load_controller, save_controller
 from swashplate.errors import ControllerError, SwashError
 from swashplate.json_text import as_json
 from swashplate.simulation.controller import Step, StepController
@@ -120,4 +120,4 @@ def test_a_controller_that_says_nothing_of_itself_is_plain(tmp_path: Path) -> No
         save_controller(hold, tmp_path / "hold.toml")
     (tmp_path / "other.toml").write_text('kind = "controller"\ntype = "pid"\n')
     with pytest.raises(ControllerError, match="type: is 'pid', expected ardupilot, autopilot, lqg"):
-        read_controller(tmp_path / "other.toml")
+        load_controller(tmp_path / "other.toml")

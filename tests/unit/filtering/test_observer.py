@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from observer_trial import trial
-from swashplate.control.kinds import read_controller, save_controller
+from swashplate.control.kinds import load_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.constant_gain import steady_sigmas, with_steady_gain
 from swashplate.control.lqg.controller import Lqg
@@ -84,7 +84,7 @@ def test_with_constant_gains_it_is_as_sure_as_it_may_be(tmp_path: Path) -> None:
         assert 0.5 < state.nees < 2.0, found
     assert np.sqrt(np.mean(found.place**2)) < 0.08
     save_controller(controller, tmp_path / "c.toml")
-    again = read_controller(tmp_path / "c.toml")
+    again = load_controller(tmp_path / "c.toml")
     assert isinstance(again, Lqg)
     assert again.plan == controller.plan
     np.testing.assert_array_equal(again.memory_of_law(), controller.memory_of_law())

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.engine.equations import SURROUNDINGS
@@ -291,11 +290,6 @@ def flight_at(flight: Flight, time: Array) -> Array:
     """The logged body states at some times, shape (n, 12)."""
     stamps, logged = flight.time("phi"), flight.array(PREDICTED)
     return np.stack([np.interp(time, stamps, column) for column in logged.T], axis=1)
-
-
-def gaps(time: Array) -> NDArray[np.bool_]:
-    """True at samples before which the log has a gap."""
-    return np.concatenate([[False], np.diff(time) > 2.5 * np.median(np.diff(time))])
 
 
 def floor(shown: Replay) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 from swashplate.control.analysis.margins import promised_disc
 from swashplate.control.analysis.stability import loop_modes
-from swashplate.control.kinds import read_controller, save_controller
+from swashplate.control.kinds import load_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
@@ -130,7 +130,7 @@ def test_a_place_is_held_as_tightly_as_delays_and_margins_allow(made: Lqg) -> No
 def test_a_controller_comes_back_from_its_file(made: Lqg, tmp_path: Path) -> None:
     path = tmp_path / "lqg.toml"
     save_controller(made, path)
-    again = read_controller(path)
+    again = load_controller(path)
     assert isinstance(again, Lqg)
     assert again.plan == made.plan
     np.testing.assert_allclose(again.memory_of_law(), made.memory_of_law(), atol=1e-15)
@@ -143,7 +143,7 @@ def test_a_controller_comes_back_from_its_file(made: Lqg, tmp_path: Path) -> Non
         assert change[0] in text
         path.write_text(text.replace(*change, 1))
         with pytest.raises(ControllerError, match=said):
-            read_controller(path)
+            load_controller(path)
 
 
 @pytest.mark.parametrize(

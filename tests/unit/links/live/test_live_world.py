@@ -13,7 +13,7 @@ import scipy.linalg
 
 import swashplate as sp
 from flown_by_hand import U, V, X, Y, Z, flown_rows, fly, fresh, holds_what_is_held, moves_its_way, recorded
-from flown_here import World
+from flown_here import Turbulence, World
 from swashplate.control.laws.linear_decoupling import static_decoupling
 from swashplate.control.lqg.design import design
 from swashplate.errors import ControllerError, FlightError
@@ -27,7 +27,7 @@ from swashplate.links.live.pilots import MODES
 from swashplate.links.live.world import FAN_SECONDS, NOT_HELD
 from swashplate.models.card import packaged_cards
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.wind import Gusts, Turbulence, dryden
+from swashplate.simulation.wind import Gusts, dryden
 
 ROLL_RATE = 9
 """Its place in a state row."""

@@ -11,7 +11,7 @@ import swashplate as sp
 from swashplate.errors import FlightError, SwashError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
-from swashplate.links.live.replay import Replay, as_json, floor, gaps, replay
+from swashplate.links.live.replay import Replay, as_json, floor, replay
 from swashplate.simulation.sensors import QUIET
 
 
@@ -164,7 +164,3 @@ def test_the_page_gets_everything_it_draws(shown: Replay) -> None:
     assert body == pytest.approx(shown.states[60, :12].tolist(), rel=1e-4, abs=1e-6)
     assert (len(inputs), len(rotors), bar, len(tail), len(ghost)) == (4, 1, None, 2, 12)
     assert floor(shown) > np.max(shown.states[:, 2])
-
-
-def test_gaps_are_seen() -> None:
-    assert gaps(np.array([0.0, 0.1, 0.2, 1.0, 1.1])).tolist() == [False, False, False, True, False]

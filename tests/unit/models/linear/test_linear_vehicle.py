@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate.control.kinds import read_controller, save_controller
+from swashplate.control.kinds import load_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
@@ -93,7 +93,7 @@ def test_the_design_takes_the_identified_delays_and_holds_the_model(flying: Vehi
     assert found.margins.together.alpha > 0.4
     assert found.modes[0].real < -0.02
     save_controller(made, tmp_path / "c.toml")
-    again = read_controller(tmp_path / "c.toml")
+    again = load_controller(tmp_path / "c.toml")
     assert isinstance(again, Lqg)
     for part, same in zip(again.feedback, made.feedback, strict=True):
         np.testing.assert_array_equal(part, same)
