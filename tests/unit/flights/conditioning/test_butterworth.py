@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from swashplate.flights.conditioning.butterworth import both_ways, butterworth_sections
+from swashplate.flights.conditioning.filters import both_ways, butterworth_sections
 
 FILTERS = [
     (4, (40.0,), 300.0),

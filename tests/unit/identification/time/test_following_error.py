@@ -17,8 +17,7 @@ from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
 from swashplate.filtering.filter_code import Followed, RecordSeries, driving_rows
-from swashplate.filtering.filter_library import filter_code
-from swashplate.filtering.filter_virtual import VirtualFilter
+from swashplate.filtering.filter_library import VirtualFilter, filter_code
 from swashplate.filtering.following import AWAY, SHARES, FollowingRows
 from swashplate.identification.core import robust
 from swashplate.identification.core.parameters import parameterize

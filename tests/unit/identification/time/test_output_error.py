@@ -10,7 +10,7 @@ import pytest
 import swashplate as sp
 from swashplate.arrays import Array
 from swashplate.compiled import can_compile
-from swashplate.filtering.filter_virtual import VirtualFilter
+from swashplate.filtering.filter_library import VirtualFilter
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import POSE, Record
 from swashplate.identification.time import output_error, shooting
