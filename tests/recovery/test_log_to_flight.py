@@ -130,5 +130,5 @@ def _left(name: str, title: str, late: str, flights: dict[str, MonteCarlo]) -> N
         for air, flown in flights.items()
     ]  # fmt: skip
     count = next(iter(flights.values())).spread.flights
-    text = f"{count} aircraft drawn from the fit. Commands are late by {late}. Limits: {LIMITS.words()}."
+    text = f"{count} aircraft drawn from the fit. Commands are late by {late}. Limits: {LIMITS.summary_text()}."
     leave(name, {"title": title, "text": text, "columns": head, "rows": rows, "passed": not any(r[1] for r in rows)})

@@ -18,11 +18,11 @@ def lateness(vehicle: Vehicle, controller: Controller | None, *, given: Mapping[
         given: delays that somebody asked for [s], one for all or by input.
     """
     inside = vehicle.traits.delayed_by
-    own = (
+    in_equations = (
         f"commands {1e3 * vehicle.card.values()[inside]:.3g} ms ({inside}, in the model's equations)" if inside else ""
     )
-    further = _further(vehicle, controller, given=given, inside=own)
-    return f"{own}; further: {further}" if own and further else own or further
+    further = _further(vehicle, controller, given=given, inside=in_equations)
+    return f"{in_equations}; further: {further}" if in_equations and further else in_equations or further
 
 
 def _further(
@@ -31,21 +31,21 @@ def _further(
     """What is late beside what the equations delay."""
     known, believed = input_delays(vehicle), {} if controller is None else dict(controller.delays)
     if given is not None:
-        late, whose = complete_delays(vehicle, given), "as given"
-        if any(known.get(name, 0.0) > value + 1e-4 for name, value in late.items()):
+        delays, whose = complete_delays(vehicle, given), "as given"
+        if any(known.get(name, 0.0) > value + 1e-4 for name, value in delays.items()):
             whose += f"; Careful: identified were {_listed(known)}"
     elif controller is not None and controller.at_once:
         left = f"; the identified {_listed(known)} are left out" if any(known.values()) else ""
         return f"nothing: the hold acts at once{left}"
     elif known:
-        late, whose = known, "identified"
+        delays, whose = known, "identified"
     elif any(believed.values()):
-        late, whose = believed, "as the controller was designed for: the model knows none"
+        delays, whose = believed, "as the controller was designed for: the model knows none"
     elif inside:
         return ""
     else:
         return "nothing: no delay of this model is known, --delay says one"
-    return f"{_listed(late) or 'nothing'} ({whose})"
+    return f"{_listed(delays) or 'nothing'} ({whose})"
 
 
 def _listed(delays: Mapping[str, float]) -> str:

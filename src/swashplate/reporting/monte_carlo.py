@@ -51,7 +51,7 @@ def compose_monte_carlo(
         title=title,
         banners=(("bad", f"LOST: {losses}; {_by(spread)}"),) if lost else (),
         summary=(
-            ("Lost", f"{losses} (limits: {spread.limits.words()})", "bad" if lost else "good"),
+            ("Lost", f"{losses} (limits: {spread.limits.summary_text()})", "bad" if lost else "good"),
             ("Worst", f"number {spread.worst}, {ending}", "plain"),
             ("Commands are late by", late, "plain"),
         ),

@@ -146,7 +146,7 @@ class Suggestion(Shown):
 
     def table(self) -> list[tuple[str, str, str]]:
         """What the loop is worth: a name with its unit, suggested, flown."""
-        columns = [_told(f) for f in (self.figures_suggested, self.figures_flown)]
+        columns = [_figure_rows(f) for f in (self.figures_suggested, self.figures_flown)]
         coupled = any(np.isfinite(f.coupling) for f in (self.figures_suggested, self.figures_flown))
         return [(name, ours, theirs) for (name, ours), (_, theirs) in zip(*columns, strict=True)][
             : None if coupled else -1
@@ -165,7 +165,7 @@ class Suggestion(Shown):
         return "\n".join(lines)
 
 
-def _told(f: LoopFigures) -> list[tuple[str, str]]:
+def _figure_rows(f: LoopFigures) -> list[tuple[str, str]]:
     judged = np.isfinite(f.peak)
 
     def number(value: float, scale: float = 1.0) -> str:
@@ -241,10 +241,10 @@ def _in_time(model: Vehicle | StateSpaceModel | Fitted) -> StateSpaceModel | Non
 
 def _suggest(loop: RateLoop, known: Mapping[str, float], refused: str) -> Suggestion:
     names = names_of(loop.axis)
-    flown = {name: known[name] for name in names.values() if name in known}
+    logged = {name: known[name] for name in names.values() if name in known}
 
     def none(reason: str, as_flown: LoopFigures = NO_FIGURES) -> Suggestion:
-        return Suggestion(loop.axis, {}, NO_FIGURES, flown, as_flown, loop, f"none: {reason}")
+        return Suggestion(loop.axis, {}, NO_FIGURES, logged, as_flown, loop, f"none: {reason}")
 
     if refused:
         return none(refused)
@@ -253,8 +253,8 @@ def _suggest(loop: RateLoop, known: Mapping[str, float], refused: str) -> Sugges
             f"the model has an unstable mode at {loop.unstable:.3g} rad/s, which no margin of a stable loop judges."
         )
     omega = _judged_at(loop)
-    as_flown = loop.figures(flown, omega) if names["P"] in flown else NO_FIGURES
-    if refuted := refused_by_flight(flown, as_flown.margins):
+    as_flown = loop.figures(logged, omega) if names["P"] in logged else NO_FIGURES
+    if refuted := refused_by_flight(logged, as_flown.margins):
         return none(refuted)
     gains = _best(loop, omega)
     if gains is None:
@@ -262,9 +262,9 @@ def _suggest(loop: RateLoop, known: Mapping[str, float], refused: str) -> Sugges
         return none(f"no gains tried that the firmware can hold keep {required}.", as_flown)
     if turned := refused_by_sign(short(gains)):
         return none(turned, as_flown)
-    suggestion = Suggestion(loop.axis, gains, loop.figures(gains, omega), flown, as_flown, loop)
+    suggestion = Suggestion(loop.axis, gains, loop.figures(gains, omega), logged, as_flown, loop)
     if np.isfinite(as_flown.peak) and not any(good for _, good in gain_changes(as_flown, suggestion.figures_suggested)):
-        return replace(suggestion, parameters=flown, figures_suggested=as_flown)
+        return replace(suggestion, parameters=logged, figures_suggested=as_flown)
     return suggestion
 
 

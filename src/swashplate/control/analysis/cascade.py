@@ -245,15 +245,15 @@ def broken_at_commands(plant: CascadePlant, K: Complex, commands: tuple[int, ...
     return BrokenLoops(plant.omega, loops, turns)
 
 
-def broken_at_leans(plant: CascadePlant, inner: Complex, whole: Complex) -> BrokenLoops:
+def broken_at_leans(plant: CascadePlant, inner: Complex, total: Complex) -> BrokenLoops:
     """The place loop, broken at the demanded roll and pitch: what it alone adds to the inner loops.
 
     Args:
         plant: behind the mixer.
-        inner, whole: `feedback` without and with the place.
+        inner, total: `feedback` without and with the place.
     """
     closed = np.linalg.inv(np.eye(4) + inner @ plant.response)
-    loop = ((whole - inner) @ plant.response @ closed)[..., :2, :2]  # what leads from a demand to its command cancels
+    loop = ((total - inner) @ plant.response @ closed)[..., :2, :2]  # what leads from a demand to its command cancels
     S = np.linalg.inv(np.eye(2) + loop)
     turned = np.unwrap(np.angle(np.linalg.det(np.eye(2) + loop)), axis=1)
     turns = np.round((turned[:, -1] - turned[:, 0]) / np.pi)

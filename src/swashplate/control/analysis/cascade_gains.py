@@ -146,8 +146,8 @@ def judge_cascade(
     k, delay_row = law.parameters, _row(vehicle, delays) + law.output_delays
     plant = cascade_plant(vehicle, hover, law.mixer, k, rate=law.rate, delays=delay_row)
     refuse_turned_commands(plant.omega, plant.response, commands=COMMANDS, outputs=OUTPUTS, where=vehicle.name)
-    whole, inner = feedback(plant.omega, k), feedback(plant.omega, k, place=False)
-    commands, leans = broken_at_commands(plant, whole, (0, 1, 2, 3)), broken_at_leans(plant, inner, whole)
+    total, inner = feedback(plant.omega, k), feedback(plant.omega, k, place=False)
+    commands, leans = broken_at_commands(plant, total, (0, 1, 2, 3)), broken_at_leans(plant, inner, total)
     names = ("roll", "pitch", "yaw", "height")
     loops = [*worth_of(commands, names), *worth_of(leans, ("place right", "place ahead"))]
     alone = broken_at_commands(plant, feedback(plant.omega, k, height=False, place=False), (0, 1, 2))
@@ -241,8 +241,8 @@ def _commands(
 
 def _placed(plant: CascadePlant, trial: Mapping[str, Array | float]) -> BrokenLoops:
     """The place loop, and roll and pitch with it around them; the first two are what the choice is for."""
-    whole, inner = feedback(plant.omega, trial), feedback(plant.omega, trial, place=False)
-    leans, commands = broken_at_leans(plant, inner, whole), broken_at_commands(plant, whole, (0, 1, 2, 3))
+    total, inner = feedback(plant.omega, trial), feedback(plant.omega, trial, place=False)
+    leans, commands = broken_at_leans(plant, inner, total), broken_at_commands(plant, total, (0, 1, 2, 3))
     return BrokenLoops(plant.omega, np.concatenate([leans.loop, commands.loop], axis=-1), commands.turns)
 
 

@@ -22,18 +22,18 @@ _CHANGES = (
 )
 
 
-def gain_changes(flown: LoopFigures, suggested: LoopFigures) -> list[tuple[str, bool]]:
+def gain_changes(current: LoopFigures, suggested: LoopFigures) -> list[tuple[str, bool]]:
     """What differs between two sets of gains by more than it matters, line by line: in words, and whether it is better.
 
     Nothing where one of them was not judged.
     """
-    if not (np.isfinite(flown.peak) and np.isfinite(suggested.peak)):
+    if not (np.isfinite(current.peak) and np.isfinite(suggested.peak)):
         return []
     changes = []
     columns = [
         (*(_or_any(r.value) for r in (f.margins.phase_margin, f.margins.gain_margin, f.margins.delay_margin)), f.peak,
          f.bandwidth, f.rejection, f.overshoot, f.shaken, f.left, f.noise, f.coupling)
-        for f in (flown, suggested)
+        for f in (current, suggested)
     ]  # fmt: skip
     for (what, unit, scale, larger, least, relative), before, after in zip(_CHANGES, *columns, strict=True):
         if unit == "ms" and max(before, after) >= 1.0:
@@ -43,7 +43,7 @@ def gain_changes(flown: LoopFigures, suggested: LoopFigures) -> list[tuple[str, 
         change = scale * (after - before)
         if not abs(change) >= (least * abs(scale * before) if relative and np.isfinite(before) else least):
             continue  # NaN is no change either
-        text = f"{what} {_plain(scale * before)} -> {_plain(scale * after)} {unit}".rstrip()
+        text = f"{what} {_three_digits(scale * before)} -> {_three_digits(scale * after)} {unit}".rstrip()
         changes.append((text, (change > 0.0) == larger))
     return changes
 
@@ -53,7 +53,7 @@ def _or_any(margin: float) -> float:
     return np.inf if np.isnan(margin) else margin
 
 
-def _plain(value: float) -> str:
+def _three_digits(value: float) -> str:
     """Three digits, without a power of ten where it is long."""
     if not np.isfinite(value):
         return "any"

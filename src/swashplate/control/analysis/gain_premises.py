@@ -88,16 +88,16 @@ def _not_followed(fit: Fitted, rate: str, command: str) -> str:
     return ""
 
 
-def refused_by_flight(flown: Mapping[str, float], margins: ResponseMargins) -> str:
+def refused_by_flight(logged: Mapping[str, float], margins: ResponseMargins) -> str:
     """That the flight refutes the model: the gains that it flew with are unstable on it. "" where they are not.
 
     Args:
-        flown: gains of the log, by the firmware's names.
+        logged: gains of the log, by the firmware's names.
         margins: of these gains on the model, filters and delay included.
     """
     if margins.delay_margin.value != 0.0:
         return ""
-    listed = ", ".join(f"{name} {gain_text(name, value)}" for name, value in flown.items() if value)
+    listed = ", ".join(f"{name} {gain_text(name, value)}" for name, value in logged.items() if value)
     return (
         f"the model is refuted: with the gains that this log flew ({listed}) its loop is unstable, and the aircraft "
         "flew. Do not use the model for gains: look at the sign, at the delay, and at what moved the command."

@@ -91,7 +91,7 @@ def short(gains: Mapping[str, float]) -> dict[str, float]:
 def written(axis: str, gains: Mapping[str, float]) -> dict[str, float]:
     """Gains of a loop of rad/s by the firmware's names and in its units."""
     return {
-        name: _whole(gains[key] / _unit(axis, key)) if axis in ROTORFLIGHT else gains[key]
+        name: _rounded(gains[key] / _unit(axis, key)) if axis in ROTORFLIGHT else gains[key]
         for key, name in names_of(axis).items()
         if key in gains
     }
@@ -130,5 +130,5 @@ def _unit(axis: str, key: str) -> float:
     return math.degrees(_SCALES[axis][key]) if key in _SCALES[axis] else 1.0
 
 
-def _whole(value: float) -> float:
+def _rounded(value: float) -> float:
     return float(round(value))

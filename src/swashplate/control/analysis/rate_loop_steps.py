@@ -98,7 +98,7 @@ class HeldModel(NamedTuple):
     bd: Array
     cd: Array
     dd: Array
-    late: NDArray[np.int64]
+    delay_steps: NDArray[np.int64]
 
 
 def held_model(model: StateSpaceModel, rate: str, command: str) -> HeldModel:
@@ -109,8 +109,8 @@ def held_model(model: StateSpaceModel, rate: str, command: str) -> HeldModel:
     o, n, dt = model.outputs.index(rate), a.shape[0], 1.0 / RATE
     held = expm(np.block([[a, b[:, driven]], [np.zeros((len(driven), n + len(driven)))]]) * dt)
     # One step at least: commands act after it.
-    late = np.array([max(1, round(model.delay(rate, model.inputs[k]) * RATE)) for k in driven], dtype=np.int64)
-    return HeldModel(held[:n, :n], held[:n, n:], c[o], d[o, driven], late)
+    delay_steps = np.array([max(1, round(model.delay(rate, model.inputs[k]) * RATE)) for k in driven], dtype=np.int64)
+    return HeldModel(held[:n, :n], held[:n, n:], c[o], d[o, driven], delay_steps)
 
 
 def stepped(
@@ -135,24 +135,24 @@ def stepped(
         for name in ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD", "FLTG")
     }
     m = max(value.size for value in k.values())
-    ad, bd, cd, dd, late = held_model(model, rate, command)
+    ad, bd, cd, dd, delay_steps = held_model(model, rate, command)
     n, dt = ad.shape[0], 1.0 / RATE
-    given = np.zeros((int(late.max()), m))
+    given = np.zeros((int(delay_steps.max()), m))
     wanted, slow, filtered, sloped, before, summed, x = *np.zeros((6, m)), np.zeros((n, m))
     target_share, error_share, slope_share, gyro_share = (
         np.where(k[name] > 0.0, 1.0 - np.exp(-2.0 * np.pi * k[name] * dt), 1.0)
         for name in ("FLTT", "FLTE", "FLTD", "FLTG")
     )
     of_gyro = "FLTG" in gains
-    seen, flying = _Gyro(gyro_filter, dt, m), np.ones(m, dtype=bool)
+    gyro, flying = _Gyro(gyro_filter, dt, m), np.ones(m, dtype=bool)
     rates = np.full((round(seconds * RATE) + 1, m), np.nan)
     for step in range(len(rates)):
-        acting = given[-late]
+        acting = given[-delay_steps]
         y = cd @ x + dd @ acting
         flying &= np.abs(y) < _WILD * max(1.0, abs(target))
         rates[step, flying] = y[flying]
         wanted = wanted + target_share * (target - wanted)
-        slow = slow + gyro_share * (seen(np.where(flying, y, 0.0)) - slow)
+        slow = slow + gyro_share * (gyro(np.where(flying, y, 0.0)) - slow)
         filtered = filtered + error_share * (wanted - slow - filtered)
         summed = summed + filtered * dt
         changing = -slow if of_gyro else filtered
@@ -183,5 +183,5 @@ class _Gyro:
 def _grows(values: Array) -> bool:
     """Whether an oscillation is larger in the last third than in the one before, or left all bounds."""
     third = values.size // 3
-    early, late = np.ptp(values[third : 2 * third]), np.ptp(values[2 * third :])
-    return not late < 1.05 * early + 1e-6
+    early, last = np.ptp(values[third : 2 * third]), np.ptp(values[2 * third :])
+    return not last < 1.05 * early + 1e-6

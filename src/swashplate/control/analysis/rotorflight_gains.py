@@ -110,7 +110,7 @@ def rotorflight_gains(
     k: dict[str, Any] = {**start.parameters, **start.pilot._asdict(), "collective": start.hover}
     k |= {f"{axis}_{name}": 0.0 for axis in AXES for name in ("p_gain", "i_gain", "d_gain", "b_gain")}
     for i, axis in enumerate(AXES[:2]):
-        k[f"{axis}_f_gain"] = _whole(1.0 / largest_rate(plant, "pq"[i], i), axis, "f_gain")
+        k[f"{axis}_f_gain"] = _firmware_number(1.0 / largest_rate(plant, "pq"[i], i), axis, "f_gain")
 
     def law_with(values: Mapping[str, Any]) -> RotorflightLaw:
         pilot = SticksPilot(**{name: float(values[name]) for name in SticksPilot._fields})
@@ -160,8 +160,8 @@ def judge_rotorflight(
     slowest = 0j
     modes_flown: tuple[RotorflightMode, ...] = ("angle", "hover")
     for mode in modes_flown:
-        flown = law.in_mode(mode).at(vehicle, hover)
-        loop = sampled_loop(vehicle, flown, hover, delays=dict(delays))
+        trimmed_law = law.in_mode(mode).at(vehicle, hover)
+        loop = sampled_loop(vehicle, trimmed_law, hover, delays=dict(delays))
         names = {"A1": "roll", "B1": "pitch", "theta0T": "yaw"} | ({"theta0": "height"} if mode == "hover" else {})
         opened = loop.opened(FREQUENCIES)
         closed = np.linalg.inv(np.eye(opened.shape[1]) + opened)
@@ -177,9 +177,9 @@ def judge_rotorflight(
 def _plant(
     vehicle: Vehicle, hover: Trim, law: RotorflightLaw, delays: Mapping[str, float], omega: Array
 ) -> CascadePlant:
-    late = np.array([delays.get(name, 0.0) for name in vehicle.input_names])
+    delay_row = np.array([delays.get(name, 0.0) for name in vehicle.input_names])
     mixer: Any = _Commands(law.rigging)
-    return cascade_plant(vehicle, hover, mixer, law.parameters, rate=law.rate, delays=late, omega=omega)
+    return cascade_plant(vehicle, hover, mixer, law.parameters, rate=law.rate, delays=delay_row, omega=omega)
 
 
 def _first_order(s: Complex, hertz: float) -> Complex:
@@ -225,8 +225,8 @@ def _feedback(omega: Array, k: Mapping[str, Any], *, height: bool = False, place
 
 def _placed(plant: CascadePlant, trial: Mapping[str, Any]) -> BrokenLoops:
     """The place loop, and all commands with it around them; the first two are what the choice is for."""
-    inner, whole = (_feedback(plant.omega, trial, height=True, place=place) for place in (False, True))
-    leans, commands = broken_at_leans(plant, inner, whole), broken_at_commands(plant, whole, (0, 1, 2, 3))
+    inner, total = (_feedback(plant.omega, trial, height=True, place=place) for place in (False, True))
+    leans, commands = broken_at_leans(plant, inner, total), broken_at_commands(plant, total, (0, 1, 2, 3))
     return BrokenLoops(plant.omega, np.concatenate([leans.loop, commands.loop], axis=-1), commands.turns)
 
 
@@ -260,7 +260,7 @@ def _best(
     )
 
 
-def _whole(per_radian: Any, axis: str, name: str) -> Any:
+def _firmware_number(per_radian: Any, axis: str, name: str) -> Any:
     """A gain per rad/s as the firmware's whole number."""
     return np.clip(np.round(per_radian / (SCALES[name][AXES.index(axis)] * _DEGREES)), 0.0, 1000.0)
 
@@ -273,9 +273,9 @@ def _rate_sets(plant: CascadePlant, axes: tuple[int, ...]) -> dict[str, Array]:
     sets: dict[str, Array] = {}
     for i in axes:
         p, axis = grid[0] / float(np.abs(plant.response[near, i, i])), AXES[i]
-        sets[f"{axis}_p_gain"] = _whole(p, axis, "p_gain")
-        sets[f"{axis}_i_gain"] = _whole(grid[1] * p, axis, "i_gain")
-        sets[f"{axis}_d_gain"] = _whole(grid[2] * p, axis, "d_gain")
+        sets[f"{axis}_p_gain"] = _firmware_number(p, axis, "p_gain")
+        sets[f"{axis}_i_gain"] = _firmware_number(grid[1] * p, axis, "i_gain")
+        sets[f"{axis}_d_gain"] = _firmware_number(grid[2] * p, axis, "d_gain")
         if axis != "yaw":
             sets[f"{axis}_o_gain"] = np.round(0.5 * sets[f"{axis}_i_gain"])
     sets["heading" if axes == (2,) else "angle_level_strength"] = grid[3] if axes == (2,) else 10.0 * grid[3]
@@ -283,8 +283,8 @@ def _rate_sets(plant: CascadePlant, axes: tuple[int, ...]) -> dict[str, Array]:
 
 
 def _height_sets(plant: CascadePlant) -> dict[str, Array]:
-    seen = (plant.omega >= 1.0) & (plant.omega <= 10.0)
-    lift = 1j * plant.omega[seen] * plant.response[seen, OUTPUTS.index("down"), 3]
+    band = (plant.omega >= 1.0) & (plant.omega <= 10.0)
+    lift = 1j * plant.omega[band] * plant.response[band, OUTPUTS.index("down"), 3]
     grid = np.array(list(product(np.geomspace(0.1, 5.0, 14), (0.2, 0.5, 1.0), (0.3, 0.5, 0.8)))).T
     climb = grid[0] / float(np.max(np.abs(lift)))
     return {"climb": climb, "climb_sum": grid[1] * climb, "height": grid[2]}

@@ -120,15 +120,15 @@ def sampled_loop(
     states = trim.states()
     reference = np.array([states.get(name, 0.0) for name in REFERENCES])
     # Specific force and draws are an observer's; here the states are known.
-    told = np.array([*trim.state, *np.zeros(3), trim.environment.voltage], dtype=np.float64)
-    inputs, *parts = _decisions(controller.law(vehicle), controller.memory_of_law(), told, reference, vehicle)
+    signals = np.array([*trim.state, *np.zeros(3), trim.environment.voltage], dtype=np.float64)
+    inputs, *parts = _decisions(controller.law(vehicle), controller.memory_of_law(), signals, reference, vehicle)
     around = linearize(vehicle, replace(trim, inputs=inputs))
     if not all(np.all(np.isfinite(part)) for part in (around.A, around.B, *parts)):
         raise SwashError("the closed loop has no derivative at this hover.", where=vehicle.name)
-    late = flown_delays(vehicle, controller, delays=delays)
+    delay_row = flown_delays(vehicle, controller, delays=delays)
 
-    def made(further: Array) -> SampledLoop:
-        F, G, before, samples = held_late(around.A, around.B, 1.0 / controller.rate, (late + further).tolist())
+    def loop_delayed_by(further: Array) -> SampledLoop:
+        F, G, before, samples = held_late(around.A, around.B, 1.0 / controller.rate, (delay_row + further).tolist())
         F, G, added = with_late_inputs(F, G, samples, before)
         n, more = len(vehicle.state_names), len(added)
         command, memory = (np.hstack([d[:, :n], np.zeros((len(d), more)), d[:, n:]]) for d in parts[:2])
@@ -143,24 +143,24 @@ def sampled_loop(
             memory,
             parts[2],
             parts[3],
-            later=lambda extra: made(further + extra),
+            later=lambda extra: loop_delayed_by(further + extra),
         )
 
-    return made(np.zeros(len(late)))
+    return loop_delayed_by(np.zeros(len(delay_row)))
 
 
-def _decisions(law: LawGraph, memory: Array, told: Array, reference: Array, vehicle: Vehicle) -> tuple[Array, ...]:
+def _decisions(law: LawGraph, memory: Array, signals: Array, reference: Array, vehicle: Vehicle) -> tuple[Array, ...]:
     """The command, and the derivatives of command and memory by (state, memory) and by the reference."""
     casadi = require_casadi()
     n, carried, k = len(vehicle.state_names), law.memory, law.memory - law.fixed
     both, asked = casadi.MX.sym("both", n + k), casadi.MX.sym("asked", len(reference))
-    everything = casadi.vertcat(both[:n], casadi.DM(told[n:]), casadi.DM.zeros(law.draws))
+    everything = casadi.vertcat(both[:n], casadi.DM(signals[n:]), casadi.DM.zeros(law.draws))
     before = casadi.vertcat(both[n:], casadi.DM(memory[k:]))
     result = law.function(before, everything[law.places.tolist()], asked)
     low, high = (casadi.DM(list(limits)) for limits in zip(*vehicle.input_limits, strict=True))
     command = casadi.fmin(casadi.fmax(result[carried:], low), high)
     parts = [command, casadi.jacobian(command, both), casadi.jacobian(result[:k], both)]
     parts += [casadi.jacobian(command, asked), casadi.jacobian(result[:k], asked)]
-    at = casadi.Function("decisions", [both, asked], parts)(np.concatenate([told[:n], memory[:k]]), reference)
+    at = casadi.Function("decisions", [both, asked], parts)(np.concatenate([signals[:n], memory[:k]]), reference)
     commands, *slopes = (np.asarray(casadi.DM(part).full(), dtype=np.float64) for part in at)
     return (commands[:, 0], *slopes)

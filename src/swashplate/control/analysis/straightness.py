@@ -214,13 +214,13 @@ def paths_of(batch: Batch, command: float, distance: float) -> Path:
     under_way = np.arange(len(x))[:, None] <= last
     numbers = np.arange(x.shape[1])
 
-    def told(values: Array) -> Array:
+    def of_arrived(values: Array) -> Array:
         return np.where(arrived, values, np.nan)
 
     return Path(
-        drift=told(y[last, numbers]),
-        leftmost=told(np.min(np.where(under_way, y, np.inf), axis=0)),
-        rightmost=told(np.max(np.where(under_way, y, -np.inf), axis=0)),
-        speed=told(np.max(np.where(under_way, u, -np.inf), axis=0)),
-        time=told(batch.time[last]),
+        drift=of_arrived(y[last, numbers]),
+        leftmost=of_arrived(np.min(np.where(under_way, y, np.inf), axis=0)),
+        rightmost=of_arrived(np.max(np.where(under_way, y, -np.inf), axis=0)),
+        speed=of_arrived(np.max(np.where(under_way, u, -np.inf), axis=0)),
+        time=of_arrived(batch.time[last]),
     )

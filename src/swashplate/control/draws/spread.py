@@ -57,7 +57,7 @@ class Limits:
             if not value > 0.0:
                 raise ControllerError(f"is {value:g}, expected a positive number.", channel=f"limit of {name}")
 
-    def words(self) -> str:
+    def summary_text(self) -> str:
         """The limits in the units that they are shown in."""
         values = asdict(self)
         listed = [f"{n} {values[n] * f:g} {u}" for n, (u, f) in SHOWN.items() if math.isfinite(values[n])]

@@ -64,8 +64,8 @@ class AutopilotKind(ControllerKind[Autopilot]):
 
     def differences(self, controller: Autopilot, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
         """The model of the design is known by its title only."""
-        own, theirs = controller.model, flying.vehicle.card.title
-        return () if own == theirs else (f"Designed on '{own}', flown on '{theirs}'.",)
+        designed_on, theirs = controller.model, flying.vehicle.card.title
+        return () if designed_on == theirs else (f"Designed on '{designed_on}', flown on '{theirs}'.",)
 
     def to_document(self, controller: Autopilot) -> dict[str, Any]:
         return {

@@ -169,10 +169,10 @@ def design_states(vehicle: Vehicle, delays: Sequence[int]) -> tuple[str, ...]:
     return (*vehicle.state_names, *waiting, *SUMS)
 
 
-def _shared(vehicle: Vehicle, own: Mapping[str, float], shares: Array) -> dict[str, float]:
+def _shared(vehicle: Vehicle, efforts: Mapping[str, float], shares: Array) -> dict[str, float]:
     """Effort by input: what was given, and shares of the usual."""
-    usual = (EFFORTS.get(name, EFFORT) for name in vehicle.input_names)
-    return {**dict(zip(vehicle.input_names, (u * s for u, s in zip(usual, shares, strict=True)), strict=True)), **own}
+    usual = (share * EFFORTS.get(name, EFFORT) for name, share in zip(vehicle.input_names, shares, strict=True))
+    return {**dict(zip(vehicle.input_names, usual, strict=True)), **efforts}
 
 
 def _eased(shares: Array, tight: float) -> dict[str, float]:

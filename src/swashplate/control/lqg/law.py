@@ -74,7 +74,7 @@ def _mixed(shares: Sequence[Operand], rows: Sequence[Sequence[Operand]]) -> list
 def lqr_law(
     memory: Sequence[Operand],
     x: Sequence[Operand],
-    late: Sequence[Operand],
+    delayed: Sequence[Operand],
     voltage: Operand,
     reference: Sequence[Operand],
     *,
@@ -89,11 +89,11 @@ def lqr_law(
     Args:
         memory: `LAW_MEMORY` numbers.
         x: estimated or measured states.
-        late: commands that were given and have not acted yet.
+        delayed: commands that were given and have not acted yet.
         voltage: the battery's [V].
         reference: the row of `REFERENCES`; speeds are counted from the speed it started at.
         names: of the states, beginning with the rigid body's.
-        late_of: the input of each late command.
+        late_of: the input of each delayed command.
         feedback: the numbers.
         dt: sample time [s].
         M: the operations.
@@ -129,7 +129,7 @@ def lqr_law(
         away["z"],
         turned,
     ]
-    held = [late[i] - trim_u[j] for i, j in enumerate(late_of)]
+    held = [delayed[i] - trim_u[j] for i, j in enumerate(late_of)]
     deviation = M.column([*(away[name] for name in names), *held, *sums])
     pushed = _mixed(now, [M.scalars(gain @ deviation) for gain in f.gains])
     commands, fits = [], 1.0

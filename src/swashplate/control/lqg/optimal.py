@@ -71,11 +71,13 @@ def unseen(
         if blind:
             vectors = np.column_stack([_turned_real(right[i].conj()) for i in blind])
             margin = float(values[blind[-1]] / values[0])
-            directions += [UnreachedDirection(complex(z), shares(vector, names), margin) for vector in plain(vectors).T]
+            directions += [
+                UnreachedDirection(complex(z), shares(vector, names), margin) for vector in pivoted_basis(vectors).T
+            ]
     return tuple(directions)
 
 
-def plain(basis: Array) -> Array:
+def pivoted_basis(basis: Array) -> Array:
     """Another basis of the same columns' span, each column with a state of its own: easier to put into words."""
     _, _, pivots = scipy.linalg.qr(basis.T, pivoting=True)
     kept = np.sort(pivots[: basis.shape[1]])

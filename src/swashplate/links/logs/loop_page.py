@@ -20,7 +20,8 @@ def loop_of(suggestion: Suggestion) -> dict[str, Any]:
     model = None
     if loop.structure is not None:
         held = held_model(loop.structure, loop.rate, loop.command)
-        model = {name: np.asarray(value).tolist() for name, value in held._asdict().items()}
+        page_names = ("ad", "bd", "cd", "dd", "late")
+        model = {name: np.asarray(value).tolist() for name, value in zip(page_names, held, strict=True)}
     return {
         "axis": axis,
         "rate": loop.rate,

@@ -48,7 +48,7 @@ class FlightsKind(CampaignKind):
         summary: list[tuple[str, str, str]] = []
         if "lost" in table:
             lost, every = int(np.sum(table["lost"])), len(table["lost"])
-            words = flight_limits(settings.limit).words()
+            words = flight_limits(settings.limit).summary_text()
             summary = [("Lost", f"{share_words(lost, every)} (limits: {words})", "bad" if lost else "good")]
         worst = "place" if "place" in table else ""
         return CampaignFindings(tuple(summary), shown, worst=worst, again=".nc")

@@ -47,8 +47,8 @@ class ArduPilotKind(ControllerKind[ArduPilotLaw]):
         return controller.at(vehicle, trim)
 
     def differences(self, controller: ArduPilotLaw, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
-        own, theirs = controller.model, flying.vehicle.card.title
-        return () if own == theirs else (f"Designed on '{own}', flown on '{theirs}'.",)
+        designed_on, theirs = controller.model, flying.vehicle.card.title
+        return () if designed_on == theirs else (f"Designed on '{designed_on}', flown on '{theirs}'.",)
 
     def to_document(self, controller: ArduPilotLaw) -> dict[str, Any]:
         return {
@@ -72,8 +72,8 @@ class ArduPilotKind(ControllerKind[ArduPilotLaw]):
             raise ControllerError(f"is '{read.frame}', expected {', '.join(FRAMES)}.", where=path, channel="frame")
         kind = FRAMES[read.frame]
         if set(read.mixer) != set(kind._fields):
-            told = f"has {', '.join(read.mixer)}, expected {', '.join(kind._fields)}."
-            raise ControllerError(told, where=path, channel="mixer")
+            problem = f"has {', '.join(read.mixer)}, expected {', '.join(kind._fields)}."
+            raise ControllerError(problem, where=path, channel="mixer")
         low, high = _RATES
         if not low <= read.rate <= high:
             raise ControllerError(f"is {read.rate:g} Hz, expected {low:g} to {high:g}.", where=path, channel="rate")

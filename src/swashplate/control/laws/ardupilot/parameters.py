@@ -134,9 +134,9 @@ def known(given: Mapping[str, float], *, frame: str) -> dict[str, float]:
     for name, value in given.items():
         if name.startswith(("ATC_RAT_", "PSC_")) and name.endswith(_REFUSED) and value != 0.0:
             raise ControllerError(f"is {value:g}; the rebuilt law has no such part, expected 0.", channel=name)
-        own, factor = RENAMED.get(name, (name, 1.0))
-        if own in values:
-            values[own] = factor * float(value)
+        law_name, factor = RENAMED.get(name, (name, 1.0))
+        if law_name in values:
+            values[law_name] = factor * float(value)
     return values
 
 

@@ -44,8 +44,8 @@ class RotorflightKind(ControllerKind[RotorflightLaw]):
         return controller.at(vehicle, trim)
 
     def differences(self, controller: RotorflightLaw, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
-        own, theirs = controller.model, flying.vehicle.card.title
-        return () if own == theirs else (f"Designed on '{own}', flown on '{theirs}'.",)
+        designed_on, theirs = controller.model, flying.vehicle.card.title
+        return () if designed_on == theirs else (f"Designed on '{designed_on}', flown on '{theirs}'.",)
 
     def to_document(self, controller: RotorflightLaw) -> dict[str, Any]:
         return {
@@ -64,13 +64,13 @@ class RotorflightKind(ControllerKind[RotorflightLaw]):
 
     def from_document(self, document: Mapping[str, Any], path: str) -> RotorflightLaw:
         read = documents.checked(document, _LawFile, where=path, error=ControllerError)
-        for channel, told, expected in (
+        for channel, entries, expected in (
             ("rigging", read.rigging, Rigging._fields),
             ("pilot", read.pilot, SticksPilot._fields),
         ):
-            if set(told) != set(expected):
-                words = f"has {', '.join(told)}, expected {', '.join(expected)}."
-                raise ControllerError(words, where=path, channel=channel)
+            if set(entries) != set(expected):
+                problem = f"has {', '.join(entries)}, expected {', '.join(expected)}."
+                raise ControllerError(problem, where=path, channel=channel)
         low, high = _RATES
         if not low <= read.rate <= high:
             raise ControllerError(f"is {read.rate:g} Hz, expected {low:g} to {high:g}.", where=path, channel="rate")
