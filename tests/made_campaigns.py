@@ -65,7 +65,7 @@ class InProcess:
         did: tasks that it did.
     """
 
-    workers, words = 1, "this process"
+    workers, description = 1, "this process"
 
     def __init__(self, work: Work, *, stop_after: int | None = None) -> None:
         self._work, self._stop, self._waiting = work, stop_after, deque[CampaignTask]()

@@ -12,7 +12,7 @@ import swashplate
 
 HOUSE = Path(swashplate.__file__).parent
 WORDS = ("found", "moved", "words", "told", "plain", "flown", "made", "own", "late", "whole", "seen")
-MOST = dict.fromkeys(("bench", "cli", "engine", "filtering", "models", "physics"), 0)
+MOST = dict.fromkeys(("api/campaigns", "bench", "cli", "engine", "filtering", "models", "physics"), 0)
 MOST |= dict.fromkeys(("links/betaflight", "links/live", "links/logs", "links/px4", "links/web"), 0)
 MOST |= {"control": 2, "export": 7, "flights": 2, "identification": 2, "links/ardupilot": 1, "links/mavlink": 1}
 MOST |= {"reporting": 8, "simulation": 9, "validation": 7}

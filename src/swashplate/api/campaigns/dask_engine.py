@@ -77,7 +77,7 @@ class DaskEngine:
         return self._count
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         place = f"of the scheduler {self._address}"
         count = self.workers
         if not count:

@@ -48,7 +48,7 @@ class TaskEngine(Protocol):
         ...
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """What it is, for a person."""
         ...
 

@@ -75,27 +75,28 @@ class CampaignKind(ABC):
 
     Attributes:
         rows: what a row is: "flight", "fit", "log".
-        question: of the verb. words: what its file says beside. without: words of the verb that mean nothing here.
+        question: of the verb. settings_type: what its file says beside.
+        without: words of the verb that mean nothing here.
         own_files: of its own words those that name files.
     """
 
     rows: ClassVar[str]
     question: ClassVar[type[VerbQuestion[Any]]]
-    words: ClassVar[type[CampaignSettings]] = CampaignSettings
+    settings_type: ClassVar[type[CampaignSettings]] = CampaignSettings
     without: ClassVar[tuple[str, ...]] = ()
     own_files: ClassVar[tuple[str, ...]] = ()
 
     @cached_property
     def schema(self) -> type[CampaignSettings]:
         """What its file says."""
-        words: list[Any] = []
+        verb_fields: list[Any] = []
         for name in entries(self.question):
-            if name not in (*self.words.__struct_fields__, *self.without):
+            if name not in (*self.settings_type.__struct_fields__, *self.without):
                 default = default_of(self.question, name)
-                words.append((name, Any) if default is dataclasses.MISSING else (name, Any, default))
+                verb_fields.append((name, Any) if default is dataclasses.MISSING else (name, Any, default))
         name, how = f"{self.question.__name__}Campaign", {"kw_only": True, "frozen": True}
-        made = msgspec.defstruct(name, words, bases=(self.words,), forbid_unknown_fields=True, **how)  # type: ignore[arg-type]
-        return cast(type[CampaignSettings], made)
+        struct = msgspec.defstruct(name, verb_fields, bases=(self.settings_type,), forbid_unknown_fields=True, **how)  # type: ignore[arg-type]
+        return cast(type[CampaignSettings], struct)
 
     def files(self, settings: Any) -> Iterator[tuple[str, str]]:
         """Files that every task needs: where each stands, and what stands there."""
@@ -106,12 +107,12 @@ class CampaignKind(ABC):
 
     def asked(self, settings: Any, files: Mapping[str, Path], **instead: Any) -> Any:
         """The question of a campaign's file, its files where they lie here, some of its fields from elsewhere."""
-        told = {name: getattr(settings, name) for name in entries(self.question) if name not in self.without}
-        for name in _file_words(self.question) & told.keys():
-            given = told[name]
+        values = {name: getattr(settings, name) for name in entries(self.question) if name not in self.without}
+        for name in _file_words(self.question) & values.keys():
+            given = values[name]
             several = isinstance(given, list | tuple)
-            told[name] = tuple(files.get(one, one) for one in given) if several else files.get(given, given)
-        return self.question(**told | instead)
+            values[name] = tuple(files.get(one, one) for one in given) if several else files.get(given, given)
+        return self.question(**values | instead)
 
     def parts(self, settings: Any, folder: Path) -> tuple[Portion, ...]:
         """Its tasks: rows in tasks of `batch`. `folder` is that of the campaign's file.
@@ -184,5 +185,5 @@ def settings_of(name: str, document: Mapping[str, Any], *, where: str = "") -> A
     Raises:
         CampaignError: an entry that is missing, unknown or of another type.
     """
-    whole = {"kind": "campaign", "of": name, **document}
-    return documents.checked(whole, CAMPAIGNS[name].schema, where=where, error=CampaignError)
+    complete = {"kind": "campaign", "of": name, **document}
+    return documents.checked(complete, CAMPAIGNS[name].schema, where=where, error=CampaignError)

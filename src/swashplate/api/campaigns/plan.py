@@ -79,22 +79,22 @@ class CampaignPlan:
 
     def __repr__(self) -> str:
         rows, tasks = self.rows, len(self.tasks)
-        told = [f"{self.of}: {rows:,} {self.kind.rows}s in {tasks:,} tasks"]
+        lines = [f"{self.of}: {rows:,} {self.kind.rows}s in {tasks:,} tasks"]
         if self.first_seconds is not None and self.task_seconds is not None and self.task_bytes is not None:
-            whole = self.task_seconds * tasks
+            total = self.task_seconds * tasks
             compiling = max(0.0, self.first_seconds - self.task_seconds)
-            wall = compiling + whole / min(self.workers, max(tasks, 1))
-            told += [
+            wall = compiling + total / min(self.workers, max(tasks, 1))
+            lines += [
                 f"a task: {self.task_seconds:.3g} s, its result {self.task_bytes / 1e3:.3g} kB; "
                 f"a worker's first one {compiling:.3g} s more, for compiling",
-                f"all: {duration(whole)} of processor time, {self.task_bytes * tasks / 1e6:.3g} MB; "
+                f"all: {duration(total)} of processor time, {self.task_bytes * tasks / 1e6:.3g} MB; "
                 f"with {self.workers} workers about {duration(wall)}",
             ]
             if self.task_seconds < LEAST_SECONDS and tasks > self.workers:
-                told.append(
+                lines.append(
                     f"Careful: a task should last a second. Say batch = {self.larger_batch()} in the campaign's file."
                 )
-        return "\n".join(told)
+        return "\n".join(lines)
 
     def larger_batch(self) -> int:
         """Rows per task that last about a second, a power of two."""
@@ -126,8 +126,8 @@ def plan_campaign(file: str | Path, *, measure: bool = False) -> CampaignPlan:
         CampaignError: an entry that is missing, unknown or impossible, an unknown kind, a file that is not there.
     """
     text = documents.read_text(file, form="toml", error=CampaignError, hint=_HINT)
-    made = _planned(text, Path(file).absolute().parent, where=str(file))
-    return _measured(made) if measure else made
+    plan = _planned(text, Path(file).absolute().parent, where=str(file))
+    return _measured(plan) if measure else plan
 
 
 def planned_in(store: CampaignStore) -> CampaignPlan:
@@ -154,13 +154,13 @@ def changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     for name in sorted({*before["files"], *now["files"]}):
         if before["files"].get(name) != now["files"].get(name):
             changed.append(f"the file {name} has another content")
-    changed += [f"the program: {words} as it was" for words in differences(before["program"], now["program"])]
+    changed += [f"the program: {difference} as it was" for difference in differences(before["program"], now["program"])]
     logs = [{p[3]: p[4] for p in plan["portions"] if p[3]} for plan in (before, now)]
     fresh, gone = (sorted(set(a) - set(b)) for a, b in ((logs[1], logs[0]), (logs[0], logs[1])))
     other = [name for name in logs[0] if name in logs[1] and logs[0][name] != logs[1][name]]
-    for names, words in ((fresh, "new"), (gone, "gone"), (other, "changed")):
+    for names, change in ((fresh, "new"), (gone, "gone"), (other, "changed")):
         if names:
-            changed.append(f"{len(names)} {words}: {', '.join(names[:3])}{' ...' if len(names) > 3 else ''}")
+            changed.append(f"{len(names)} {change}: {', '.join(names[:3])}{' ...' if len(names) > 3 else ''}")
     if not changed and before["portions"] != now["portions"]:
         changed.append("its tasks are cut otherwise")
     return changed
@@ -190,9 +190,9 @@ def _planned(text: str, place: Path, *, where: str) -> CampaignPlan:
         raise CampaignError(
             f"its files have more than {_LARGEST >> 20} MiB, and every task takes them along.", where=where
         )
-    whole = json.loads(json.dumps(msgspec.to_builtins(settings)))  # lists as a store gives them back
-    tasks = made_tasks(str(document["of"]), matters(whole), parts, files=files, program=program())
-    return CampaignPlan(text, str(document["of"]), whole, tasks)
+    as_stored = json.loads(json.dumps(msgspec.to_builtins(settings)))  # lists as a store gives them back
+    tasks = made_tasks(str(document["of"]), matters(as_stored), parts, files=files, program=program())
+    return CampaignPlan(text, str(document["of"]), as_stored, tasks)
 
 
 def _kind(name: Any, *, where: str) -> CampaignKind:

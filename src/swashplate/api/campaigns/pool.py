@@ -49,7 +49,7 @@ class ProcessPool:
         return len(self._lanes)
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         return f"{self.workers} processes of this machine"
 
     def submit(self, task: CampaignTask) -> None:
@@ -137,8 +137,8 @@ def _serve(pipe: Connection, work: Work) -> None:
 
 def in_words(error: BaseException) -> str:
     """An error as one line."""
-    words = " ".join(str(error).split())
-    return words if type(error).__module__.startswith("swashplate") else f"{type(error).__name__}: {words}"
+    text = " ".join(str(error).split())
+    return text if type(error).__module__.startswith("swashplate") else f"{type(error).__name__}: {text}"
 
 
 @contextmanager

@@ -107,26 +107,26 @@ class Campaign(Shown):
         values = np.asarray(self.table[by], dtype=np.float64)
         order = np.argsort(-np.where(np.isnan(values), -np.inf, values), kind="stable")[:count]
         factor = self.findings.shown.get(by, ("", 1.0))[1]
-        rows, told = self.table, f"swash campaign replay {self.folder}"
+        rows, replay_command = self.table, f"swash campaign replay {self.folder}"
         worst = []
         for k in order:
             number = int(rows["number"][k])
-            command = f"{told} {number} -o worst-{number}{self.findings.again}"
+            command = f"{replay_command} {number} -o worst-{number}{self.findings.again}"
             worst.append(WorstRow(number, int(rows["seed"][k]), float(factor * values[k]), command))
         return tuple(worst)
 
     @property
     def standing(self) -> str:
         """How far it is, in words."""
-        told = f"{len(self.done)} of {len(self.names)} tasks done"
+        text = f"{len(self.done)} of {len(self.names)} tasks done"
         if self.refused:
-            told += f", the results of {len(self.refused)} refused"
+            text += f", the results of {len(self.refused)} refused"
         if self.failed:
-            told += f", {len(self.failed)} given up"
+            text += f", {len(self.failed)} given up"
         left = len(self.names) - len(self.done) - len(self.failed) + len(self.refused)
         if left and not self.at_work:
-            told += f"; `swash campaign resume {self.folder}` goes on"
-        return told + (f"; at work: {self.at_work}" if self.at_work else "")
+            text += f"; `swash campaign resume {self.folder}` goes on"
+        return text + (f"; at work: {self.at_work}" if self.at_work else "")
 
     def to_document(self) -> dict[str, object]:
         """The summary as what becomes JSON."""
@@ -137,8 +137,8 @@ class Campaign(Shown):
             "done": len(self.done),
             "rows": len(self.table.get("number", ())),
             "refused": dict(self.refused),
-            "failed": {name: dict(told) for name, told in self.failed.items()},
-            "summary": {label: words for label, words, _ in self.findings.summary},
+            "failed": {name: dict(failure) for name, failure in self.failed.items()},
+            "summary": {label: text for label, text, _ in self.findings.summary},
             "careful": list(self.findings.careful),
             "quantiles": {
                 name: {f"{share:g}": list(estimate) for share, estimate in zip(QUANTILES, every, strict=True)}
@@ -168,8 +168,8 @@ class Campaign(Shown):
             folder=str(self.folder),
             tables=findings.tables,
             refused=tuple(self.refused.values()),
-            failed=[FailedTask(told["first"], told["count"], told["seed"], told["of"], tuple(told["tries"]))
-                    for told in self.failed.values()],
+            failed=[FailedTask(f["first"], f["count"], f["seed"], f["of"], tuple(f["tries"]))
+                    for f in self.failed.values()],
         )  # fmt: skip
 
     def save(self, path: str | Path) -> Path:
@@ -196,27 +196,27 @@ class Campaign(Shown):
         return atomic.write_text(place, pd.DataFrame(table).to_csv(index=False, na_rep="nan"))
 
     def __repr__(self) -> str:
-        told = [
+        lines = [
             f"{self.of}: {self.standing}",
             *self.refused.values(),
-            *(f"Careful: {words}" for words in self.findings.careful),
+            *(f"Careful: {text}" for text in self.findings.careful),
         ]
-        told += [f"{label}: {words}" for label, words, _ in self.findings.summary]
+        lines += [f"{label}: {text}" for label, text, _ in self.findings.summary]
         if self.table and self.findings.shown:
             head = ("", *(f"{100 * share:g} %" for share in QUANTILES), "95 % interval of the last")
             rows = []
             for (name, (unit, _)), every in zip(self.findings.shown.items(), self.quantiles.values(), strict=True):
                 last = f"{every[-1][1]:.4g} to {every[-1][2]:.4g}"
                 rows.append((f"{name} [{unit}]" if unit else name, *(f"{estimate[0]:.4g}" for estimate in every), last))
-            told.append(text_table(head, rows))
+            lines.append(text_table(head, rows))
         for caption, head, cells in self.findings.tables:
-            told.append(text_table(head, cells, left=(0, len(head) - 1)) if cells else caption)
+            lines.append(text_table(head, cells, left=(0, len(head) - 1)) if cells else caption)
         by = self.findings.worst
         if row := next(iter(self.worst(1)), None):
-            told.append(f"worst {by}: number {row.number}, seed {row.seed}: {row.command}")
+            lines.append(f"worst {by}: number {row.number}, seed {row.seed}: {row.command}")
         for failed in list(self.failed.values())[:3]:
-            told.append(f"given up: rows from {failed['first']} (seed {failed['seed']}): {failed['tries'][-1]}")
-        return "\n".join(told)
+            lines.append(f"given up: rows from {failed['first']} (seed {failed['seed']}): {failed['tries'][-1]}")
+        return "\n".join(lines)
 
 
 def campaign_results(folder: str | Path) -> Campaign:
@@ -231,7 +231,7 @@ def campaign_results(folder: str | Path) -> Campaign:
     store = CampaignStore(folder)
     plan = planned_in(store)
     names = tuple(task.name for task in plan.tasks)
-    failed = {name: told for name, told in store.failed().items() if name in set(names)}
+    failed = {name: failure for name, failure in store.failed().items() if name in set(names)}
     done = store.done() & set(names)
     rows = tuple(range(t.portion.first, t.portion.first + t.portion.count) for t in plan.tasks)
     return Campaign(Path(folder), plan.of, plan.document, names, rows, done, failed, at_work=store.owner)

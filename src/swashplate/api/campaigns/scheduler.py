@@ -72,16 +72,16 @@ class DaskScheduler:
         ca = self._file(_CA, self.ca, "ca-file")
         certificate = self._file(_CERTIFICATE, self.certificate, "client.cert")
         key = self._file(_KEY, self.key, "client.key")
-        made = make(tls_ca_file=ca, tls_client_cert=certificate, tls_client_key=key, require_encryption=True)
+        security = make(tls_ca_file=ca, tls_client_cert=certificate, tls_client_key=key, require_encryption=True)
         try:
-            made.get_connection_args("client")
+            security.get_connection_args("client")
         except OSError as error:  # what OpenSSL says of a file is one
             raise CampaignError(
                 f"are no certificates, and no key that belongs to one of them: {error.strerror}.",
                 channel=", ".join(_OPTIONS),
                 hint=_HOW,
             ) from None
-        return made
+        return security
 
     def _open(self, make: Any) -> Any:
         if any((self.ca, self.certificate, self.key)):

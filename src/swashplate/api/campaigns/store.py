@@ -143,11 +143,11 @@ class CampaignStore:
         atomic.write_bytes(self._result(task.name), content)
         (self.folder / FAILED / f"{task.name}.json").unlink(missing_ok=True)
 
-    def give_up(self, task: CampaignTask, words: Sequence[str]) -> None:
+    def give_up(self, task: CampaignTask, reasons: Sequence[str]) -> None:
         """Write that a task has failed for good, with what was said at each try."""
         portion = task.portion
-        told = {"first": portion.first, "count": portion.count, "seed": portion.seed, "of": portion.of}
-        atomic.write_json(self.folder / FAILED / f"{task.name}.json", {**told, "tries": list(words)})
+        document = {"first": portion.first, "count": portion.count, "seed": portion.seed, "of": portion.of}
+        atomic.write_json(self.folder / FAILED / f"{task.name}.json", {**document, "tries": list(reasons)})
 
     def columns(self, name: str) -> Columns:
         """The result of a task.
@@ -228,8 +228,8 @@ def _unpacked(path: Path, content: bytes, name: str) -> Columns:
     try:
         return unpacked(content, task=name)
     except Exception as error:  # whatever the libraries raise on damaged bytes is the file's fault
-        words, hint = str(error).rstrip(".") or type(error).__name__, "`swash campaign resume` does the task again."
-        raise CampaignError(f"is no result of its task: {words}.", where=path, hint=hint) from None
+        reason, hint = str(error).rstrip(".") or type(error).__name__, "`swash campaign resume` does the task again."
+        raise CampaignError(f"is no result of its task: {reason}.", where=path, hint=hint) from None
 
 
 def _locked(descriptor: int) -> bool:

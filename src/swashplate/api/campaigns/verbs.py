@@ -30,11 +30,11 @@ def run_campaign(asked: RunCampaign, folder: Path, say: Say) -> Campaign:
     Stopped or killed at any moment it goes on where it was the next time: every task is named by the SHA-256 of what it
     depends on, and its result is a file that appears when it is complete.
     """
-    made, make = plan_campaign(asked.file), _chosen(asked.where(), asked.workers)
+    plan, make = plan_campaign(asked.file), _chosen(asked.where(), asked.workers)
     store = CampaignStore(folder)
     with store.held():
         if store.exists:
-            changed = changes(store.plan(), made.stored())
+            changed = changes(store.plan(), plan.stored())
             if changed and not asked.accept_changes:
                 raise CampaignError(
                     f"was begun otherwise: {'; '.join(changed)}.",
@@ -46,8 +46,8 @@ def run_campaign(asked: RunCampaign, folder: Path, say: Say) -> Campaign:
             changed = ["new"]
         if changed:
             say("writing the plan")
-            store.begin(made.text, made.stored(), made.tasks[0].files if made.tasks else {})
-        _finish(made, store, make, say=say)
+            store.begin(plan.text, plan.stored(), plan.tasks[0].files if plan.tasks else {})
+        _finish(plan, store, make, say=say)
     return campaign_results(folder)
 
 
@@ -56,12 +56,12 @@ def go_on(asked: ResumeCampaign, say: Say) -> Campaign:
     store, make = CampaignStore(asked.folder), _chosen(asked.where(), asked.workers)
     store.plan()
     with store.held():
-        made = planned_in(store)
-        _check_same_program(made, store)
+        plan = planned_in(store)
+        _check_same_program(plan, store)
         if asked.retry_failed:
             for name in store.failed():
                 (store.folder / FAILED / f"{name}.json").unlink(missing_ok=True)
-        _finish(made, store, make, say=say)
+        _finish(plan, store, make, say=say)
     return campaign_results(asked.folder)
 
 
@@ -79,11 +79,11 @@ def replay_campaign(folder: str | Path, number: int) -> Any:
             another row; a task that cannot be done.
     """
     store = CampaignStore(folder)
-    made = planned_in(store)
-    _check_same_program(made, store)
-    task = next((t for t in made.tasks if 0 <= number - t.portion.first < t.portion.count), None)
+    plan = planned_in(store)
+    _check_same_program(plan, store)
+    task = next((t for t in plan.tasks if 0 <= number - t.portion.first < t.portion.count), None)
     if task is None:
-        raise CampaignError(f"has no {made.kind.rows} {number}; it has {made.rows}.", where=folder)
+        raise CampaignError(f"has no {plan.kind.rows} {number}; it has {plan.rows}.", where=folder)
     replaying: Any = partial(worker.replay, row=number - task.portion.first)
     pool = ProcessPool(replaying, workers=1)
     try:
@@ -91,17 +91,17 @@ def replay_campaign(folder: str | Path, number: int) -> Any:
     finally:
         pool.close()
     if outcome.columns is None:
-        raise CampaignError(f"cannot be done again: {outcome.error}", where=f"{made.kind.rows} {number}")
+        raise CampaignError(f"cannot be done again: {outcome.error}", where=f"{plan.kind.rows} {number}")
     return outcome.columns
 
 
-def _check_same_program(made: CampaignPlan, store: CampaignStore) -> None:
+def _check_same_program(plan: CampaignPlan, store: CampaignStore) -> None:
     """That this process computes what a campaign's tasks were computed with.
 
     Raises:
         CampaignError: with what differs.
     """
-    changed = differences(made.tasks[0].program if made.tasks else {}, program())
+    changed = differences(plan.tasks[0].program if plan.tasks else {}, program())
     if changed:
         raise CampaignError(
             f"was begun with another program: {'; '.join(changed)}.",
@@ -124,21 +124,21 @@ def _chosen(scheduler: DaskScheduler | None, workers: int | None) -> Callable[[W
     return lambda work, _: DaskEngine(work, scheduler=scheduler, least=workers or 1)
 
 
-def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int], TaskEngine], *, say: Say) -> None:
+def _finish(plan: CampaignPlan, store: CampaignStore, make: Callable[[Work, int], TaskEngine], *, say: Say) -> None:
     """Do every task of a plan that the store does not have."""
-    names = {task.name for task in made.tasks}
+    names = {task.name for task in plan.tasks}
     if refused := store.forget_refused(sorted(names & store.done())):
         say(f"{len(refused)} results are refused, and their tasks done again")
     done, failed = store.done(), store.failed()
-    left: Sequence[CampaignTask] = [t for t in made.tasks if t.name not in done and t.name not in failed]
-    standing = CampaignStanding(total=len(made.tasks), done=len(names & done), failed=len(names & set(failed)))
+    left: Sequence[CampaignTask] = [t for t in plan.tasks if t.name not in done and t.name not in failed]
+    standing = CampaignStanding(total=len(plan.tasks), done=len(names & done), failed=len(names & set(failed)))
     if not left:
         return
     say("starting the workers")
     engine = make(worker.work, len(left))
     standing.workers = engine.workers
     try:
-        tell = partial(_told, say, made, engine)
+        tell = partial(_say_standing, say, plan, engine)
         tell(standing)
         carry_out(left, engine, store, standing=standing, tell=tell)
     finally:
@@ -146,11 +146,11 @@ def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int]
             engine.close()
 
 
-def _told(say: Say, made: CampaignPlan, engine: TaskEngine, standing: CampaignStanding) -> None:
+def _say_standing(say: Say, plan: CampaignPlan, engine: TaskEngine, standing: CampaignStanding) -> None:
     left = "" if standing.seconds_left is None or not standing.workers else f", {duration(standing.seconds_left)} left"
     failed = f", {standing.failed} failed" if standing.failed else ""
     say(
-        f"{made.of} on {engine.words}",
+        f"{plan.of} on {engine.description}",
         done=standing.done + standing.failed,
         total=standing.total,
         note=f"{standing.done} of {standing.total} tasks{failed}{left}",

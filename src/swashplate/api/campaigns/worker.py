@@ -35,11 +35,11 @@ def work(task: CampaignTask) -> Columns:
     if count != {portion.count}:
         raise CampaignError(f"gave columns of {sorted(count)} rows, expected {portion.count}.", channel=task.kind)
     kept = chosen(tuple(columns), settings.keep)
-    own = {
+    row_columns = {
         "number": np.arange(portion.first, portion.first + portion.count),
         "seed": np.full(portion.count, portion.seed, dtype=np.int64),
     }
-    return own | {name: columns[name] for name in kept}
+    return row_columns | {name: columns[name] for name in kept}
 
 
 def replay(task: CampaignTask, row: int) -> Any:

@@ -97,7 +97,7 @@ def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
         scheduler.setattr(engine._client, "scheduler_info", lambda n_workers: {"workers": {}})
         scheduler.setattr(engine, "_counted", float("-inf"))
         assert engine.workers == 0
-        assert engine.words == f"no worker of the scheduler {dask.address}, it waits for one"
+        assert engine.description == f"no worker of the scheduler {dask.address}, it waits for one"
     engine._counted = float("-inf")
     other = tuple(replace(task, program=dict(task.program) | {"numpy": "1.0"}) for task in made_campaigns.tasks(2))
     monkeypatch.undo()
@@ -181,7 +181,7 @@ def test_a_campaign_whose_workers_have_all_gone_waits_and_says_so(tmp_path: Path
         dask.workers[0].kill()
 
         def tell(standing: CampaignStanding) -> None:
-            told.append((standing.workers, engine.words))
+            told.append((standing.workers, engine.description))
             if not standing.workers and len(dask.workers) == 1:
                 dask.join("--no-nanny")
 

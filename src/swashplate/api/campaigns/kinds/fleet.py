@@ -51,7 +51,7 @@ class FleetKind(CampaignKind):
 
     rows = "log"
     question = FitTransferFunctions
-    words = FleetWords
+    settings_type = FleetWords
     without = ("responses", "hold_out", "outputs", "gains", "margins")
 
     def parts(self, settings: Any, folder: Path) -> tuple[Portion, ...]:
@@ -82,8 +82,8 @@ class FleetKind(CampaignKind):
     def findings(self, settings: Any, table: Columns) -> CampaignFindings:
         if "verdict" not in table:
             return CampaignFindings((), {})
-        verdicts = [str(words) for words in table["verdict"]]
-        kinds = Counter(words.partition(":")[0] for words in verdicts)
+        verdicts = [str(verdict) for verdict in table["verdict"]]
+        kinds = Counter(verdict.partition(":")[0] for verdict in verdicts)
         good = kinds.get(GOOD, 0)
         shown = {n: ("", 1.0) for n in ("cost", *Form.parse(settings.form).names) if n in table and good}
         tables = [("What became of the logs", ("verdict", "logs"), tuple((w, str(n)) for w, n in kinds.most_common()))]

@@ -33,7 +33,7 @@ class FlightsKind(CampaignKind):
         return super().parts(settings, folder)
 
     def run(self, settings: Any, portion: Portion, files: Mapping[str, Path]) -> Columns:
-        many = self._flown(settings, portion, files)
+        many = self._fly_portion(settings, portion, files)
         spread = many.spread
         columns: Columns = {"lost_after": spread.lost_after, "lost": np.isfinite(spread.lost_after).astype(np.int64)}
         columns |= {name: np.asarray(values, dtype=np.float64) for name, values in spread.values.items()}
@@ -41,19 +41,19 @@ class FlightsKind(CampaignKind):
         return columns | {f"drawn.{name}": np.asarray(v, dtype=np.float64) for name, v in many.drawn.items()}
 
     def replay(self, settings: Any, portion: Portion, files: Mapping[str, Path], row: int) -> Flight:
-        return self._flown(settings, portion, files).flight(row)
+        return self._fly_portion(settings, portion, files).flight(row)
 
     def findings(self, settings: Any, table: Columns) -> CampaignFindings:
         shown = {name: how for name, how in (*SHOWN.items(), ("place_rms", ("m", 1.0))) if name in table}
         summary: list[tuple[str, str, str]] = []
         if "lost" in table:
             lost, every = int(np.sum(table["lost"])), len(table["lost"])
-            words = flight_limits(settings.limit).summary_text()
-            summary = [("Lost", f"{share_words(lost, every)} (limits: {words})", "bad" if lost else "good")]
+            limit_text = flight_limits(settings.limit).summary_text()
+            summary = [("Lost", f"{share_words(lost, every)} (limits: {limit_text})", "bad" if lost else "good")]
         worst = "place" if "place" in table else ""
         return CampaignFindings(tuple(summary), shown, worst=worst, again=".nc")
 
-    def _flown(self, settings: Any, portion: Portion, files: Mapping[str, Path]) -> MonteCarlo:
+    def _fly_portion(self, settings: Any, portion: Portion, files: Mapping[str, Path]) -> MonteCarlo:
         vehicle = vehicle_of(str(files.get(settings.vehicle, settings.vehicle)))
         return self.asked(settings, files, vehicle=vehicle, count=portion.count, seed=portion.seed).answer()
 

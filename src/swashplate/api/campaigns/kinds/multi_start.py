@@ -43,7 +43,7 @@ class MultiStartWords(FitWords, forbid_unknown_fields=True, kw_only=True, frozen
 class MultiStartKind(FitKind):
     """See `CampaignKind`."""
 
-    words = MultiStartWords
+    settings_type = MultiStartWords
     own_files = ("responses",)
 
     def parts(self, settings: Any, folder: Path) -> tuple[Portion, ...]:

@@ -53,7 +53,7 @@ class RecoveryWords(FitWords, forbid_unknown_fields=True, kw_only=True, frozen=T
 class RecoveryKind(FitKind):
     """See `CampaignKind`."""
 
-    words = RecoveryWords
+    settings_type = RecoveryWords
     own_files = ("controller",)
     without = (*FitKind.without, "flight", "mapping", "units", "drop_bad_stamps", "as_logged")
 
@@ -70,7 +70,7 @@ class RecoveryKind(FitKind):
 
     def data(self, settings: Any, asked: FitVehicle, model: Vehicle, files: Mapping[str, Path]) -> Callable[[int], Any]:
         controller = None if settings.controller is None else files[settings.controller]
-        return lambda seed: flown(settings, model, controller, seed)
+        return lambda seed: simulate_flight(settings, model, controller, seed)
 
     def run(self, settings: Any, portion: Portion, files: Mapping[str, Path]) -> Columns:
         columns = super().run(settings, portion, files)
@@ -89,13 +89,13 @@ class RecoveryKind(FitKind):
         for name in names:
             off = table[f"{name}.off"][usable]
             inside, every = int(np.sum(np.abs(off) < _NORMAL)), len(off)
-            words = judged(inside, every)
-            if "narrow" in words:
+            judgement = judged(inside, every)
+            if "narrow" in judgement:
                 narrow.append(name)
             low, high = share_interval(inside, every) if every else (0.0, 1.0)
             share = f"{100 * inside / every:.1f}" if every else ""
             bias, scatter = (f"{f(off):.2f}" if every > 1 else "" for f in (np.mean, np.std))
-            cells.append((name, share, f"{100 * low:.1f} to {100 * high:.1f}", bias, scatter, words))
+            cells.append((name, share, f"{100 * low:.1f} to {100 * high:.1f}", bias, scatter, judgement))
         if narrow:
             careful.append(f"bounds are too narrow: {', '.join(narrow)}")
         lost = int(np.sum(~usable))
@@ -117,7 +117,7 @@ def judged(inside: int, of: int) -> str:
     return "too wide" if low > SURE else "as they say"
 
 
-def flown(settings: Any, truth: Vehicle, controller: Path | None, seed: int) -> Flight:
+def simulate_flight(settings: Any, truth: Vehicle, controller: Path | None, seed: int) -> Flight:
     """One flight of the truth as its sensors saw it, conditioned."""
     maneuver = parse_maneuver(settings.maneuver)
     gusts = turbulence(settings.gusts)
@@ -131,8 +131,8 @@ def flown(settings: Any, truth: Vehicle, controller: Path | None, seed: int) -> 
         wind=None if blowing is None else {name: series[:, 0] for name, series in blowing.items()},
     )
     if not settings.noise:
-        seen = observe(flight, truth, sensors=QUIET if settings.sensors == "clean" else Sensors(), seed=seed)
-        return seen.condition(rate=settings.rate, cutoff=0.0)
+        measured = observe(flight, truth, sensors=QUIET if settings.sensors == "clean" else Sensors(), seed=seed)
+        return measured.condition(rate=settings.rate, cutoff=0.0)
     random = np.random.default_rng([seed, 2])
     columns = {name: flight.values(name) for name in truth.input_names}
     for name, sigma in settings.noise.items():
