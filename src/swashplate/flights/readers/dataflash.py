@@ -17,7 +17,7 @@ from swashplate.flights.readers.dataflash_index import MessageKind, Scan
 from swashplate.flights.readers.source import Places, Stored, part
 from swashplate.flights.stored_column import StoredColumn
 
-_BLOCK = 1 << 21  # bytes that are decoded at a time
+_BLOCKS = (1 << 20, 1 << 23)  # bytes that are decoded at a time: at least, at most; else the log's sixteenth part
 _LONGEST = 255  # bytes of a message
 
 
@@ -97,6 +97,7 @@ def decoded(content: Stored, wanted: Sequence[Wanted]) -> list[dict[str, NDArray
 
     The file is gone through once for all of them.
     """
+    block_size = int(np.clip(len(content) >> 4, *_BLOCKS))
     columns, tasks = list[dict[str, NDArray[np.generic]]](), []
     for kind, at, names in wanted:
         places = [kind.place(name) for name in names]
@@ -114,14 +115,14 @@ def decoded(content: Stored, wanted: Sequence[Wanted]) -> list[dict[str, NDArray
                 "itemsize": size,
             }
         )
-        edges = np.searchsorted(at, np.arange(0, len(content) + _BLOCK, _BLOCK, dtype=at.dtype)).tolist()
+        edges = np.searchsorted(at, np.arange(0, len(content) + block_size, block_size, dtype=at.dtype)).tolist()
         tasks.append((at, begin + 3, record, arrays, edges))
-    for span in range(-(-len(content) // _BLOCK)):
+    for span in range(-(-len(content) // block_size)):
         here = [task for task in tasks if task[-1][span] < task[-1][span + 1]]
         if not here:
             continue
-        first = span * _BLOCK
-        block = part(content, first, first + _BLOCK + _LONGEST)  # the last message may reach over
+        first = span * block_size
+        block = part(content, first, first + block_size + _LONGEST)  # the last message may reach over
         for at, offset, record, arrays, edges in here:
             chosen = slice(edges[span], edges[span + 1])
             size = record.itemsize

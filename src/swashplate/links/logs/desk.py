@@ -14,8 +14,7 @@ from swashplate.links.logs import code_lines
 from swashplate.links.logs.bins import trace
 from swashplate.links.logs.cockpit import Cockpit
 from swashplate.links.logs.code_lines import Read
-from swashplate.links.logs.identify_sweep import Identified, Tell, identify_sweep
-from swashplate.links.logs.job import PageJob
+from swashplate.links.logs.job import Identified, PageJob, Tell
 from swashplate.links.logs.opened import READY, Opened
 from swashplate.links.logs.remedies import Remedy
 from swashplate.links.logs.sweep_channels import channels_of
@@ -189,6 +188,9 @@ class Desk:
             others = [log for log in self._logs.values() if log is not opened and log.state == READY]
 
         def work(folder: Path, tell: Tell) -> Identified:
+            # A quarter of a second that no first picture need wait.
+            from swashplate.links.logs.identify_sweep import identify_sweep
+
             one = inspection.sweeps[sweep]
             by_hand = bool(input or output)
             return identify_sweep(opened, one, chosen, others=others, folder=folder, tell=tell, alone_only=by_hand)

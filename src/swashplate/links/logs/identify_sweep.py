@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,30 +20,14 @@ from swashplate.flights.tabular import write_csv
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.alone import alone, off_axis
 from swashplate.links.logs.hold_out import Part, hold_out
+from swashplate.links.logs.job import Identified, Make, Tell
 from swashplate.links.logs.loop_page import loop_of
 from swashplate.links.logs.opened import Opened
 from swashplate.links.logs.sweep_channels import Channels
 from swashplate.links.logs.sweep_set import Swept, together
 from swashplate.public import resolve
 
-Make = Callable[[], Path]
-"""Makes a file and says where it lies."""
-Tell = Callable[[str, float], None]
-"""Is told what is being done, and the share that is done; stops the work by raising."""
 _GYRO = "INS_GYRO_FILTER"
-
-
-@dataclass(frozen=True)
-class Identified:
-    """What came of a sweep.
-
-    Attributes:
-        document: what the page shows.
-        files: what makes each, by the name under which it is downloaded.
-    """
-
-    document: dict[str, Any]
-    files: Mapping[str, Make]
 
 
 def identify_sweep(

@@ -7,14 +7,33 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from swashplate.atomic import scratch_folder
 from swashplate.errors import SwashError
-from swashplate.links.logs.identify_sweep import Identified, Make, Tell
 
 _LOG = logging.getLogger("swashplate.open")
+Make = Callable[[], Path]
+"""Makes a file and says where it lies."""
+Tell = Callable[[str, float], None]
+"""Is told what is being done, and the share that is done; stops the work by raising."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What came of a sweep.
+
+    Attributes:
+        document: what the page shows.
+        files: what makes each, by the name under which it is downloaded.
+    """
+
+    document: dict[str, Any]
+    files: Mapping[str, Make]
+
+
 Work = Callable[[Path, Tell], Identified]
 
 
