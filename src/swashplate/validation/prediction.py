@@ -212,13 +212,13 @@ class ObservedRecord:
         model, (commands, voltage) = self._filter.model, self._commands(kicks.shape[1])
         fade = self._fade
         state = model.displace(FilterState(*(np.asarray(part)[starts] for part in self._run.states)), aside)
-        shown = []
+        states = np.empty((kicks.shape[1], *state.x.shape))
         for k in range(kicks.shape[1]):
             here = starts + k
             x = self._filter.step(state.x, state.gust, state.drift, commands[here], voltage[here], self._constants)
             state = model.displace(FilterState(x, fade * state.gust, state.drift), kicks[:, k])
-            shown.append(model.measure(state.x.T, self.nuisance, _ARRAYS).T)
-        return np.stack(shown, axis=1)
+            states[k] = state.x
+        return np.asarray(model.measure(states.T, self.nuisance, _ARRAYS).T).swapaxes(0, 1)
 
     @cached_property
     def uncertainty(self) -> tuple[Array, Array, Array, Array]:

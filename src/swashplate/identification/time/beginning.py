@@ -44,6 +44,8 @@ _ASIDE = 2e-3
 
 _PUSHES = np.array([Nuisance._fields.index(name) for name in PUSHES])
 
+_OF_PLACES = np.array([Noise._fields.index(name) for name in ("speed", "wind", "tau_wind")])
+
 _POINTS = (1.0, -1.0, 2.0, -2.0)
 _WEIGHTS = (8.0 / 12.0, -8.0 / 12.0, -1.0 / 12.0, 1.0 / 12.0)
 """The four points of a slope and their weights (Abramowitz and Stegun 1972, 25.3.6)."""
@@ -157,7 +159,8 @@ def joined_at(model: StochasticModel, rows: FilterNumbers, first: FirstMotion) -
     """A, C, Q and R of the joined system in steady flight, one of each for every row of numbers."""
     noise, nuisance = Noise(*rows.noise.T), Nuisance(*rows.nuisance.T)
     mean = first.voltage[1]
-    decisive = np.concatenate([rows.parameters, rows.noise], axis=1) if model.windy else rows.parameters
+    windy = rows.noise[:, _OF_PLACES] if model.windy else rows.noise[:, :0]  # of the noise what `model.places` asks for
+    decisive = np.concatenate([rows.parameters, windy], axis=1)
     apart = np.flatnonzero(np.any(decisive != decisive[0], axis=1))
     which = np.zeros(len(decisive), dtype=np.intp)
     which[apart], apart = 1 + np.arange(apart.size), np.concatenate([[0], apart])
