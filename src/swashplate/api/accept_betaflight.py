@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from swashplate.api.asking import name_of, strings
 from swashplate.api.link import link_engine
 from swashplate.api.saying import Say
 from swashplate.api.truth_beside import GAIN, PHASE, SIGMAS, TruthBeside, gain_and_phase_off
+from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
@@ -22,7 +24,8 @@ from swashplate.identification.responses.respond import respond
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES
 from swashplate.links.ardupilot.trial import Background, TrialEndedError, TrialLine
 from swashplate.links.betaflight.binary import BetaflightBinary
-from swashplate.links.betaflight.configuration import configuration
+from swashplate.links.betaflight.configuration import configuration, read_settings
+from swashplate.links.betaflight.flown_loop import flown_loop
 from swashplate.links.betaflight.gains import AXES, RATES, SIGNS, axis_response, betaflight_gains
 from swashplate.links.betaflight.log_clock import log_clock
 from swashplate.links.betaflight.motors import MotorMapping
@@ -72,6 +75,9 @@ def accept_multirotor(
     folder = asked.folder / "sitl"
     if folder.exists():
         raise SwashError("is there already.", where=folder, channel="--out", hint="Give another folder, or remove it.")
+    if gains is None and asked.defaults:
+        files = [asked.defaults] if isinstance(asked.defaults, str | Path) else asked.defaults
+        gains = {name: value for file in files for name, value in read_settings(file).items()}
     mapping, sitl = MotorMapping(vehicle), BetaflightBinary(asked.binary, folder)
     around = asked.around(vehicle)
     with listen_udp("127.0.0.1", MOTORS_PORT) as bound:
@@ -173,7 +179,8 @@ def _axis(
 
     In lockstep motors are held for a loop, so the truth is half of one late. Without, it is not: a step moves the time
     that has passed under the newest motors, which is early by what a state waits for its loop; then either side may be
-    off by the longest step that there was. So may the phase, and by a sample of the records in any case.
+    off by the longest step that there was, and so may the phase, besides its random error. In lockstep that is a loop:
+    which one's motors a frame of the log has. Frames hold command and rate of one time, so records add nothing.
     """
     place, command, stick = AXES.index(axis), f"mixer_{axis}", f"stick_{axis}"
     rate = f"{RATES[place]}_imu" if f"{RATES[place]}_imu" in flight else RATES[place]
@@ -184,14 +191,13 @@ def _axis(
         sweep.seconds, about, channel=stick,
     )  # fmt: skip
     piece = flight.between(clock.start, clock.start + sweep.seconds / clock.ratio)
-    names = [f"motor_{channel}" for channel in mapping.channels]
+    names, logged = [f"motor_{channel}" for channel in mapping.channels], piece
     if all(name in piece for name in names):
         motors = np.array([piece.values(name) for name in names])
         piece = piece.with_channel(command, SIGNS[place] * mapping.commands(motors)[place], like=names[0])
+    band = (1.25 * sweep.low, 0.75 * sweep.high)
     records = uniform_records([piece], (command, rate, stick), rate=_RATE)
-    response = respond(
-        records, inputs=[command], outputs=[rate], references=(stick,), band=(1.25 * sweep.low, 0.75 * sweep.high)
-    )
+    response = respond(records, inputs=[command], outputs=[rate], references=(stick,), band=band)
     h, coherence, error = response.pair(rate, command)
     good = np.isfinite(h) & (coherence >= _COHERENT)
     omega = response.omega * clock.ratio
@@ -213,12 +219,18 @@ def _axis(
     if good.any():
         gain, phase = gain_and_phase_off(h[good], true[good])
         sigma = np.nan_to_num(error[good])
-        limit = np.minimum(PHASE, np.degrees(response.omega[good] * max(1.0 / _RATE, longest)))
-        right = (gain <= np.maximum(GAIN, SIGMAS * 8.686 * sigma)) & (
-            phase <= np.maximum(limit, SIGMAS * np.degrees(sigma))
-        )
+        limit = phase_limit(response.omega[good], longest)
+        right = (gain <= np.maximum(GAIN, SIGMAS * 8.686 * sigma)) & (phase <= limit + SIGMAS * np.degrees(sigma))
         words = f"{gain.max():.2f} dB, {phase.max():.1f} deg"
-        expected = f"within {GAIN:g} dB and {limit.min():.1f} to {limit.max():.1f} deg, or {SIGMAS:g} random errors"
+        expected = f"within {GAIN:g} dB and {limit.min():.1f} to {limit.max():.1f} deg, and {SIGMAS:g} random errors"
         passed = bool(right.all()) if enough else None
         lines.append(TrialLine(f"{axis}: response beside truth", words, expected, passed))
+    with suppress(SwashError):
+        lines.append(TrialLine(f"{axis}: rate loop", flown_loop(logged, axis, band=band).words()))
     return lines
+
+
+def phase_limit(omega: Array, longest: float) -> Array:
+    """Degrees that a response may be off besides its random error, at frequencies [rad/s], by what is not known of when
+    motors acted [s]; as many as `PHASE`."""
+    return np.minimum(PHASE, np.degrees(omega * longest))

@@ -18,8 +18,8 @@ def suggest_gains(
 ) -> tuple[Suggestion, ...]:
     """Rate-loop gains for every axis of a fit, beside those that the log flew with, with margins of both.
 
-    In Rotorflight's names and whole numbers where the log is Rotorflight's, otherwise in ArduPilot's. An axis whose
-    premises do not hold gets no gains but the reason (`Suggestion.refused`): the log is of another autopilot, the
+    In Rotorflight's or Betaflight's names and whole numbers where the log is theirs, otherwise in ArduPilot's. An axis
+    whose premises do not hold gets no gains but the reason (`Suggestion.refused`): the log is of another autopilot, the
     command was not moved from outside, its sign is wrong or not known, the model does not follow the response, flights
     that it has not seen refute it, or the flown gains are unstable on it.
 

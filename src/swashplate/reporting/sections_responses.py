@@ -9,7 +9,7 @@ import numpy as np
 
 from swashplate.arrays import Complex
 from swashplate.control.analysis.ardupilot_gains import Suggestion
-from swashplate.control.analysis.rate_gain_names import ROTORFLIGHT, gain_text
+from swashplate.control.analysis.rate_gain_names import firmware_of, gain_text
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.frequency.handling import Handling
 from swashplate.identification.frequency.handling_readings import handling_lines
@@ -316,7 +316,7 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
         for what, suggested, logged in g.table()
     )
     said = dict.fromkeys(g.words for g in gains)
-    firmware = "Rotorflight" if any(g.axis in ROTORFLIGHT for g in gains) else "ArduPilot"
+    firmware = " and ".join(dict.fromkeys(firmware_of(g.axis) for g in gains))
     refused = {g.words for g in gains if g.refused}
     advice = tuple(
         Text(f"{', '.join(g.axis for g in gains if g.words == w)}: {w}", tone="bad" if w in refused else "caution")

@@ -15,9 +15,13 @@ import pytest
 
 import swashplate as sp
 from link_bench import QUICK
+from swashplate.api.accept_betaflight import phase_limit
+from swashplate.api.truth_beside import PHASE
 from swashplate.compiler import compiler
+from swashplate.control.analysis.cascade import FREQUENCIES
 from swashplate.control.laws.rotorflight.mixers import SWASHPLATES
-from swashplate.links.betaflight.configuration import configuration
+from swashplate.errors import LinkError
+from swashplate.links.betaflight.configuration import configuration, read_settings
 from swashplate.links.betaflight.gains import AXES, axis_response, betaflight_gains
 from swashplate.links.betaflight.log_clock import log_clock
 from swashplate.links.betaflight.motors import MotorMapping
@@ -31,7 +35,7 @@ from swashplate.links.betaflight.packets import (
 )
 from swashplate.links.betaflight.servo_outputs import SwashServoMapping
 from swashplate.links.betaflight.session import BetaflightSession
-from swashplate.links.betaflight.stepped_clock import stepped_clock
+from swashplate.links.betaflight.stepped_clock import LOOP, stepped_clock
 from swashplate.links.betaflight.trial import StickSweep
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings
@@ -160,6 +164,7 @@ def test_gains_keep_their_margins(craft: tuple[MotorMapping, LinearModel]) -> No
     found = betaflight_gains(model, mapping)
     for loop in found.loops:
         assert loop.holds, loop
+        assert loop.crossover < FREQUENCIES[-1], "a crossover that nobody has seen has no margin"
     assert all(value == round(value) for value in found.settings.values())
     text = configuration(mapping, found.settings)
     assert text.count("mmix ") == len(mapping.channels) + 1
@@ -182,6 +187,9 @@ def test_a_sweep_goes_from_one_end_to_the_other() -> None:
     values = np.array([sweep(t) for t in time])
     crossings = time[:-1][np.signbit(values[:-1]) != np.signbit(values[1:])]
     assert sweep(-1.0) == sweep(21.0) == 0.0
+    wide = np.array([StickSweep("roll", 0.5, 24.0, 20.0)(t) for t in time])
+    assert np.abs(wide).max() == pytest.approx(np.abs(values).max(), rel=1e-3)
+    assert np.abs(wide[time > 18.0]).max() < 0.4 * np.abs(values).max()  # 16 Hz and more
     assert 0.5 / np.diff(crossings)[0] == pytest.approx(0.5, rel=0.2)
     assert 0.5 / np.diff(crossings)[-2] == pytest.approx(6.0, rel=0.1)
 
@@ -338,3 +346,21 @@ def test_the_clock_of_a_program_waits_for_states(tmp_path: Path) -> None:
                 assert program.stdout.readline() == "over\n"
         finally:
             program.kill()
+
+
+def test_settings_are_read_from_lines_of_the_command_line(tmp_path: Path) -> None:
+    dump = tmp_path / "gains.txt"
+    dump.write_text("# of x8\nset p_roll = 199\nset  d_roll=241 # and d_max\n\nsave\n", encoding="utf-8")
+    assert read_settings(dump) == {"p_roll": 199.0, "d_roll": 241.0}
+    dump.write_text("set mixer = CUSTOM\n", encoding="utf-8")
+    with pytest.raises(LinkError, match="the line 'set mixer = CUSTOM', expected 'set NAME = NUMBER'"):
+        read_settings(dump)
+
+
+def test_a_response_a_loop_late_is_right_and_one_a_record_late_is_not() -> None:
+    """Beside records of 200 Hz 5 ms passed for nothing: frames hold command and rate of one time."""
+    omega = 2.0 * np.pi * np.geomspace(0.6, 4.5, 20)
+    limit = phase_limit(omega, LOOP)
+    assert np.all(np.degrees(omega * LOOP) <= limit + 1e-12)
+    assert np.all(np.degrees(omega * 0.005) > limit)
+    assert phase_limit(omega, 1.0).max() == PHASE

@@ -123,7 +123,9 @@ class FromResponses(LinearFit[Answer]):
     responses: Aircraft | None = option(
         default=None, help="What `swash respond` wrote: the file responses.nc or its folder.", kw_only=False
     )
-    gains: bool = option(default=False, help="Also suggest rate-loop gains, ArduPilot's or Rotorflight's.")
+    gains: bool = option(
+        default=False, help="Also suggest rate-loop gains: ArduPilot's, Rotorflight's or Betaflight's."
+    )
     band: Bands | None = option(
         default=None, help="Limits in Hz: 0.1-10 for all, p/lateral=0.5-12 for a pair, collective=0.3-5 for a channel."
     )

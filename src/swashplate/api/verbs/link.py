@@ -270,7 +270,9 @@ class Accept(InAir["Acceptance"], Linkable):
     band: Band | None = setting(
         default=None, help="band of the sweeps, 0.4-8 by default, of Betaflight 0.5-6", unit="Hz"
     )
-    defaults: Paths | None = setting(default=None, help="an additional parameter file, read last; may be repeated")
+    defaults: Paths | None = setting(
+        default=None, help="a parameter file, read last, or settings for Betaflight; may be repeated"
+    )
     instance: int = setting(
         default=0, help="instance of SITL: adds 10 times this number to every port.", least=0, most=99
     )

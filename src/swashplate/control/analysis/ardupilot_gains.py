@@ -1,23 +1,25 @@
-"""Rate-loop feed-forward and gains for ArduPilot or Rotorflight, from an identified model, and what they buy.
+"""Rate-loop gains for ArduPilot, Rotorflight or Betaflight, from an identified model, and what they buy.
 
 ArduPilot's parameters are ATC_RAT_*_FF, _P, _I, _D and the filters _FLTT, _FLTE, _FLTD (`rate_loop`), which belong to
-the loop, and so to the suggestion; Rotorflight's are `roll_p_gain` and its like (`rate_gain_names`).
+the loop, and so to the suggestion; Rotorflight's are `roll_p_gain`, Betaflight's `p_roll` and its like
+(`rate_gain_names`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.gain_changes import gain_changes
 from swashplate.control.analysis.gain_premises import refused_by_flight, refused_by_sign
+from swashplate.control.analysis.kept_margins import GAIN_MARGIN, PEAK, PHASE_MARGIN, keeps_margins, keeps_with_angle
 from swashplate.control.analysis.rate_gain_names import (
-    ROTORFLIGHT,
+    ARDUPILOT,
+    BETAFLIGHT,
     axes_of,
     beware,
     filters_of,
@@ -46,8 +48,6 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
 
-PHASE_MARGIN, GAIN_MARGIN, PEAK = 45.0, 6.0, 2.0
-"""Degrees, decibels and largest sensitivity that every suggestion keeps."""
 OVERSHOOT = 0.3
 """Of a demand that steps at once; the filter of the demand (FLTT) is the fastest that keeps it."""
 
@@ -55,6 +55,12 @@ _SLOW = 2.0 * np.pi * 0.2
 """rad/s: unstable modes below it are the attitude loop's or the pilot's, not the rate loop's."""
 _SHARES = {"P": np.geomspace(20.0, 0.02, 50), "D": np.array([0.2, 0.1, 0.05, 0.0]), "I": np.array([0.5, 0.25, 0.1])}
 """Shares: P of one over the steady rate, D of a tenth of P, I of the feed-forward or else of P / 5."""
+_STEEP = np.array([0.6, 0.4, 0.3])
+"""Shares of D for Betaflight's roll and pitch too, whose motors are late by some 0.05 s."""
+_QUICK = np.geomspace(400.0, 0.1, 60)
+"""Shares of P for Betaflight: one over the rate at the slow end of a plant that integrates up to 20 rad/s is small."""
+_STRONG = 15.0
+"""rad/s up to which Betaflight's loops hold disturbances down."""
 _FADED = np.array([1.5, 0.5])
 """1/s, I over P that are tried too: a disturbance that lasts must fade although the steady rate is large."""
 _HELD = np.array([20.0, 8.0, 3.0, 1.0])
@@ -69,7 +75,7 @@ class Suggestion(Shown):
     """Gains of one axis.
 
     Attributes:
-        axis: "RLL", "PIT" or "YAW"; Rotorflight's are "roll", "pitch", "yaw".
+        axis: "RLL", "PIT" or "YAW"; Rotorflight's are "roll", "pitch", "yaw", Betaflight's "Roll", "Pitch", "Yaw".
         parameters: by the firmware's names; none where they are refused.
         figures: what they are worth on the model, with what the fit's bounds make of the margins.
         flown: the log's own gains (none where it does not hold them), and what they are worth.
@@ -210,7 +216,7 @@ def suggest_gains(
     Args:
         model: a model, or a fit, whose bounds the margins then get.
         autopilot: parameters of the log by name: filters, the gains that were flown, INS_GYRO_FILTER. With
-            Rotorflight's among them the suggestion is in Rotorflight's names and whole numbers.
+            Rotorflight's or Betaflight's among them the suggestion is in their names and whole numbers.
         sources: the log's channel behind a model's, where their names differ. A rate of SIDD (`p_sid`) has not passed
             the gyro filter, which the loop has.
         premise: of a rate and its command, why the data behind the model carry no gains, "" where they do; None for a
@@ -280,16 +286,19 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
     else:  # an integrator's phase is -90 degrees there
         middle = complex(loop.plant(np.array([_SLOW]))[0])
         one = float(np.sign((1j * middle).real or 1.0) / abs(middle))
-    holds = loop.axis in ROTORFLIGHT  # no attitude loop stands behind its integral
+    holds = loop.axis not in ARDUPILOT  # no attitude loop stands behind its integral
     ours = np.arange(float(_HELD.size if holds else _SHARES["I"].size + _FADED.size))
-    tried = np.meshgrid(_SHARES["P"], _SHARES["D"], ours, indexing="ij")
+    leans = loop.axis in BETAFLIGHT and loop.axis != "Yaw"
+    slopes = np.concatenate([_STEEP, _SHARES["D"]]) if leans else _SHARES["D"][-1 if loop.axis in BETAFLIGHT else 0 :]
+    shares = _QUICK if loop.axis in BETAFLIGHT else _SHARES["P"]
+    tried = np.meshgrid(shares, slopes, ours, indexing="ij")
     share, slope, which = (np.ravel(np.asarray(x, dtype=np.float64)) for x in tried)
     p: Array = one * share
     of_one = _SHARES["I"][:, None] * (one if steady else 0.2 * p) * np.ones(p.size)
     rows = _HELD[:, None] * p if holds else np.concatenate([of_one, _FADED[:, None] * p])
     integral: Array = np.asarray(rows[which.astype(np.int64), np.arange(p.size)], dtype=np.float64)
     grid: dict[str, Array] = {
-        "FF": np.full(p.size, one if steady else 0.0),
+        "FF": np.full(p.size, one if steady and loop.axis not in BETAFLIGHT else 0.0),
         "P": p,
         "I": integral,
         "D": slope * 0.1 * p,
@@ -299,13 +308,21 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
     if not grid["P"].size:
         return None
     loops = _loops(loop, grid, omega)
-    kept = _keep(loops)
+    kept = keeps_margins(loops)
+    if loop.axis in BETAFLIGHT and loop.fit is not None:  # beyond what was fitted nobody has seen a crossover
+        last = max(float(target.omega[-1]) for target in loop.fit.targets)
+        kept &= np.abs(loops[:, min(int(np.searchsorted(omega, last)), omega.size - 1)]) < 1.0
+    if leans:
+        ahead = np.stack([loop.ahead(gains, omega) for gains in _sets(grid)]) * loop.plant(omega)
+        kept &= keeps_with_angle(omega, loops, ahead)
     if not kept.any():
         return None
     sensitivity = np.abs(1.0 / (1.0 + loops[kept]))
     rejected = omega[np.argmax(sensitivity > HALF_POWER, axis=1)]
     # Of those that are nearly the fastest, the one whose integral takes a lasting disturbance away first.
     slow = rejected < _NEARLY * rejected.max()
+    if loop.axis in BETAFLIGHT:
+        slow = np.log(sensitivity[:, omega <= _STRONG]).mean(axis=1)
     ranked = np.flatnonzero(kept)[np.lexsort((sensitivity.max(axis=1), -np.abs(grid["I"][kept]), slow))]
     best = int(ranked[0])
     if holds:  # no filter of the demand takes an overshoot away
@@ -324,26 +341,11 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
 
 def _loops(loop: RateLoop, grid: Mapping[str, Array], omega: Array) -> Complex:
     """Broken loops of m sets of gains, shape (m, n)."""
-    size = max(value.size for value in grid.values())
-    sets = ({name: float(value[k]) for name, value in grid.items()} for k in range(size))
-    return np.stack([loop.controller(gains, omega) for gains in sets]) * loop.plant(omega)
+    return np.stack([loop.controller(gains, omega) for gains in _sets(grid)]) * loop.plant(omega)
 
 
-def _keep(loops: Complex) -> NDArray[np.bool_]:
-    """Which loops are stable by Nyquist's count of a stable plant, and far enough from -1 at every crossing, (m,).
-
-    One whose gain is above one to the end of what is judged has a crossover, and a delay margin, that nobody has seen.
-    """
-    around = 1.0 + loops
-    turns = np.unwrap(np.angle(around), axis=1)
-    size, phase = np.abs(loops), np.degrees(np.angle(loops))
-    above = size > 1.0
-    crossing = above[:, :-1] != above[:, 1:]
-    narrow = (crossing & (180.0 - np.abs(phase[:, :-1]) < PHASE_MARGIN)).any(axis=1)
-    loud = (np.abs(np.diff(phase, axis=1)) > 180.0) & (size[:, :-1] >= 10.0 ** (-GAIN_MARGIN / 20.0))
-    encircled = np.abs(turns[:, -1] - turns[:, 0]) > np.pi
-    near = np.abs(around).min(axis=1) <= 1.0 / PEAK
-    return np.asarray(~encircled & ~narrow & ~loud.any(axis=1) & ~near & ~above[:, -1])
+def _sets(grid: Mapping[str, Array]) -> Iterator[dict[str, float]]:
+    return ({name: float(value[k]) for name, value in grid.items()} for k in range(grid["P"].size))
 
 
 def _with_coupling(single: Sequence[Suggestion]) -> list[Suggestion]:
@@ -368,9 +370,11 @@ def _with_words(s: Suggestion, besides: str) -> Suggestion:
     changes = gain_changes(s.figures_flown, s.figures_suggested)
     buys = tuple(text for text, good in changes if good)
     costs = tuple(text for text, good in changes if not good)
+    ahead = s.axis not in BETAFLIGHT
     text = (
-        f"Keeps {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g} dB on the model, one axis at a time. Fly the feed-forward "
-        "first with P, I and D at a third, then raise them."
+        f"Keeps {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g} dB on the model, one axis at a time. Fly "
+        f"{'the feed-forward first with P, I and D at a third' if ahead else 'P, I and D at a third first'}, then "
+        "raise them."
     )
     if s.figures_suggested.overshoot > OVERSHOOT:
         size = f"{100.0 * s.figures_suggested.overshoot:.0f} %"
@@ -378,7 +382,7 @@ def _with_words(s: Suggestion, besides: str) -> Suggestion:
     if not s.flown:
         text += " The log holds no flown gains: there is nothing to compare with."
     text += besides
-    if not np.isfinite(s.loop.steady):
+    if ahead and not np.isfinite(s.loop.steady):
         text += " Under a steady command the rate settles slowly or not at all: no feed-forward."
     if s.loop.unstable:
         text += f" The slow mode that grows ({s.loop.unstable:.2g} rad/s) is left to the attitude loop."

@@ -69,6 +69,17 @@ class LoopFigures:
 NO_FIGURES = LoopFigures(ResponseMargins(*[ReadNumber(NAN)] * 5), *[NAN] * 7)
 
 
+def controller_response(gains: Mapping[str, float], omega: Array, *, gyro_filter: float = 0.0) -> Complex:
+    """From a rate to the command with its sign turned, shape (n,): gains and filters by their names, and the gyro's."""
+    s: Complex = np.asarray(1j * omega, dtype=np.complex128)
+    k = short(gains)
+    pid = k.get("P", 0.0) + k.get("I", 0.0) / s + k.get("D", 0.0) * s * _first_order(s, k.get("FLTD", 0.0))
+    c = 2.0 * np.pi * gyro_filter
+    gyro = c**2 / (s**2 + np.sqrt(2.0) * c * s + c**2) if c > 0.0 else 1.0
+    smooth = _first_order(s, k.get("FLTE", 0.0)) * _first_order(s, k.get("FLTG", 0.0))
+    return np.asarray(pid * smooth * gyro, dtype=np.complex128)
+
+
 @dataclass(frozen=True)
 class RateLoop:
     """A rate loop without its gains: what the model answers, and what filters stand beside it [Hz].
@@ -101,13 +112,7 @@ class RateLoop:
 
     def controller(self, gains: Mapping[str, float], omega: Array) -> Complex:
         """From the rate to the command with its sign turned, gyro filter included where the model lacks it."""
-        s: Complex = np.asarray(1j * omega, dtype=np.complex128)
-        k = short(gains)
-        pid = k.get("P", 0.0) + k.get("I", 0.0) / s + k.get("D", 0.0) * s * _first_order(s, k.get("FLTD", 0.0))
-        c = 2.0 * np.pi * self.gyro_filter
-        gyro = c**2 / (s**2 + np.sqrt(2.0) * c * s + c**2) if c > 0.0 else 1.0
-        smooth = _first_order(s, k.get("FLTE", 0.0)) * _first_order(s, k.get("FLTG", 0.0))
-        return np.asarray(pid * smooth * gyro, dtype=np.complex128)
+        return controller_response(gains, omega, gyro_filter=self.gyro_filter)
 
     def ahead(self, gains: Mapping[str, float], omega: Array) -> Complex:
         """From the demanded rate to the command: its filter, feed-forward, the controller without the gyro's filter."""

@@ -142,7 +142,7 @@ def read(source: Source, options: Options) -> Flight:
         firmware=fields.called,
         notes=tuple(remarks.notes),
         damage=tuple(remarks.damage),
-        parameters=_parameters(header, gains=fields.rotorflight),
+        parameters=_parameters(header, fields),
         events=_events(frames, header, main),
     )
     if note:
@@ -187,7 +187,7 @@ def _lost(frames: FoundFrames) -> list[str]:
     ]
 
 
-def _parameters(header: Header, *, gains: bool) -> dict[str, float]:
+def _parameters(header: Header, fields: Fields) -> dict[str, float]:
     """Numbers of the header by name; of a row of numbers `rollPID_0`, `rollPID_1`, ..."""
     parameters = {}
     for name, text in header.values.items():
@@ -197,10 +197,34 @@ def _parameters(header: Header, *, gains: bool) -> dict[str, float]:
             value = as_number(part.strip(), np.nan)
             if key and np.isfinite(value):
                 parameters[key if len(parts) == 1 else f"{key}_{i}"] = value
-    return parameters | (_own_gains(parameters) if gains else {})
+    if fields.rotorflight:
+        return parameters | _rotorflight_gains(parameters)
+    return parameters | (_betaflight_gains(parameters) if "betaflight" in fields.firmware.lower() else {})
 
 
-def _own_gains(numbers: Mapping[str, float]) -> dict[str, float]:
+def _betaflight_gains(numbers: Mapping[str, float]) -> dict[str, float]:
+    """Betaflight's gains by the names of its command line (`p_roll`), and the joint corner of D's filters [Hz].
+
+    Headers that tell `d_max` are of 2025.12 and later, where D is not the largest one of each axis. None where a filter
+    of D is not of first order or the rows are missing: nothing is said of such a loop.
+    """
+    first = numbers.get("dterm_lpf1_dyn_hz_0") or numbers.get("dterm_lpf1_static_hz")
+    second = numbers.get("dterm_lpf2_static_hz")
+    if "d_max_0" not in numbers or first is None or second is None or numbers.get("dterm_notch_hz"):
+        return {}
+    if (first and numbers.get("dterm_lpf1_type")) or (second and numbers.get("dterm_lpf2_type")):
+        return {}
+    lag = sum(1.0 / corner for corner in (first, second) if corner)
+    gains = {
+        f"{name}_{axis}": numbers[f"{axis}PID_{i}"]
+        for axis in ("roll", "pitch", "yaw")
+        for i, name in enumerate("pid")
+        if f"{axis}PID_{i}" in numbers
+    }
+    return {**gains, "dterm_lpf": 1.0 / lag if lag else 0.0} if gains else {}
+
+
+def _rotorflight_gains(numbers: Mapping[str, float]) -> dict[str, float]:
     """Rotorflight's gains and cut-offs by the names of its command line (`roll_p_gain`).
 
     Headers with five gains an axis (P, I, D, F, B) are of firmwares whose scales are known: `rate_gain_names`.

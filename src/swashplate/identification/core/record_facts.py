@@ -18,6 +18,7 @@ INJECTED = ("sweep", "sid", "reference", "excitation")
 _RATE_GAINS = re.compile(
     r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[TED])|INS_GYRO_FILTER"
     r"|(roll|pitch|yaw)_([pidf]_gain|(gyro|d)_cutoff)|yaw_stop_gain_[01]"
+    r"|[pid]_(roll|pitch|yaw)|dterm_lpf|yaw_lowpass_hz"
 )
 
 

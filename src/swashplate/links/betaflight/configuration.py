@@ -5,8 +5,12 @@ Names: its cli.c, settings.c and msp_box.c (permanent numbers of modes).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from pathlib import Path
 
+from swashplate.errors import LinkError
+from swashplate.files import read_text
 from swashplate.links.betaflight.motors import MotorMapping
 
 ANGLE_LIMIT = 30.0
@@ -14,6 +18,7 @@ ANGLE_LIMIT = 30.0
 _ARM, _ANGLE = 0, 1
 """Modes; the switches are channels 5 and 6."""
 _UP = "1700 2100"
+_SET = re.compile(r"set\s+(\w+)\s*=\s*(-?\d+(?:\.\d+)?)")
 
 
 def configuration(mapping: MotorMapping, gains: Mapping[str, float]) -> str:
@@ -41,3 +46,21 @@ def configuration(mapping: MotorMapping, gains: Mapping[str, float]) -> str:
         "save",
     ]
     return "\n".join(lines) + "\n"
+
+
+def read_settings(path: str | Path) -> dict[str, float]:
+    """The numbers that lines of Betaflight's command line set (`set p_roll = 45`); remarks and `save` are passed over.
+
+    Raises:
+        LinkError: naming the line that is neither.
+    """
+    settings: dict[str, float] = {}
+    for line in read_text(Path(path)).splitlines():
+        text = line.partition("#")[0].strip()
+        if not text or text == "save":
+            continue
+        found = _SET.fullmatch(text)
+        if found is None:
+            raise LinkError(f"has the line '{text[:60]}', expected 'set NAME = NUMBER'.", where=path)
+        settings[found[1]] = float(found[2])
+    return settings

@@ -33,9 +33,11 @@ _LATE = 0.006
 the rest is for a machine that is late."""
 _GYRO, _SLOPE = (250.0, 500.0), (75.0, 150.0)
 """Hz: low-passes of first order of the gyro and of D, at a low throttle."""
+_YAW = 100.0
+"""Hz: another of yaw's P (yaw_lowpass_hz)."""
 _QUICK = 20.0
 """rad/s: where a command is asked which way it turns, before speed and motors have much to say."""
-_LARGEST, _MOST_YAW = 250.0, 100.0
+_LARGEST = 250.0
 _RESERVE = (1.0, 8.0)
 """dB and degrees that rates leave to the angle around them."""
 
@@ -84,13 +86,15 @@ def betaflight_gains(model: LinearModel, mapping: MotorMapping) -> BetaflightGai
         ).T
         p, i, d = grid[0], np.round(grid[1] * grid[0]), np.round(grid[2] * grid[0])
         k = {key: (each * _SCALES[key] / _WHOLE * _DEGREES)[:, None] for key, each in (("p", p), ("i", i), ("d", d))}
-        back = (k["p"] + k["i"] / s + k["d"] * s * _poles(s, _SLOPE)) * delay
-        outer = (k["p"] + k["i"] / s) * np.exp(-s * _LATE) * (grid[3][:, None] if axis < 2 else 0.0) / s
+        steady = k["p"] * (_poles(s, (_YAW,)) if name == "yaw" else 1.0) + k["i"] / s
+        back = (steady + k["d"] * s * _poles(s, _SLOPE)) * delay
+        outer = steady * np.exp(-s * _LATE) * (grid[3][:, None] if axis < 2 else 0.0) / s
         trial = BrokenLoops(FREQUENCIES, (plant * (back + outer))[..., None], np.zeros(p.size))
         bare = BrokenLoops(FREQUENCIES, (plant * back)[..., None], np.zeros(p.size))
         roomy = (trial.gain >= GAIN_KEPT + _RESERVE[0]) & (trial.phase >= PHASE_KEPT + _RESERVE[1])
         alone = (bare.gain >= GAIN_KEPT) & (bare.phase >= PHASE_KEPT)
-        kept = np.all(roomy & (trial.peak <= PEAK_KEPT) & alone, axis=1) & (d <= _LARGEST) & (i <= _LARGEST)
+        seen = np.abs(trial.loop[:, -1]) < 1.0  # a crossover beyond the last frequency has margins that nobody has seen
+        kept = np.all(roomy & seen & (trial.peak <= PEAK_KEPT) & alone, axis=1) & (d <= _LARGEST) & (i <= _LARGEST)
         if not kept.any():
             raise LinkError(f"no gains of {name} keep {GAIN_KEPT:g} dB and {PHASE_KEPT:g} degrees.", channel=name)
         worth = np.where(kept, trial.quiet(0.2, 15.0)[:, 0], -np.inf)

@@ -26,6 +26,8 @@ _STRAYS = 0.5
 """m from its place and its height that the hover may stray."""
 _LARGEST = {"roll": 0.5, "pitch": 0.5, "yaw": 0.1}
 """Of a full stick."""
+_EVEN = 6.0
+"""Hz up to which leans are swept as widely; beyond as 1/f, for a quick loop asks its motors for more than they have."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ class StickSweep:
         ratio = self.high / self.low
         turns = self.low * self.seconds / math.log(ratio) * (ratio ** (t / self.seconds) - 1.0)
         fade = min(1.0, t, self.seconds - t)
-        return _LARGEST[self.axis] * fade * math.sin(2.0 * math.pi * turns)
+        smaller = 1.0 if self.axis == "yaw" else min(1.0, _EVEN / (self.low * ratio ** (t / self.seconds)))
+        return _LARGEST[self.axis] * smaller * fade * math.sin(2.0 * math.pi * turns)
 
 
 @dataclass

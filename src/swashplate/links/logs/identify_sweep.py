@@ -11,7 +11,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
-from swashplate.control.analysis.rate_gain_names import ROTORFLIGHT
+from swashplate.control.analysis.rate_gain_names import ARDUPILOT, cli_lines
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import Sweep
@@ -261,17 +261,14 @@ def _files(
             study.save(place)
         return place / name
 
-    # Rotorflight takes lines of its command line, ArduPilot a file of parameters.
-    spoken = any(one.axis in ROTORFLIGHT for study in studies for one in study.material.gains)
+    # Rotorflight and Betaflight take lines of their command line, ArduPilot a file of parameters.
+    spoken = any(one.axis not in ARDUPILOT for study in studies for one in study.material.gains)
     named = "gains.txt" if spoken else "gains.param"
 
     def parameters() -> Path:
         gains = [one for study in studies for one in study.material.gains]
         settings = [(name, value) for one in gains for name, value in one.parameters.items()]
-        if spoken:
-            lines = [*(f"set {name} = {value:.0f}" for name, value in settings), "save"]
-        else:
-            lines = [f"{name},{value:.6g}" for name, value in settings]
+        lines = [*cli_lines(dict(settings)), "save"] if spoken else [f"{name},{value:.6g}" for name, value in settings]
         return write_text(folder / named, "\n".join(lines) + "\n")
 
     def measured() -> Path:

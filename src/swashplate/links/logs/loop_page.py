@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.control.analysis.ardupilot_gains import Suggestion
-from swashplate.control.analysis.rate_gain_names import ROTORFLIGHT, names_of, short
+from swashplate.control.analysis.rate_gain_names import ARDUPILOT, names_of, short
 from swashplate.control.analysis.rate_loop import LOWEST, SEEN, LoopFigures
 from swashplate.control.analysis.rate_loop_steps import held_model
 
@@ -26,7 +26,7 @@ def loop_of(suggestion: Suggestion) -> dict[str, Any]:
         "axis": axis,
         "rate": loop.rate,
         "words": _why(suggestion),
-        "cli": axis in ROTORFLIGHT,
+        "cli": axis not in ARDUPILOT,
         "gains": [
             {
                 "short": key,

@@ -235,6 +235,28 @@ def test_a_tail_that_is_a_motor_has_no_yaw_command(tmp_path):
     assert any("not a yaw command" in note for note in flight.provenance.notes)
 
 
+@pytest.mark.parametrize(
+    ("more", "corner"),
+    [({}, 50.0), ({"dterm_lpf2_static_hz": 0}, 75.0), ({"dterm_lpf2_type": 1}, None), ({"d_max": None}, None)],
+)
+def test_betaflights_own_gains_where_their_loop_is_known(tmp_path, more, corner):
+    """Two low-passes of first order are late together as one; other filters, and D before 2025.12, are not told."""
+    known = {"rollPID": "45,80,30", "pitchPID": "47,84,34", "yawPID": "45,80,0", "d_max": "40,46,0",
+             "dterm_lpf1_type": 0, "dterm_lpf1_dyn_hz": "75,150", "dterm_lpf2_type": 0,
+             "dterm_lpf2_static_hz": 150} | more  # fmt: skip
+    fields = (Field("loopIteration", 0, (0, 1), (6, 9)), Field("time", 0, (0, 1), (2, 0)),
+              Field("gyroADC[0]", 1, (0, 0), (3, 0)))  # fmt: skip
+    rows = np.zeros((20, len(fields)), dtype=np.int64)
+    rows[:, 0], rows[:, 1] = np.arange(20), 900 + 125 * np.arange(20)
+    told = {"Firmware type": "Betaflight", "Firmware revision": "Betaflight 2026.12.0-alpha SITL"}
+    told |= {name: value for name, value in known.items() if value is not None}
+    content = made.header(fields, interval=8, share="1/1", more=told)
+    content += b"".join(made.frames(fields, rows, interval=8)) + made.END
+    log = sp.read(saved(tmp_path, content)).provenance
+    assert log.parameter("dterm_lpf") == (None if corner is None else pytest.approx(corner))
+    assert log.parameter("d_pitch") == (None if corner is None else 34.0)
+
+
 def test_betaflight_units_by_version_and_resolution(tmp_path):
     fields = (
         Field("loopIteration", 0, (0, 1), (6, 9)), Field("time", 0, (0, 1), (2, 0)),
