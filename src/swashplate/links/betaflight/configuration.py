@@ -59,8 +59,8 @@ def read_settings(path: str | Path) -> dict[str, float]:
         text = line.partition("#")[0].strip()
         if not text or text == "save":
             continue
-        found = _SET.fullmatch(text)
-        if found is None:
+        hit = _SET.fullmatch(text)
+        if hit is None:
             raise LinkError(f"has the line '{text[:60]}', expected 'set NAME = NUMBER'.", where=path)
-        settings[found[1]] = float(found[2])
+        settings[hit[1]] = float(hit[2])
     return settings

@@ -37,7 +37,7 @@ class FlownLoop(NamedTuple):
 
     def words(self) -> str:
         """In one line."""
-        told = (
+        parts = (
             (f"misses {100.0 * self.missed:.0f} % of its demand", self.missed),
             (f"resonance {self.resonance:.1f} dB", self.resonance),
             (f"crossover {self.crossover:.1f} rad/s", self.crossover),
@@ -45,7 +45,7 @@ class FlownLoop(NamedTuple):
             (f"largest sensitivity {self.sensitivity:.2f}", self.sensitivity),
             (f"rejects to {self.rejection:.1f} rad/s", self.rejection),
         )
-        return ", ".join(text for text, value in told if np.isfinite(value))
+        return ", ".join(text for text, value in parts if np.isfinite(value))
 
 
 def flown_loop(piece: Flight, axis: str, *, band: tuple[float, float]) -> FlownLoop:
@@ -57,11 +57,11 @@ def flown_loop(piece: Flight, axis: str, *, band: tuple[float, float]) -> FlownL
     Raises:
         FlightError: a header without gains (Betaflight 2025.12 and later have them).
     """
-    own, command, stick = axis.capitalize(), f"mixer_{axis}", f"stick_{axis}"
-    rate = BETAFLIGHT[own][0]
-    gains = {name: piece.provenance.parameter(name) for name in names_of(own).values()}
+    title, command, stick = axis.capitalize(), f"mixer_{axis}", f"stick_{axis}"
+    rate = BETAFLIGHT[title][0]
+    gains = {name: piece.provenance.parameter(name) for name in names_of(title).values()}
     known = {name: float(value) for name, value in gains.items() if value is not None}
-    if names_of(own)["P"] not in known:
+    if names_of(title)["P"] not in known:
         raise FlightError("the log's header has no gains of Betaflight: its loop cannot be judged.", channel=command)
     records = uniform_records([piece], (command, rate, f"{rate}_demand", stick), rate=_RATE)
     asked, followed = (np.concatenate([each.values(n) for each in records]) for n in (f"{rate}_demand", rate))
