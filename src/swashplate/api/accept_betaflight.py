@@ -226,7 +226,7 @@ def _axis(
         passed = bool(right.all()) if enough else None
         lines.append(TrialLine(f"{axis}: response beside truth", words, expected, passed))
     with suppress(SwashError):
-        lines.append(TrialLine(f"{axis}: rate loop", flown_loop(logged, axis, band=band).words()))
+        lines.append(TrialLine(f"{axis}: rate loop", flown_loop(logged, axis, band=band).summary()))
     return lines
 
 

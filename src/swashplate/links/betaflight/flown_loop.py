@@ -35,7 +35,7 @@ class FlownLoop(NamedTuple):
     rejection: float
     resonance: float
 
-    def words(self) -> str:
+    def summary(self) -> str:
         """In one line."""
         parts = (
             (f"misses {100.0 * self.missed:.0f} % of its demand", self.missed),
