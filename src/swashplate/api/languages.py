@@ -13,6 +13,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from swashplate.api.judging import (
+    judge_bands,
+    judge_delays,
+    judge_environment,
+    judge_flag,
+    judge_mapping,
+    judge_names,
+    judge_number,
+    judge_numbers,
+    judge_object,
+    judge_speeds,
+    judge_values,
+    judge_whole,
+    judge_wind,
+)
 from swashplate.errors import SwashError
 
 Names: TypeAlias = Sequence[str] | str
@@ -203,8 +218,6 @@ def _renamed(text: str, called: str) -> dict[str, str]:
 
 
 _RANGE_POINTS = 11
-_SHORTEST_DELAY = 0.5
-"""ms: a number below it was meant in seconds."""
 
 
 def speeds(text: str, called: str = "--speed") -> tuple[float, ...]:
@@ -229,47 +242,11 @@ def _delays(texts: Sequence[str], called: str) -> dict[str, float] | float:
     return numbers(texts[0], called, count=1)[0] if plain else numbers_by_name(texts, called)
 
 
-def _judged_delays(value: Mapping[str, float] | float, called: str) -> Mapping[str, float] | float:
-    """Delays in ms; what can only be seconds is refused."""
-    for name, one in (value if isinstance(value, Mapping) else {"": value}).items():
-        shown = f"{name}={one:g}" if name else f"{one:g}"
-        if not 0.0 <= one <= 1000.0:
-            raise SwashError(f"is {shown} ms, expected 0 to 1000.", channel=called)
-        if 0.0 < one < _SHORTEST_DELAY:
-            hint = f"{1e3 * one:g} for {one:g} s."
-            raise SwashError(f"is {shown} ms, expected 0, or {_SHORTEST_DELAY:g} or more.", channel=called, hint=hint)
-    return value
-
-
-def _three(value: Any, called: str) -> Any:
-    """A wind towards north, east and down, each a finite number or a series of them."""
-    import numpy as np
-
-    count = len(value) if isinstance(value, Sequence) or getattr(value, "ndim", 0) else 0
-    if count != 3:
-        given = f"has {count} parts" if count else f"is {value}"
-        raise SwashError(f"{given}, expected three: towards north, east and down [m/s].", channel=called)
-    for part, name in zip(value, ("north", "east", "down"), strict=True):
-        if not np.all(np.isfinite(np.asarray(part, dtype=float))):
-            raise SwashError(f"towards {name} is not finite.", channel=called)
-    return value
-
-
 def in_seconds(milliseconds: Any) -> Any:
     """One number, or several by name; None where there is none."""
     if isinstance(milliseconds, Mapping):
         return {name: value / 1e3 for name, value in milliseconds.items()}
     return None if milliseconds is None else milliseconds / 1e3
-
-
-def _environment(value: Any, called: str) -> Any:
-    """An environment of its numbers by name; one as it is."""
-    from swashplate.physics.environment import Environment
-
-    for name in value if isinstance(value, Mapping) else ():
-        if name not in Environment._fields:
-            raise SwashError(f"'{name}' is unknown, expected one of {', '.join(Environment._fields)}.", channel=called)
-    return Environment(**value) if isinstance(value, Mapping) else value
 
 
 def _priors(texts: Sequence[str], called: str) -> dict[str, Any]:
@@ -314,40 +291,40 @@ def _same(value: Any, called: str) -> Any:
 
 _LANGUAGES: Mapping[str, Language] = {
     "str": Language(_same),
-    "bool": Language(_flag, kind="bool"),
-    "int": Language(_whole, kind="int", metavar="N"),
-    "float": Language(_number, kind="float", metavar="NUMBER"),
+    "bool": Language(_flag, kind="bool", judge=judge_flag),
+    "int": Language(_whole, kind="int", metavar="N", judge=judge_whole),
+    "float": Language(_number, kind="float", metavar="NUMBER", judge=judge_number),
     "Path": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
     "Judged": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
     "Drawn": Language(_whole, kind="int", metavar="N"),
     "Rule": Language(_same),
-    "Fitted": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
+    "Fitted": Language(lambda text, _: Path(text), kind="path", metavar="FILE", judge=judge_object),
     "Motion": Language(_same, metavar="SPEC"),
-    "Pilot": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
+    "Pilot": Language(lambda text, _: Path(text), kind="path", metavar="FILE", judge=judge_object),
     "GainsFile": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
     "Paths": Language(lambda texts, _: tuple(map(Path, texts)), repeated=True, kind="path", metavar="FILE"),
-    "Names": Language(names, metavar="NAME,..."),
-    "Texts": Language(lambda texts, _: tuple(texts), repeated=True, metavar="TEXT"),
+    "Names": Language(names, metavar="NAME,...", judge=judge_names),
+    "Texts": Language(lambda texts, _: tuple(texts), repeated=True, metavar="TEXT", judge=judge_names),
     "Numbers": Language(lambda text, called: tuple(numbers(text, called)), metavar="NUMBER,..."),
-    "Speeds": Language(speeds, metavar="V"),
-    "Wind": Language(lambda text, called: tuple(numbers(text, called, count=3)), metavar="N,E,D", judge=_three),
-    "Band": Language(band, metavar="LOW-HIGH"),
-    "Bands": Language(_bands, repeated=True, metavar="[PAIR=]LOW-HIGH"),
+    "Speeds": Language(speeds, metavar="V", judge=judge_speeds),
+    "Wind": Language(lambda text, called: tuple(numbers(text, called, count=3)), metavar="N,E,D", judge=judge_wind),
+    "Band": Language(band, metavar="LOW-HIGH", judge=judge_bands),
+    "Bands": Language(_bands, repeated=True, metavar="[PAIR=]LOW-HIGH", judge=judge_bands),
     "Stretches": Language(_stretches, repeated=True, metavar="START,STOP"),
-    "Air": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=_environment),
-    "Values": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE"),
-    "Limits": Language(limits_by_name, metavar="NAME=VALUE,..."),
-    "Switches": Language(_switches, repeated=True, metavar="NAME=VALUE"),
-    "Words": Language(assignments, repeated=True, metavar="NAME=VALUE"),
+    "Air": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=judge_environment),
+    "Values": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=judge_values),
+    "Limits": Language(limits_by_name, metavar="NAME=VALUE,...", judge=judge_numbers),
+    "Switches": Language(_switches, repeated=True, metavar="NAME=VALUE", judge=judge_mapping),
+    "Words": Language(assignments, repeated=True, metavar="NAME=VALUE", judge=judge_mapping),
     "Renamed": Language(_renamed, metavar="NAME[=CHANNEL],..."),
-    "Delays": Language(_delays, repeated=True, metavar="MS", judge=_judged_delays),
+    "Delays": Language(_delays, repeated=True, metavar="MS", judge=judge_delays),
     "Priors": Language(_priors, repeated=True, metavar="CARD|NAME=MEAN,SIGMA"),
-    "Logs": Language(lambda texts, _: tuple(texts), repeated=True, metavar="LOG"),
+    "Logs": Language(lambda texts, _: tuple(texts), repeated=True, metavar="LOG", judge=judge_object),
     "FlightLimits": Language(assignments, repeated=True, metavar="NAME=VALUE"),
     "Gusts": Language(_same, metavar="none|indoor|WIND"),
     "Battery": Language(_battery, metavar="FROM-TO"),
-    "Log": Language(_same, metavar="LOG"),
-    "Aircraft": Language(_same, metavar="NAME|FILE"),
-    "Things": Language(lambda texts, _: tuple(texts), repeated=True, metavar="FILE"),
+    "Log": Language(_same, metavar="LOG", judge=judge_object),
+    "Aircraft": Language(_same, metavar="NAME|FILE", judge=judge_object),
+    "Things": Language(lambda texts, _: tuple(texts), repeated=True, metavar="FILE", judge=judge_object),
 }
 """By annotation."""
