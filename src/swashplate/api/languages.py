@@ -300,7 +300,7 @@ _LANGUAGES: Mapping[str, Language] = {
     "Rule": Language(_same),
     "Fitted": Language(lambda text, _: Path(text), kind="path", metavar="FILE", judge=judge_object),
     "Motion": Language(_same, metavar="SPEC"),
-    "Pilot": Language(lambda text, _: Path(text), kind="path", metavar="FILE", judge=judge_object),
+    "Pilot": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
     "GainsFile": Language(lambda text, _: Path(text), kind="path", metavar="FILE"),
     "Paths": Language(lambda texts, _: tuple(map(Path, texts)), repeated=True, kind="path", metavar="FILE"),
     "Names": Language(names, metavar="NAME,...", judge=judge_names),

@@ -138,7 +138,8 @@ def test_its_files_are_the_series_and_the_card(tmp_path: Path) -> None:
         (UNKNOWN, {"limits": {"seconds": 2.0}}, r"seconds: 2 s hold 0.6 periods .* Fly at least 6\.67 s"),
         (UNKNOWN, {"axes": ("roll", "loop")}, "loop: is no axis of 'coax'"),
         (UNKNOWN, {"criterion": "E"}, "'E' is unknown, expected one of D, A"),
-        (UNKNOWN, {"band": (8.0, 0.5)}, "expected it to rise"),
+        (UNKNOWN, {"band": (8.0, 0.5)}, "expected two rising numbers"),
+        (UNKNOWN, {"band": (0.5, 45.0)}, "expected it to rise to at most 40 Hz"),
     ],
 )
 def test_what_makes_no_sense_is_refused(unknown: Any, asked: dict[str, Any], words: str) -> None:
