@@ -159,7 +159,7 @@ def bench_procedures_text() -> str:
     from swashplate.bench.evaluate import PROCEDURES
 
     rows = [
-        (f"`{name}`", module.TITLE, ", ".join(f"`{column}`" for column in module.COLUMNS), module.SOURCE)
+        (f"`{name}`", module.title, ", ".join(f"`{column}`" for column in module.columns), module.source)
         for name, module in PROCEDURES.items()
     ]
     return _table(("procedure", "measures", "needs the columns", "by"), rows)
