@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.linalg.lapack import dtbtrs
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -66,6 +65,8 @@ def both_ways(sections: Array, values: Array, *, padding: int) -> Array:
 
 def _forwards(sections: Array, values: Array) -> Array:
     """Values after the sections; recursions are systems of equations with a band, solved from the first row on."""
+    from scipy.linalg.lapack import dtbtrs  # slow to import; `inspect` does without
+
     rest = float(np.prod(sections[:, :3].sum(axis=1) / sections[:, 3:].sum(axis=1)))
     driven = (values - values[:1]).reshape(len(values), -1)
     for b0, b1, b2, *poles in sections:
