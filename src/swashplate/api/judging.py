@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import is_dataclass
 from typing import Any
 
 from swashplate.errors import SwashError
@@ -32,7 +31,7 @@ def judge_whole(value: Any, called: str) -> int:
 
 
 def judge_flag(value: Any, called: str) -> bool:
-    if value not in (True, False):
+    if getattr(value, "ndim", 0) or value not in (True, False):
         raise SwashError(f"is {value!r}, expected true or false.", channel=called)
     return bool(value)
 
@@ -47,9 +46,18 @@ def judge_numbers(value: Any, called: str) -> Mapping[str, float]:
     return {name: judge_number(one, f"{called} {name}") for name, one in judge_mapping(value, called).items()}
 
 
-def judge_values(value: Any, called: str) -> Any:
-    """Numbers by name, or an object that has them (a trim, a noise)."""
-    return value if hasattr(value, "_fields") or is_dataclass(value) else judge_numbers(value, called)
+def judge_start(value: Any, called: str) -> Any:
+    """A trim, or states by name."""
+    from swashplate.simulation.trim import Trim
+
+    return value if isinstance(value, Trim) else judge_numbers(value, called)
+
+
+def judge_noise(value: Any, called: str) -> Any:
+    """A noise, or numbers of it by name."""
+    from swashplate.filtering.disturbances import Noise
+
+    return value if isinstance(value, Noise) else judge_numbers(value, called)
 
 
 def judge_speeds(value: Any, called: str) -> Any:

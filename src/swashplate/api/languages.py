@@ -20,11 +20,12 @@ from swashplate.api.judging import (
     judge_flag,
     judge_mapping,
     judge_names,
+    judge_noise,
     judge_number,
     judge_numbers,
     judge_object,
     judge_speeds,
-    judge_values,
+    judge_start,
     judge_whole,
     judge_wind,
 )
@@ -38,6 +39,10 @@ Wind: TypeAlias = Sequence[float]
 Band: TypeAlias = tuple[float, float]
 Stretches: TypeAlias = Sequence[tuple[float, float]]
 Values: TypeAlias = Mapping[str, float]
+Start: TypeAlias = Any
+"""A trim, or states by name."""
+Noises: TypeAlias = Any
+"""A noise, or numbers of it by name."""
 Switches: TypeAlias = Mapping[str, Any]
 Words: TypeAlias = Mapping[str, str]
 Renamed: TypeAlias = Mapping[str, str] | Sequence[str] | str
@@ -312,7 +317,9 @@ _LANGUAGES: Mapping[str, Language] = {
     "Bands": Language(_bands, repeated=True, metavar="[PAIR=]LOW-HIGH", judge=judge_bands),
     "Stretches": Language(_stretches, repeated=True, metavar="START,STOP"),
     "Air": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=judge_environment),
-    "Values": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=judge_values),
+    "Values": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=judge_numbers),
+    "Start": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=judge_start),
+    "Noises": Language(numbers_by_name, repeated=True, metavar="NAME=VALUE", judge=judge_noise),
     "Limits": Language(limits_by_name, metavar="NAME=VALUE,...", judge=judge_numbers),
     "Switches": Language(_switches, repeated=True, metavar="NAME=VALUE", judge=judge_mapping),
     "Words": Language(assignments, repeated=True, metavar="NAME=VALUE", judge=judge_mapping),

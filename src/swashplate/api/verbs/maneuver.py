@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.languages import Aircraft, Band, Judged, Limits, Names, Pilot, Values
+from swashplate.api.languages import Aircraft, Band, Judged, Limits, Names, Noises, Pilot
 from swashplate.api.question import VerbQuestion, argument, option, setting, verb
 from swashplate.api.saying import Say, silent
 from swashplate.errors import SwashError
@@ -98,7 +98,7 @@ class DesignManeuver(VerbQuestion["DesignedManeuver"]):
         help="optimise for the average over draws of the prior, or for the worst of them",
         choices=("average", "worst"),
     )
-    noise: Values | None = setting(
+    noise: Noises | None = setting(
         default=None,
         help="of air and sensors, by name; the model's own identification's, else that of usual indoor flights",
     )

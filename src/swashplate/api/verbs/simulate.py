@@ -16,7 +16,7 @@ from swashplate.api.languages import (
     Gusts,
     Motion,
     Pilot,
-    Values,
+    Start,
     Wind,
     Words,
 )
@@ -76,7 +76,7 @@ class Simulate(OfVehicle["SimulatedFlight"]):
     lead: float = setting(default=3.0, help="hover before the maneuver", unit="s", least=0.0)
     tail: float = setting(default=3.0, help="hover after the maneuver", unit="s", least=0.0)
     environment: Air | None = setting(default=None, help="air_density and gravity, where the card's are not meant")
-    start: Values | None = setting(default=None, help="of inputs: states by name, or a trim; hover if not given")
+    start: Start | None = setting(default=None, help="of inputs: states by name, or a trim; hover if not given")
     substeps: int = setting(default=1, help="of inputs: Runge-Kutta steps per sample", least=1)
     interpolation: str = setting(default="held", help="of inputs between samples", choices=("held", "linear"))
     delays: Delays | None = setting(

@@ -93,9 +93,7 @@ def betaflight_gains(model: LinearModel, mapping: MotorMapping) -> BetaflightGai
         bare = BrokenLoops(FREQUENCIES, (plant * back)[..., None], np.zeros(p.size))
         roomy = (trial.gain >= GAIN_KEPT + _RESERVE[0]) & (trial.phase >= PHASE_KEPT + _RESERVE[1])
         alone = (bare.gain >= GAIN_KEPT) & (bare.phase >= PHASE_KEPT)
-        crosses = (
-            np.abs(trial.loop[:, -1]) < 1.0
-        )  # a crossover beyond the last frequency has margins that nobody has seen
+        crosses = np.abs(trial.loop[:, -1]) < 1.0  # beyond the last frequency nobody has seen margins
         kept = np.all(roomy & crosses & (trial.peak <= PEAK_KEPT) & alone, axis=1) & (d <= _LARGEST) & (i <= _LARGEST)
         if not kept.any():
             raise LinkError(f"no gains of {name} keep {GAIN_KEPT:g} dB and {PHASE_KEPT:g} degrees.", channel=name)
