@@ -25,7 +25,7 @@ function blades(count, radius, chord, look) {
     arm.rotation.z = (2 * Math.PI * i) / count;
     group.add(arm);
   }
-  return group;
+  return merged(group);
 }
 
 function disc(radius, color, ghost) {
@@ -35,19 +35,43 @@ function disc(radius, color, ghost) {
   return new THREE.Mesh(new THREE.CircleGeometry(radius, 40), look);
 }
 
+// One mesh of all that hangs in a group, each part in its own colour: a picture costs by the number of meshes.
+function merged(group, look = THREE.MeshLambertMaterial) {
+  group.updateMatrixWorld(true);
+  const out = group.matrixWorld.clone().invert(), positions = [], normals = [], colors = [];
+  let ghost = {};
+  group.traverse((part) => {
+    if (!part.isMesh) return;
+    const geometry = part.geometry.toNonIndexed().applyMatrix4(part.matrixWorld).applyMatrix4(out), { r, g, b } = part.material.color;
+    positions.push(...geometry.attributes.position.array);
+    normals.push(...geometry.attributes.normal.array);
+    for (let i = 0; i < geometry.attributes.position.count; i += 1) colors.push(r, g, b);
+    ghost = { transparent: part.material.transparent, opacity: part.material.opacity };
+  });
+  const geometry = new THREE.BufferGeometry();
+  for (const [name, values] of Object.entries({ position: positions, normal: normals, color: colors }))
+    geometry.setAttribute(name, new THREE.Float32BufferAttribute(values, 3));
+  return new THREE.Mesh(geometry, new look({ vertexColors: true, ...ghost }));
+}
+
+// A force, from where it acts.
 class Arrow {
   constructor(color, scale) {
     this.scale = scale;
-    this.helper = new THREE.ArrowHelper(new THREE.Vector3(0, 0, -1), new THREE.Vector3(), 1, color);
+    const parts = new THREE.Group(), look = new THREE.MeshBasicMaterial({ color });
+    const head = new THREE.Mesh(new THREE.ConeGeometry(0.04, 0.18, 5), look);
+    head.position.y = 0.91;
+    parts.add(tube([0, 0, 0], [0, 0.82, 0], 0.006, look), head);
+    this.mesh = merged(parts, THREE.MeshBasicMaterial);
     this.direction = new THREE.Vector3();
   }
   show(fx, fy, fz) {
     this.direction.set(fx, fy, fz);
     const length = this.direction.length() * this.scale;
-    this.helper.visible = length > 1e-6;
-    if (!this.helper.visible) return;
-    this.helper.setDirection(this.direction.normalize());
-    this.helper.setLength(length, 0.18 * length, 0.08 * length);
+    this.mesh.visible = length > 1e-6;
+    if (!this.mesh.visible) return;
+    this.mesh.scale.setScalar(length);
+    this.mesh.quaternion.setFromUnitVectors(UP, this.direction.normalize());
   }
 }
 
@@ -62,6 +86,7 @@ export class Helicopter {
     const paint = material(color, ghost), dark = material(0x333a40, ghost);
     const coaxial = picture.tail === null;
 
+    const body = new THREE.Group();
     // What has no rotors says its parts; a fuselage is two balls, over the rotor's radius.
     const looks = { paint, dark, glass: material(0x87b5d6, ghost) };
     const forms = { ball: () => new THREE.SphereGeometry(1, 24, 16), box: () => new THREE.BoxGeometry(1, 1, 1), wheel: () => new THREE.CylinderGeometry(1, 1, 1, 20) };
@@ -70,21 +95,21 @@ export class Helicopter {
       const part = new THREE.Mesh(forms[form](), looks[look]);
       part.position.set(...middle).multiplyScalar(R);
       part.scale.set(...size).multiplyScalar(R);
-      this.group.add(part);
+      body.add(part);
     }
 
     const top = Math.min(...picture.rotors.map((r) => r.hub[2]), picture.bar ? picture.bar.hub[2] : 0);
-    for (const { hub } of picture.rotors) this.group.add(tube([0, 0, 0], [hub[0], hub[1], coaxial ? top : hub[2]], 0.018 * R, dark));
+    for (const { hub } of picture.rotors) body.add(tube([0, 0, 0], [hub[0], hub[1], coaxial ? top : hub[2]], 0.018 * R, dark));
     const { length, width, depth } = picture.skids ?? {};
     for (const side of picture.skids ? [-1, 1] : []) {
-      this.group.add(tube([-length, side * width, depth], [length, side * width, depth], 0.016 * R, dark));
+      body.add(tube([-length, side * width, depth], [length, side * width, depth], 0.016 * R, dark));
       for (const end of [-0.5, 0.5])
-        this.group.add(tube([end * length, side * 0.1 * R, 0.1 * R], [end * length, side * width, depth], 0.013 * R, dark));
+        body.add(tube([end * length, side * 0.1 * R, 0.1 * R], [end * length, side * width, depth], 0.013 * R, dark));
     }
     if (coaxial && !picture.parts) {
       const fin = new THREE.Mesh(new THREE.BoxGeometry(0.2 * R, 0.02 * R, 0.22 * R), dark);
       fin.position.set(-0.55 * R, 0, -0.08 * R);
-      this.group.add(fin);
+      body.add(fin);
     }
 
     this.rotors = picture.rotors.map((rotor, i) => {
@@ -96,8 +121,8 @@ export class Helicopter {
       plane.add(spinning, disc(rotor.radius, i ? 0x0072b2 : 0x009e73, ghost));
       shaft.add(plane);
       const thrust = new Arrow(i ? 0x0072b2 : 0x009e73, per);
-      thrust.helper.position.set(...rotor.hub);
-      this.group.add(shaft, thrust.helper);
+      thrust.mesh.position.set(...rotor.hub);
+      this.group.add(shaft, thrust.mesh);
       return { plane, spinning, thrust, sense: rotor.sense };
     });
     this.bar = null;
@@ -112,17 +137,17 @@ export class Helicopter {
         weight.position.x = end;
         spinning.add(weight);
       }
-      this.bar.add(spinning);
+      this.bar.add(merged(spinning));
       this.group.add(this.bar);
     }
     this.tail = null;
     if (picture.tail) {
       const { hub, radius, blades: count } = picture.tail;
-      this.group.add(tube([-0.3 * R, 0, -0.05 * R], [hub[0], 0, hub[2]], 0.03 * R, paint));
+      body.add(tube([-0.3 * R, 0, -0.05 * R], [hub[0], 0, hub[2]], 0.03 * R, paint));
       if (picture.fin && picture.fin.side > 0) {
         const fin = new THREE.Mesh(new THREE.BoxGeometry(picture.fin.side, 0.01 * R, picture.fin.side), paint);
         fin.position.set(picture.fin.x, 0, picture.fin.z);
-        this.group.add(fin);
+        body.add(fin);
       }
       const holder = new THREE.Group();
       holder.position.set(hub[0], 0.05 * R, hub[2]);
@@ -130,10 +155,11 @@ export class Helicopter {
       const spinning = blades(count, radius, 0.18 * radius, dark);
       holder.add(spinning, disc(radius, 0xcc79a7, ghost));
       const thrust = new Arrow(0xcc79a7, 3 * per);
-      thrust.helper.position.set(...hub);
-      this.group.add(holder, thrust.helper);
+      thrust.mesh.position.set(...hub);
+      this.group.add(holder, thrust.mesh);
       this.tail = { spinning, thrust };
     }
+    this.group.add(merged(body));
   }
 
   // Position and Euler angles as they are now, discs as last told; `elapsed` seconds of simulation turn the rotors.
