@@ -91,7 +91,7 @@ _COMMANDS = (
     "cmd", "command", "controls", "control", "torque", "mixer", "servo", "stick", "rc", "rccommand", "out", "output",
     "input", "u", "ruder", "actuator", "befehl", "knuppel",
 )  # fmt: skip
-_FORCES = ("acc", "accel", "accelerometer", "beschleunigung", "a", "accsmooth", "specificforce")
+_FORCES = ("acc", "accel", "acceleration", "accelerometer", "beschleunigung", "a", "accsmooth", "specificforce")
 _SPEEDS = ("vel", "velocity", "v", "speed", "geschwindigkeit")
 _PLACES = ("pos", "position", "t", "place", "ort")
 _BY_AXIS = {
@@ -190,7 +190,7 @@ def _by_letter(parts: Sequence[str], kind: str) -> tuple[str, str]:
         named = any(word in names for word in before) or joined in names
         if what == "speed" and "ang" in before:
             continue
-        if "acc" in before and "ang" in before:
+        if all(any(word.startswith(begin) for word in before) for begin in ("acc", "ang")):
             return "", ""
         if (named and kind in ("", what)) or (kind == what and (before in (["xyz"], []) or named)):
             part = _BY_LETTER[what].get(last, "")
@@ -205,13 +205,14 @@ def _size(values: Array) -> float:
     return float(np.quantile(np.abs(good), 0.999)) if good.size else 0.0
 
 
-def _unit_by_size(name: str, size: float) -> str:
+def _unit_by_size(name: str, size: float, column: str) -> str:
     """The unit of a channel whose largest values are known, those of its sisters with them: one sensor has one unit."""
     inside = channel(name).unit
     if inside == "rad":
         return "deg" if size > _TURN else "rad"
     if inside == "rad/s":
-        return "rpm" if name.startswith("omega") and size > 600.0 else "deg/s" if size > 12.0 else "rad/s"
+        turns = name.startswith("omega") and (size > 600.0 or "rpm" in column.lower())
+        return "rpm" if turns else "deg/s" if size > 12.0 else "rad/s"
     if inside == "m/s^2":
         return "g" if size < 4.0 else "m/s^2"
     if inside == "1":
@@ -253,6 +254,9 @@ def guesses(table: ColumnTable) -> list[Guess]:
         except SwashError:
             listed.append(Guess(index, name, unit=unit, why="no numbers"))
             continue
+        if not np.isfinite(numbers[index]).any():
+            listed.append(Guess(index, name, unit=unit, why="holds nothing"))
+            continue
         known, why = _known(name, _of_unit(unit)) if name else ("", "")
         other = bool(unit) and units.is_known(unit) and known and units.inside_unit(unit) != channel(known).unit
         if not known or known in taken or other:
@@ -269,7 +273,7 @@ def guesses(table: ColumnTable) -> list[Guess]:
     for guess in listed:
         if guess.channel not in ("", "time"):
             family = sizes.get(channel(guess.channel).unit, 0.0)
-            unit = guess.unit or _unit_by_size(guess.channel, family)
+            unit = guess.unit or _unit_by_size(guess.channel, family, guess.name)
             guess = _scaled(guess, numbers[guess.index], unit, family)
         done.append(guess)
     return done

@@ -72,10 +72,15 @@ def time_hint(names: Iterable[str]) -> str:
     like = [
         name
         for name in names
-        if name.lower() == "t" or get_close_matches(name.lower(), ("time", "timestamp", "zeit"), n=1)
+        if name.lower() == "t"
+        or name.lower().startswith("time_")
+        or get_close_matches(name.lower(), ("time", "timestamp", "zeit"), n=1)
     ]
     asked = f"Did you mean {' or '.join(map(repr, like))}? " if like else ""
-    return f"{asked}Call it 'time', with its unit ('time [s]'), or say in a mapping file which it is."
+    return (
+        f"{asked}Call it 'time', with its unit ('time [s]'), or say in a mapping file which it is: swash inspect FILE "
+        "--map guesses it for every column."
+    )
 
 
 def named_unit(name: str) -> str | None:

@@ -42,6 +42,7 @@ def guesses_of(header: str, *columns: np.ndarray) -> list[tuple[str, str]]:
         ("vel x,pos y,vbat", ["vx", "y", "voltage"]),
         ("/rates/p,/controls/roll,throttlePct", ["p", "mixer_roll", "mixer_collective"]),
         ("ang acc x,temperature,satellites", ["", "", ""]),
+        ("acceleration_x,acceleration_y,angular acceleration z", ["ax", "ay", ""]),
     ],
 )
 def test_names(names: str, channels: list[str]) -> None:
@@ -54,6 +55,11 @@ def test_one_sensor_has_one_unit_by_its_largest_axis() -> None:
     assert [unit for _, unit in told] == ["s", "deg/s", "deg/s", "deg/s"]
     told = guesses_of("time [s],gyro.x,gyro.y,gyro.z", 3.0 * WAVE, 2.0 * WAVE, 0.1 * WAVE)
     assert [unit for _, unit in told] == ["s", "rad/s", "rad/s", "rad/s"]
+
+
+def test_a_name_says_revolutions_and_an_empty_column_is_no_channel() -> None:
+    told = guesses_of("time [s],rpm_0,voltage,roll", 300.0 + WAVE, np.full(TIME.size, np.nan), WAVE)
+    assert told[1:] == [("omega_rotor", "rpm"), ("", ""), ("phi", "rad")]
 
 
 def test_pulses_counts_and_a_sensor_on_its_head_are_turned() -> None:
