@@ -96,7 +96,8 @@ def time_base(name: str, data: xr.Dataset, switched: Array) -> StreamSummary:
             usual = by_turns
     long = steps > _GAP * usual
     long[long] = ~_steady(np.flatnonzero(long), steps[long])
-    pauses = long & _beside(time[:-1], switched) & _beside(time[1:], switched)
+    inside = np.searchsorted(switched, time + _SWITCHING)[1:] - np.searchsorted(switched, time - _SWITCHING)[:-1]
+    pauses = long & (inside > 1) & _beside(time[:-1], switched) & _beside(time[1:], switched)
     long &= ~pauses
     return StreamSummary(
         name,

@@ -88,6 +88,13 @@ def test_a_stream_of_one_mode_pauses_in_the_others_and_any_other_pause_is_a_gap(
         assert any("log: 1 gap in the time stamps, the longest 7010 ms" in text for text in lost.problems)
 
 
+def test_samples_that_were_lost_at_a_change_of_mode_are_a_gap_and_no_pause() -> None:
+    time = np.arange(N) / 100.0
+    time[200:] += 0.07
+    told = inspect(replace(_flight(time), provenance=Provenance(events=(Event(2.0, "mode", "LOITER"),))))
+    assert (told.streams[0].gaps, told.streams[0].pause) == (1, 0.0)
+
+
 def test_what_stands_still_on_purpose_is_no_problem_and_a_dead_sensor_is() -> None:
     still = ("omega_rotor", "voltage", "pid_d_roll", "p_demand", "rcin_7", "q", "mixer_yaw", "elevator")
     found = inspect(_flight(**{name: np.full(N, 0.5) for name in still}))
