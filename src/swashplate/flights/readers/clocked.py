@@ -323,4 +323,4 @@ def unread(counts: Mapping[str, int], read: Sequence[str]) -> tuple[str, ...]:
     if not rest:
         return ()
     listed = ", ".join(f"{name} ({n})" for name, n in sorted(rest.items(), key=lambda item: (-item[1], item[0])))
-    return (f"also in the log, not read: {listed}",)
+    return (f"also in the log (`swash open` finds and plots all of it): {listed}",)
