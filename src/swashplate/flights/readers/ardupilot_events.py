@@ -155,13 +155,30 @@ def _arming(messages: Messages) -> list[Event]:
 
 
 _SUBSYSTEMS = {
-    2: "radio", 3: "compass", 5: "failsafe of the radio", 6: "failsafe of the battery",
-    8: "failsafe of the ground station", 9: "failsafe of the fence", 10: "change of mode refused", 11: "GPS",
-    12: "crash check", 13: "flip", 15: "parachute", 16: "EKF check", 17: "failsafe of the EKF", 18: "barometer",
-    19: "CPU overload", 21: "terrain data", 22: "navigation", 23: "failsafe of terrain", 24: "EKF changed its core",
-    25: "thrust loss", 26: "sensors", 27: "leak", 29: "vibration", 30: "internal error", 31: "dead reckoning",
+    1: "main loop", 2: "radio", 3: "compass", 5: "failsafe of the radio", 6: "failsafe of the battery",
+    7: "failsafe of GPS", 8: "failsafe of the ground station", 9: "failsafe of the fence", 10: "change of mode refused",
+    11: "GPS", 12: "crash check", 13: "flip", 15: "parachute", 16: "EKF check", 17: "failsafe of the EKF",
+    18: "barometer", 19: "CPU overload", 21: "terrain data", 22: "navigation", 23: "failsafe of terrain",
+    24: "EKF changed its core", 25: "thrust loss", 26: "sensors", 27: "leak", 29: "vibration", 30: "internal error",
+    31: "dead reckoning",
 }  # fmt: skip
 """ERR.Subsys, as ArduPilot's page "Diagnosing problems using logs" lists it."""
+_CODES = {
+    (2, 2): "a frame came late", (11, 2): "a glitch", (12, 1): "a crash was detected", (12, 2): "control was lost",
+    (13, 2): "abandoned", (15, 2): "too low", (15, 3): "landed", (16, 2): "the variance is bad", (18, 2): "a glitch",
+    (21, 2): "missing", (22, 2): "no destination was set", (22, 5): "the destination lies outside the fence",
+    **dict.fromkeys(((part, 1) for part in (5, 6, 7, 8, 9, 17, 23, 26, 27, 29, 31)), "began"),
+}  # fmt: skip
+"""ERR.ECode of a subsystem, as AP_Logger's LogErrorCode names it (ArduPilot 4.6)."""
+
+
+def _error_text(part: int, code: int) -> str:
+    """What an ERR message says. Of a mode that was refused and of the EKF's core the code is a number, 0 included."""
+    if part in (10, 24):
+        told = f"{'mode' if part == 10 else 'core'} {code}"
+    else:
+        told = _CODES.get((part, code), f"code {code}") if code else "over"
+    return f"{_SUBSYSTEMS.get(part, f'subsystem {part}')}: {told}"
 
 
 def _errors(messages: Messages) -> list[Event]:
@@ -170,11 +187,7 @@ def _errors(messages: Messages) -> list[Event]:
         return []
     rows = zip(seconds(table).tolist(), table.number("Subsys").tolist(), table.number("ECode").tolist(), strict=True)
     return [
-        Event(
-            time,
-            "error",
-            f"{_SUBSYSTEMS.get(int(part), f'subsystem {part:g}')}: {f'code {code:g}' if code else 'over'}",
-        )
+        Event(time, "error", _error_text(int(part), int(code)))
         for time, part, code in rows
         if math.isfinite(time) and math.isfinite(part) and math.isfinite(code)
     ]

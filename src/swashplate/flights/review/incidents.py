@@ -236,7 +236,9 @@ def _clipping(flight: Flight) -> list[Incident]:
         step = float(np.median(np.diff(time)))
         for start, stop in _runs(time, (more > 0.0) & _during(time, armed(flight)), least=0.0, step=step):
             count = float(np.sum(more[(time >= start) & (time <= stop) & (more > 0.0)]))
-            happened.append(Incident("clipping", start, stop, f"an accelerometer was clipped {count:.0f} times"))
+            happened.append(
+                Incident("clipping", start, stop, f"an accelerometer was clipped {count:.0f} time{'s' * (count != 1)}")
+            )
     return happened
 
 

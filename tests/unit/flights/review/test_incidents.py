@@ -162,12 +162,21 @@ def test_an_ardupilot_log_tells_its_errors_and_supply(tmp_path: Path) -> None:
             ("GPS", (us, 0, 1 if lost else 4, 11, 0.8, 47.4, 8.5, 0.3)),
             ("POWR", (us, 4.2 if lost else 5.1, 0.0)),
         ]
-    rows.append(("ERR", (29_000_000, 17, 1)))
+    errors = ((17, 1), (17, 0), (12, 1), (16, 2), (24, 0), (10, 0), (22, 7))
+    rows += [("ERR", (29_000_000 + 1_000_000 * k, *error)) for k, error in enumerate(errors)]
     path = tmp_path / "events.bin"
     path.write_bytes(dataflash(sorted(rows, key=lambda row: row[1][0]), formats))
     made = read(path)
     assert np.degrees(made.values("latitude")[0]) == pytest.approx(47.4)
     found = review(made).incidents
-    assert [each.kind for each in found] == ["GPS", "power", "error"]
+    assert [each.kind for each in found] == ["GPS", "power", *["error"] * 7]
     assert found[0].start == pytest.approx(26.0, abs=0.15)
-    assert str(found[2]) == "29.0 s: failsafe of the EKF: code 1"
+    assert [str(each).partition(" s: ")[2] for each in found[2:]] == [
+        "failsafe of the EKF: began",
+        "failsafe of the EKF: over",
+        "crash check: a crash was detected",
+        "EKF check: the variance is bad",
+        "EKF changed its core: core 0",
+        "change of mode refused: mode 0",
+        "navigation: code 7",
+    ]
