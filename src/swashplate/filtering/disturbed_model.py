@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Values
 from swashplate.engine.equations import Equations, equations_of
@@ -44,6 +45,10 @@ class FilterState(NamedTuple):
     x: Scalar
     gust: Scalar
     drift: Scalar
+
+    def at(self, samples: NDArray[np.intp]) -> FilterState:
+        """Those at some samples of a series."""
+        return FilterState(*(np.asarray(part)[samples] for part in self))
 
 
 @dataclass(frozen=True)

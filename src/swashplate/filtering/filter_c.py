@@ -24,7 +24,7 @@ from swashplate.filtering.following import AWAY, SHARES, STILL
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.physics.backend import CasadiBackend
 
-Following = Callable[[Statements, Sequence[int]], str]
+Beyond = Callable[[Statements, Sequence[int]], str]
 
 _FOUND = ("nu", "corrected", "acting", "rest")
 _READ = ("s", "y", "g", "w", "p", "k")
@@ -51,7 +51,7 @@ class Sample:
 
 
 def filter_source(model: StochasticModel) -> str:
-    """C of a vehicle in disturbed air, as `sample_source`, with a gain that follows where there is wind."""
+    """C of a vehicle in disturbed air, as `sample_source`, with predictions, and with wind a gain that follows."""
     casadi, correct = require_casadi(), correction(model)
     vehicle = model.vehicle
     sizes = (len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2, len(vehicle.state_names))
@@ -59,15 +59,15 @@ def filter_source(model: StochasticModel) -> str:
     beside = [casadi.SX.sym(name, size) for name, size in zip("wpk", sizes, strict=True)]
     sampled = casadi.Function("f", [*given, *beside], correct(*given), {"cse": True})
     sample = Sample(sampled, model.disturbed, windy=model.windy)
-    return sample_source(model.equations, sample, partial(_following, model) if model.windy else None)
+    return sample_source(model.equations, sample, partial(_beyond_a_record, model))
 
 
-def sample_source(equations: Equations, sample: Sample, following: Following | None = None) -> str:
-    """C of `run_along`, `run_moved`, `run_steps`, `run_steps_moved` and `rates_and_slopes` (`templates/filter.c`).
+def sample_source(equations: Equations, sample: Sample, beyond: Beyond | None = None) -> str:
+    """C of `run_along`, `run_moved`, `run_steps` and `rates_and_slopes` (`templates/filter.c`).
 
     Args:
         equations: that are stepped. sample: what is made of a reading.
-        following: prints a gain that follows, from the rates without what the card alone decides, and their roots.
+        beyond: prints what follows in the file, from the rates without what the card alone decides, and their roots.
 
     Raises:
         ExportError: for equations that CasADi cannot trace or that are not printed as C.
@@ -81,7 +81,7 @@ def sample_source(equations: Equations, sample: Sample, following: Following | N
     rates = traced_rates(equations)
     source = statements(rates.function, precision="double", inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
     of_card, rest = split(source, moving=("x[", "w[", *ROOTS), fixed="cp")
-    follow = following(rest, rates.steps) if following else ""
+    further = beyond(rest, rates.steps) if beyond else ""
     of_inputs, rest = split(rest)
     driven = frozenset(range(m + 3))  # not the voltage
     arrays: dict[str, tuple[str, frozenset[int] | None]] = {"p": ("dp", None)}
@@ -119,7 +119,7 @@ def sample_source(equations: Equations, sample: Sample, following: Following | N
         "OF_INPUTS_MOVED": _indented(input_lines),
         "MOVING": _rates_in_c(rest, rates.steps),
         "MOVING_MOVED": _indented([*lines, *moving.stores(stored, {0: "k"})]),
-        "FOLLOWING": follow,
+        "BEYOND": further,
     }
     return fill_template("filter.c", blanks)
 
@@ -129,6 +129,14 @@ def _rates_in_c(code: Statements, steps: Sequence[int]) -> str:
     if steps:
         return print_searches(code, steps, real="double", precision="double", outputs=["k"])
     return print_statements(code, "double", "double", ["k"])
+
+
+def _beyond_a_record(model: StochasticModel, rates: Statements, steps: Sequence[int]) -> str:
+    """C of predictions (`templates/ahead.c`), and of a gain that follows where there is wind."""
+    places = {name: model.vehicle.index(state) for name, state in (("NORTH", "x"), ("EAST", "y"), ("HEADING", "psi"))}
+    flags = {"WINDY": int(model.windy), "ROOTED": int(bool(steps))}
+    ahead = fill_template("ahead.c", {**places, **flags})
+    return ahead + (_following(model, rates, steps) if model.windy else "")
 
 
 def _following(model: StochasticModel, rates: Statements, steps: Sequence[int]) -> str:

@@ -46,10 +46,23 @@ class Along(NamedTuple):
 
 
 class Pushed(NamedTuple):
-    """Commands and air (rows, inputs + 4) and added accelerations (rows, 6); or their directions (count, rows, ...)."""
+    """Commands and air (rows, inputs + 4) and added accelerations (rows, 6)."""
 
     driving: Array
     push: Array
+
+
+class Onward(NamedTuple):
+    """What predictions begin with and depend on, or directions in which that moves (count, ...).
+
+    Attributes:
+        states: joined, at their starts (rows, joined).
+        fade: what is left of gusts after a sample (gusts,). numbers: of the equations (numbers,).
+    """
+
+    states: Array
+    fade: Array
+    numbers: Array
 
 
 class Following(NamedTuple):
@@ -102,11 +115,39 @@ class FilterCode(Protocol):
         """States (rows, states) one sample later; numbers of all rows, or of each (rows, numbers)."""
         ...
 
-    def step_moved(
-        self, dt: float, x: Array, pushed: Pushed, numbers: Array, directions: tuple[Array, Pushed, Array]
+    def ahead(
+        self,
+        dt: float,
+        starts: NDArray[np.intp],
+        onward: Onward,
+        driving: Array,
+        count: int,
+        kicks: Array | None = None,
+    ) -> Array:
+        """States (rows, count, states) 1, 2, ... samples after some starts, with nothing measured any more.
+
+        Args:
+            starts: samples. onward: what they begin with.
+            driving: by sample (n, inputs + 4), `count` of them beyond the last start.
+            kicks: what is added to the joined states after every sample, nose north (rows, count, joined).
+        """
+        ...
+
+    def ahead_moved(
+        self,
+        dt: float,
+        starts: NDArray[np.intp],
+        onward: Onward,
+        driving: Array,
+        steps: NDArray[np.intp],
+        directions: tuple[Onward, int, Array],
     ) -> tuple[Array, Array]:
-        """The same, and slopes (count, rows, states) along directions of the states, of what pushes and of the numbers
-        (count, numbers)."""
+        """States after `steps` samples, ascending (rows, steps, states), and their slopes (count, rows, steps, states).
+
+        Args:
+            starts, onward, driving: as of `ahead`.
+            directions: of `onward`, and as in `Along` the first that moves commands and how they do.
+        """
         ...
 
     def rates(self, x: Array, w: Array, p: Array) -> Array:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import math
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
@@ -16,9 +16,9 @@ from swashplate.engine.graph import Graph
 from swashplate.engine.on_arrays import OnArrays
 from swashplate.engine.roots import require_casadi
 from swashplate.engine.trace import unrolled_rates
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel
 from swashplate.filtering.filter_c import correction, filter_source
-from swashplate.filtering.filter_code import Along, FilterCode, Fixed, Followed, Following, Pushed, RecordSeries
+from swashplate.filtering.filter_code import Along, FilterCode, Fixed, Followed, Following, Onward, Pushed, RecordSeries
 from swashplate.filtering.following import followed
 
 _FRACTIONS, _WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
@@ -47,6 +47,7 @@ class VirtualFilter:
         self._n, self._m = len(model.vehicle.state_names), len(model.vehicle.input_names)
         self._rates = OnArrays(unrolled_rates(model.equations))
         self._pushed = np.eye(self._n)[:, model.disturbed]
+        self._ends = np.cumsum([self._n, model.n_gusts])
 
     # ---- along a record ----------------------------------------------------------------------------------------
     def along(self, dt: float, fixed: Fixed, series: RecordSeries) -> tuple[Array, Array, Array]:
@@ -137,13 +138,53 @@ class VirtualFilter:
             after += weight * dt * k
         return after
 
-    def step_moved(
-        self, dt: float, x: Array, pushed: Pushed, numbers: Array, directions: tuple[Array, Pushed, Array]
+    def ahead(
+        self,
+        dt: float,
+        starts: NDArray[np.intp],
+        onward: Onward,
+        driving: Array,
+        count: int,
+        kicks: Array | None = None,
+    ) -> Array:
+        state, out = FilterState(*np.split(onward.states, self._ends, axis=1)), np.empty((len(starts), count, self._n))
+        for k in range(count):
+            after = self.step(dt, state.x, self._acting(state, driving[starts + k]), onward.numbers)
+            state = FilterState(after, onward.fade * state.gust, state.drift)
+            state = state if kicks is None else self._model.displace(state, kicks[:, k])
+            out[:, k] = state.x
+        return out
+
+    def ahead_moved(
+        self,
+        dt: float,
+        starts: NDArray[np.intp],
+        onward: Onward,
+        driving: Array,
+        steps: NDArray[np.intp],
+        directions: tuple[Onward, int, Array],
     ) -> tuple[Array, Array]:
-        dx, d_pushed, d_numbers = directions
-        planes, further = self._planes(dt, x, pushed, numbers, d_numbers)
-        at = np.concatenate([dx, d_pushed.driving, d_pushed.push], axis=2).transpose(1, 2, 0)
-        return self.step(dt, x, pushed, numbers), (planes @ at + further).transpose(2, 0, 1)
+        to, arriving, commands = directions
+        state, way = (FilterState(*np.split(rows, self._ends, axis=-1)) for rows in (onward.states, to.states))
+        d_driving, reached, slopes = np.zeros((len(to.fade), *driving[starts].shape)), [], []
+        for k in range(steps[-1]):
+            d_driving[arriving : arriving + len(commands), :, : self._m] = commands[:, starts + k]
+            pushed, d_pushed = self._acting(state, driving[starts + k]), self._acting(way, d_driving)
+            planes, further = self._planes(dt, state.x, pushed, onward.numbers, to.numbers)
+            at = np.concatenate([way.x, d_pushed.driving, d_pushed.push], axis=2).transpose(1, 2, 0)
+            fading = onward.fade * way.gust + to.fade[:, None] * state.gust
+            way = FilterState((planes @ at + further).transpose(2, 0, 1), fading, way.drift)
+            state = FilterState(self.step(dt, state.x, pushed, onward.numbers), onward.fade * state.gust, state.drift)
+            if k + 1 in steps:
+                reached.append(state.x)
+                slopes.append(way.x)
+        return np.stack(reached, axis=1), np.stack(slopes, axis=2)
+
+    def _acting(self, state: FilterState, driving: Array) -> Pushed:
+        """What drives with the wind of a state, and its pushes: gusts and drifts together."""
+        wind, w = state.gust[..., N_DISTURBANCES:], driving.copy()
+        w[..., self._m : self._m + wind.shape[-1]] += wind
+        return Pushed(w, state.gust[..., :N_DISTURBANCES] + state.drift)
 
     def _planes(self, dt: float, x: Array, pushed: Pushed, numbers: Array, along: Array) -> tuple[Array, Array]:
         """Slopes of a step by states, driving and push (rows, states, all three), and along directions of the numbers
@@ -206,18 +247,20 @@ _ARGUMENTS = {
     "run_along": "ld" + 8 * "*",
     "run_moved": "ld" + 6 * "*" + "ll" + 3 * "*" + "ll" + 2 * "*" + "li*",
     "run_steps": "ldl" + 4 * "*",
-    "run_steps_moved": "lld" + 8 * "*",
     "run_rates": "l" + 4 * "*",
     "rates_and_slopes": "l" + 6 * "*",
+    "run_ahead": "lldi" + 4 * "*" + "l" + 2 * "*",
+    "run_ahead_moved": "ldi" + 4 * "*" + "l" + 3 * "*" + "lll*li" + 2 * "*",
+    "run_following": "lld" + 13 * "*",
 }
-_FOLLOWING = {"run_following": "lld" + 13 * "*"}
+"""By function, where the source has it."""
 
 
 class FilterLibrary:
     """The functions of one filter's C.
 
     Args:
-        source: the C. outputs: how many there are. windy: whether its gain can follow.
+        source: the C. outputs: how many there are.
 
     Raises:
         ExportError: without a compiler, or where it refuses.
@@ -225,10 +268,10 @@ class FilterLibrary:
 
     compiled_by = "C"
 
-    def __init__(self, source: str, outputs: int, *, windy: bool = False) -> None:
+    def __init__(self, source: str, outputs: int) -> None:
         self._c = loaded(source, options=(*_OPTIONS, *_QUIET))
-        for name, kinds in (_ARGUMENTS | (_FOLLOWING if windy else {})).items():
-            function = getattr(self._c, name)
+        for name in filter(partial(hasattr, self._c), _ARGUMENTS):
+            function, kinds = getattr(self._c, name), _ARGUMENTS[name]
             function.argtypes, function.restype = [_KINDS[kind] for kind in kinds], None
         self._directions, self._roots = int(self._c.directions()), int(self._c.roots())
         self._outputs = outputs
@@ -246,7 +289,7 @@ class FilterLibrary:
         slopes, states = np.empty((count, n, self._outputs)), np.empty((count, len(along.marks), fixed.start.size))
         here = *map(flat, fixed), *map(flat, series), went
         moving, pushed = tuple(map(flat, along.fixed)), flat(along.commands)
-        at = np.ascontiguousarray(along.marks, np.dtype("l"))
+        at = longs(along.marks)
         for first in range(0, count, self._directions):
             where = first, count, *moving, along.arriving, len(pushed), pushed, slopes, len(at), at, states
             self._c.run_moved(n, dt, *here, *where)
@@ -257,14 +300,36 @@ class FilterLibrary:
         self._c.run_steps(len(after), dt, int(numbers.ndim == 2), after, *map(flat, pushed), flat(numbers))
         return after
 
-    def step_moved(
-        self, dt: float, x: Array, pushed: Pushed, numbers: Array, directions: tuple[Array, Pushed, Array]
+    def ahead(
+        self,
+        dt: float,
+        starts: NDArray[np.intp],
+        onward: Onward,
+        driving: Array,
+        count: int,
+        kicks: Array | None = None,
+    ) -> Array:
+        given, n = tuple(map(flat, onward)), _states_of(onward)
+        states, kicked = np.empty((len(starts), count, n)), flat([] if kicks is None else kicks)
+        self._c.run_ahead(len(starts), count, dt, longs(starts), *given, flat(driving), kicked.size, kicked, states)
+        return states
+
+    def ahead_moved(
+        self,
+        dt: float,
+        starts: NDArray[np.intp],
+        onward: Onward,
+        driving: Array,
+        steps: NDArray[np.intp],
+        directions: tuple[Onward, int, Array],
     ) -> tuple[Array, Array]:
-        after, (dx, d_pushed, d_numbers) = np.array(x, dtype=np.float64, order="C"), directions
-        slope = np.array(dx, dtype=np.float64, order="C")
-        here = after, *map(flat, pushed), flat(numbers), slope, *map(flat, d_pushed), flat(d_numbers)
-        self._c.run_steps_moved(len(after), len(slope), dt, *here)
-        return after, slope
+        to, arriving, commands = directions
+        rows, count, marks, n = len(starts), len(to.fade), len(steps), _states_of(onward)
+        states, slopes = np.empty((rows, marks, n)), np.empty((count, rows, marks, n))
+        given = *map(flat, onward), flat(driving), count, *map(flat, to)
+        moving = arriving, len(commands), len(driving), flat(commands)
+        self._c.run_ahead_moved(rows, dt, longs(starts), *given, *moving, marks, longs(steps), states, slopes)
+        return states, slopes
 
     def follow(self, dt: float, begin: Following, series: RecordSeries) -> Followed:
         rows, n, y, joined = len(begin.states), len(series.readings), self._outputs, begin.states.shape[1]
@@ -286,6 +351,16 @@ class FilterLibrary:
         return results
 
 
+def _states_of(onward: Onward) -> int:
+    """How many of the joined states are the vehicle's."""
+    return onward.states.shape[1] - onward.fade.size - N_DISTURBANCES
+
+
+def longs(places: NDArray[np.intp]) -> NDArray[np.int_]:
+    """Places as C reads them."""
+    return np.ascontiguousarray(places, np.dtype("l"))
+
+
 def flat(rows: ArrayLike) -> Array:
     """Numbers as C reads them."""
     return np.ascontiguousarray(rows, dtype=np.float64)
@@ -300,5 +375,5 @@ def filter_code(model: StochasticModel) -> FilterCode:
         MissingLibraryError: without CasADi.
     """
     if can_compile():
-        return FilterLibrary(filter_source(model), model.n_outputs, windy=model.windy)
+        return FilterLibrary(filter_source(model), model.n_outputs)
     return VirtualFilter(model)

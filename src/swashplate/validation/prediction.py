@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array, lengthened
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, stochastic_model
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, stochastic_model
 from swashplate.filtering.filter_code import RecordSeries, driving_rows
 from swashplate.filtering.nuisance import Nuisance, commands_moved, motors
 from swashplate.filtering.riccati import gain_at, steady_gain
@@ -164,8 +164,10 @@ class ObservedRecord:
 
     def ahead(self, starts: NDArray[np.intp], ahead: int) -> Array:
         """Body states 1, 2, ... samples after some starts, with nothing measured any more (starts, ahead, 12)."""
-        known = self._run.states, self._numbers, *self._commands(ahead)
-        return self._filter.ahead_of(*known, starts, ahead)[..., self._body]
+        driving = driving_rows(*self._commands(ahead))
+        return self._filter.ahead_of(self._run.states.at(starts), self._numbers, driving, starts, ahead)[
+            ..., self._body
+        ]
 
     def closed_ahead(self, laws: Sequence[Law], starts: NDArray[np.intp], ahead: int) -> Array:
         """As `ahead`, with the loops of some axes closed."""
@@ -194,7 +196,7 @@ class ObservedRecord:
         reference, answering = np.stack(references, axis=1), reach - 1 - np.array(lags)
         past = before[starts[:, None] + np.arange(1, reach + 1)]
         body, fade = self._body, self._fade
-        x, gust, drift = (np.asarray(part)[starts] for part in self._run.states[:3])
+        x, gust, drift = self._run.states.at(starts)
         states = np.empty((len(starts), ahead, len(PREDICTED)))
         for k in range(ahead):
             u = reaching[starts + k]
@@ -209,16 +211,10 @@ class ObservedRecord:
     def shown(self, starts: NDArray[np.intp], aside: Array, kicks: Array) -> Array:
         """Readings without the sensors' noise (runs, samples, outputs), of states that begin `aside` (runs, joined) and
         are kicked at every sample (runs, samples, joined)."""
-        model, (commands, voltage) = self._filter.model, self._commands(kicks.shape[1])
-        fade = self._fade
-        state = model.displace(FilterState(*(np.asarray(part)[starts] for part in self._run.states)), aside)
-        states = np.empty((kicks.shape[1], *state.x.shape))
-        for k in range(kicks.shape[1]):
-            here = starts + k
-            x = self._filter.step(state.x, state.gust, state.drift, commands[here], voltage[here], self._constants)
-            state = model.displace(FilterState(x, fade * state.gust, state.drift), kicks[:, k])
-            states[k] = state.x
-        return np.asarray(model.measure(states.T, self.nuisance, _ARRAYS).T).swapaxes(0, 1)
+        model, ahead = self._filter.model, kicks.shape[1]
+        state, driving = model.displace(self._run.states.at(starts), aside), driving_rows(*self._commands(ahead))
+        states = self._filter.ahead_of(state, self._numbers, driving, starts, ahead, kicks)
+        return np.asarray(model.measure(states.T, self.nuisance, _ARRAYS).T)
 
     @cached_property
     def uncertainty(self) -> tuple[Array, Array, Array, Array]:

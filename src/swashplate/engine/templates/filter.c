@@ -96,12 +96,6 @@ static void gathered(vec *to, const double *rows, long size, long first, long co
     for (int l = 0; l < V; ++l) to[i][l] = first + l < count ? rows[(first + l) * size + i] : 0;
 }
 
-/* The same of row `i` of `rows` in every direction. */
-static void gathered_row(vec *to, const double *from, long size, long rows, long i, long first, long count) {
-  for (long j = 0; j < size; ++j)
-    for (int l = 0; l < V; ++l) to[j][l] = first + l < count ? from[((first + l) * rows + i) * size + j] : 0;
-}
-
 void run_along(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
                const double *rows, double *innovations, double *states, double *roots);
 void run_moved(long n, double dt, const double *start, const double *g, const double *p, const double *readings,
@@ -109,8 +103,6 @@ void run_moved(long n, double dt, const double *start, const double *g, const do
                const double *d_g, const double *d_p, long arriving, long late, const double *d_commands, double *out,
                long marks, const long *at, double *d_states);
 void run_steps(long rows, double dt, long each, double *x, const double *w, const double *push, const double *p);
-void run_steps_moved(long rows, long count, double dt, double *x, const double *w, const double *push, const double *p,
-                     double *dx, const double *d_w, const double *d_push, const double *d_p);
 void run_rates(long rows, const double *x, const double *w, const double *p, double *k);
 void rates_and_slopes(long rows, const double *x, const double *w, const double *p, double *k, double *by_x,
                       double *by_w);
@@ -185,30 +177,6 @@ void run_steps(long rows, double dt, long each, double *x, const double *w, cons
   }
 }
 
-/* The same, with slopes of states (count, rows, N) along directions of commands and air (count, rows, W), of the push
-   (count, rows, D) and of the numbers (count, P), which are those of all. */
-void run_steps_moved(long rows, long count, double dt, double *x, const double *w, const double *push, const double *p,
-                     double *dx, const double *d_w, const double *d_push, const double *d_p) {
-  double at[N], cp[CP], root[4][R];
-  vec v[N], vw[W], vpush[D], vp[P], vcp[CP];
-  for (long first = 0; first < count; first += V) {
-    gathered(vp, d_p, P, first, count);
-    of_card_moved(p, cp, vp, vcp);
-    for (long i = 0; i < rows; ++i) {
-      memcpy(at, x + i * N, sizeof at);
-      step(at, w + i * W, w + i * W, push + i * D, p, cp, dt, root);
-      memcpy(at, x + i * N, sizeof at);
-      gathered_row(v, dx, N, rows, i, first, count);
-      gathered_row(vw, d_w, W, rows, i, first, count);
-      gathered_row(vpush, d_push, D, rows, i, first, count);
-      step_moved(at, w + i * W, w + i * W, push + i * D, p, cp, dt, root, v, vw, vpush, vp, vcp);
-      for (int l = 0; l < V && first + l < count; ++l)
-        for (int j = 0; j < N; ++j) dx[((first + l) * rows + i) * N + j] = v[j][l];
-    }
-  }
-  run_steps(rows, dt, 0, x, w, push, p);
-}
-
 /* Rates k (N), and their slopes by the states (N, N) and by `count` of what drives them from `from` on (N, count). */
 static void slopes_at(const double *x, const double *w, const double *p, const double *cp, int from, int count, double *k,
                       double *by_x, double *by_w) {
@@ -248,6 +216,6 @@ void rates_and_slopes(long rows, const double *x, const double *w, const double 
     slopes_at(x + i * N, w + i * W, p + i * P, cp, 0, W, k + i * N, by_x + i * N * N, by_w + i * N * W);
   }
 }
-@FOLLOWING@
+@BEYOND@
 int directions(void) { return V; }
 int roots(void) { return R; }

@@ -170,6 +170,7 @@ class MultiStepErrors:
         share = steps[0] / steps[-1]  # of a start among those that overlap it
         self._scale = np.sqrt(share) / size
         self._share = share
+        self._last: tuple[Array, tuple[list[Array], list[Array]]] | None = None
 
     @property
     def start(self) -> Array:
@@ -226,8 +227,12 @@ class MultiStepErrors:
         return white, scaled, self.known
 
     def _errors_and_slopes(self, row: Array) -> tuple[list[Array], list[Array]]:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self._base.errors_ahead_moved(self.whole_row(row), self.ahead, self._places)
+        """Those of the last row are kept, which a search ends with and its judges ask for."""
+        if self._last is None or not np.array_equal(self._last[0], row):
+            with np.errstate(over="ignore", invalid="ignore"):
+                parts = self._base.errors_ahead_moved(self.whole_row(row), self.ahead, self._places)
+            self._last = np.array(row), parts
+        return self._last[1]
 
 
 def told_horizon(horizon: Horizon | None) -> dict[str, list[float]]:

@@ -116,8 +116,8 @@ class RecordRun:
     def ahead(self, run: Filtered, starts: Sequence[int], steps: Sequence[int]) -> Array:
         """Measured less predicted after `steps` samples from each start (starts, steps, outputs)."""
         at, of = np.asarray(starts, dtype=np.intp), np.asarray(steps, dtype=np.intp)
-        series = run.states, run.numbers, run.commands, self.voltage
-        states = self._filter.ahead_of(*series, at, int(of[-1]))[:, of - 1]
+        driving = self._series(run.commands).driving
+        states = self._filter.ahead_of(run.states.at(at), run.numbers, driving, at, int(of[-1]))[:, of - 1]
         return self.readings[at[:, None] + of] - np.real(self._measured(states, Nuisance(*run.numbers.nuisance)))
 
     def ahead_moved(
@@ -136,7 +136,7 @@ class RecordRun:
         at, of = np.asarray(starts, dtype=np.intp), np.asarray(steps, dtype=np.intp)
         moves, series = self._moves(run, *given, count), self._series(run.commands)
         _, by_start = self._filter.run_slopes(run.begin, run.numbers, series, run.run, moves, starts)
-        states, slopes = self._filter.ahead_moved(run.states, by_start, run.numbers, series, moves, at, steps)
+        states, slopes = self._filter.ahead_moved(run.states.at(at), by_start, run.numbers, series, moves, at, steps)
         nuisance, to = run.numbers.nuisance, moves.numbers.nuisance
         errors = self.readings[at[:, None] + of] - np.real(self._measured(states, Nuisance(*nuisance)))
         aside = Nuisance(*(nuisance + 1j * IMAGINARY * to).T[..., None, None])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import IMAGINARY, Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
-from swashplate.filtering.filter_code import Along, Fixed, Pushed, RecordSeries
+from swashplate.filtering.filter_code import Along, Fixed, Onward, Pushed, RecordSeries
 from swashplate.filtering.filter_library import filter_code
 from swashplate.identification.time.beginning import (
     Begun,
@@ -98,25 +98,21 @@ class RecordFilter:
         self,
         states: FilterState,
         numbers: FilterNumbers,
-        commands: Array,
-        voltage: Array,
+        driving: Array,
         starts: NDArray[np.intp],
         ahead: int,
+        kicks: Array | None = None,
     ) -> Array:
         """States 1, 2, ... samples after some starts, with nothing measured any more (starts, ahead, states).
 
         Args:
-            states: after each reading. numbers: of the filter.
-            commands, voltage: by sample, `ahead` of them beyond the last start.
+            states: at the starts. numbers: of the filter.
+            driving: by sample (n, inputs + 4), `ahead` of them beyond the last start.
             starts: samples. ahead: how many samples to predict.
+            kicks: what is added to the joined states after every sample, nose north (starts, ahead, joined).
         """
-        x, gust, drift = (np.asarray(part)[starts] for part in states[:3])
-        given = numbers_and_constants(self.model.vehicle, numbers.parameters)
-        fade, out = self.model.fade(Noise(*numbers.noise)), np.empty((len(starts), ahead, self._n))
-        for k in range(ahead):
-            out[:, k] = x = self.step(x, gust, drift, commands[starts + k], voltage[starts + k], given)
-            gust = fade * gust
-        return out
+        onward = self._onward(states, numbers)
+        return self._code.ahead(self.model.dt, starts, onward, driving, ahead, kicks)
 
     def step(self, x: Array, gust: Array, drift: Array, commands: Array, voltage: Array, numbers: Array) -> Array:
         """States (rows, states) one sample later.
@@ -140,30 +136,19 @@ class RecordFilter:
         """States after `steps` samples from some starts (starts, steps, states), and their slopes (directions, ...).
 
         Args:
-            states, numbers, series: as of `along`. moves: in which directions.
-            slopes: of the states at the starts, of `run_slopes`.
+            states: at the starts, and `slopes` of them, of `run_slopes`.
+            numbers, series: as of `along`. moves: in which directions.
             starts: samples. steps: how far to predict, ascending.
         """
-        x, gust, drift = (np.asarray(part)[starts] for part in states[:3])
-        dx, d_gust, d_drift = slopes[:3]
-        given = numbers_and_constants(self.model.vehicle, numbers.parameters)
-        d_told = numbers_moved(self.model.vehicle, moves.numbers.parameters)
-        fade, d_fade = self._fading(numbers.noise, moves.numbers.noise)
-        arriving, inputs, count = moves.arriving, moves.commands, len(d_told)
-        commands, voltage = series.driving[:, :-4], series.driving[:, -1]
-        d_commands = np.zeros((count, len(starts), commands.shape[1]))
-        still, reached, slopes_of = np.zeros((count, len(starts))), [], []
-        for k in range(steps[-1]):
-            here = starts + k
-            d_commands[arriving : arriving + len(inputs)] = inputs[:, here]
-            pushed = _pushed(gust, drift, commands[here], voltage[here])
-            along = dx, _pushed(d_gust, d_drift, d_commands, still), d_told
-            x, dx = self._code.step_moved(self.model.dt, x, pushed, given, along)
-            d_gust, gust = fade * d_gust + d_fade[:, None] * gust, fade * gust
-            if k + 1 in steps:
-                reached.append(x)
-                slopes_of.append(dx)
-        return np.stack(reached, axis=1), np.stack(slopes_of, axis=2)
+        fading = self._fading(numbers.noise, moves.numbers.noise)[1]
+        along = Onward(_row(slopes), fading, numbers_moved(self.model.vehicle, moves.numbers.parameters))
+        onward, of = self._onward(states, numbers), np.asarray(steps, dtype=np.intp)
+        directions = along, moves.arriving, moves.commands
+        return self._code.ahead_moved(self.model.dt, starts, onward, series.driving, of, directions)
+
+    def _onward(self, states: FilterState, numbers: FilterNumbers) -> Onward:
+        fade = self.model.fade(Noise(*numbers.noise))
+        return Onward(_row(states), fade, numbers_and_constants(self.model.vehicle, numbers.parameters))
 
     def _fixed(self, begin: Begun, numbers: FilterNumbers) -> Fixed:
         fade = self.model.fade(Noise(*numbers.noise))

@@ -19,11 +19,13 @@ from swashplate.errors import ExportError
 from swashplate.filtering import filter_library as libraries
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
+from swashplate.filtering.filter_code import driving_rows
 from swashplate.identification.core.multi_step import Ahead
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import POSE, Record
 from swashplate.identification.time.beginning import FilterNumbers
 from swashplate.identification.time.filter_error import FilterError
+from swashplate.identification.time.innovations import Filtered
 from swashplate.identification.time.record_filter import record_filter
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
@@ -87,7 +89,8 @@ def test_steps_are_those_of_the_equations(name: str) -> None:
     commands, voltage = run.commands, likelihood.records[0].voltage
     noise = np.array(Noise(wind=0.3), dtype=np.float64)
     numbers = FilterNumbers(run.numbers.parameters, noise, run.numbers.nuisance, run.numbers.inputs)
-    found = record_filter(model).ahead_of(states, numbers, commands, voltage, np.array([100, 170]), 2)
+    starts, driving = np.array([100, 170]), driving_rows(commands, voltage)
+    found = record_filter(model).ahead_of(states.at(starts), numbers, driving, starts, 2)
     parameters, push = vehicle.parameters(*run.numbers.parameters.tolist()), np.zeros(len(vehicle.state_names))
     around = environment_of(vehicle, parameters=parameters)
     for start, predicted in zip((100, 170), found, strict=True):
@@ -125,7 +128,7 @@ def test_slopes_of_errors_ahead_are_those_of_the_errors() -> None:
     likelihood = _likelihood("coax")
     row, places = _somewhere(likelihood), np.flatnonzero([e.group != "noise" for e in likelihood.row.entries])
     (errors,), (slopes,) = likelihood.errors_ahead_moved(row, AHEAD, places)
-    np.testing.assert_array_equal(errors, likelihood.errors_ahead(row, AHEAD)[0])
+    np.testing.assert_allclose(errors, likelihood.errors_ahead(row, AHEAD)[0], rtol=0.0, atol=1e-13)  # of another loop
     assert errors.dtype == slopes.dtype == np.float64
     for place, found in zip(places, slopes, strict=True):
         step = 1e-4 * np.eye(len(row))[place]
@@ -151,18 +154,31 @@ def test_without_a_compiler_the_numbers_are_the_same(
     row = _somewhere(in_c)
     places = np.arange(len(_FREE[name]) + 2)
     ours, (run,), ahead = in_c.scores(row), in_c.runs(row), in_c.errors_ahead_moved(row, AHEAD, places)
+    kicked = _kicked(in_c, run)
     monkeypatch.setattr(libraries, "can_compile", lambda: False)
     _forget()
     try:
         by_numpy = FilterError(in_c.table, in_c.records, noise=in_c.noise)
         theirs, (other,) = by_numpy.scores(row), by_numpy.runs(row)
         further = by_numpy.errors_ahead_moved(row, AHEAD, places)
+        np.testing.assert_allclose(kicked, _kicked(by_numpy, run), rtol=1e-10, atol=1e-10)
         assert by_numpy.compiled_by == "NumPy"
     finally:
         _forget()
     np.testing.assert_allclose(run.innovations, other.innovations, atol=1e-11 * np.abs(other.innovations).max())
     for mine, exact in zip((*ours, *ahead[0], *ahead[1]), (*theirs, *further[0], *further[1]), strict=True):
         np.testing.assert_allclose(mine, exact, rtol=1e-10, atol=1e-11 * np.max(np.abs(exact)))
+
+
+def _kicked(likelihood: FilterError, run: Filtered) -> Array:
+    """Predictions whose joined states are kicked at every sample."""
+    starts, driving = np.array([100, 170]), driving_rows(run.commands, likelihood.records[0].voltage)
+    joined = sum(part.shape[1] for part in run.states)
+    kicks = 0.01 * np.random.default_rng(4).standard_normal((2, 20, joined))
+    of = record_filter(likelihood.model)
+    predicted = of.ahead_of(run.states.at(starts), run.numbers, driving, starts, 20, kicks)
+    assert np.abs(predicted - of.ahead_of(run.states.at(starts), run.numbers, driving, starts, 20)).max() > 0.01
+    return predicted
 
 
 def _forget() -> None:
