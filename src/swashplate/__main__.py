@@ -6,6 +6,7 @@ start, is answered by Python.
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import signal
@@ -36,6 +37,7 @@ def main() -> NoReturn:
         folders = os.environ["PATH"].split(os.pathsep)
         os.environ["PATH"] = os.pathsep.join(folder for folder in folders if os.path.isabs(folder))
     gc.set_threshold(50_000, 20, 20)  # cells of a large table are no cycles: looking for some took a fifth of reading
+    atexit.register(gc.freeze)  # what is left at the end goes with the process: nobody looks for cycles in it
     from swashplate.cli.app import main as run
 
     run()

@@ -11,10 +11,11 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 import swashplate as sp
+from swashplate.arrays import Array
 from swashplate.flights import datasets
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.parameters import Parameterization
-from swashplate.identification.core.records import Record, records
+from swashplate.identification.core.records import records
 from swashplate.identification.time.filter_error import FilterError, unrelated
 
 NAME = "nanobench/B2_circle_fast_rep2"
@@ -67,9 +68,9 @@ def test_commands_of_another_time_are_told_from_those_of_the_flight(shared_data:
     pieces = [piece for piece in records(read, vehicle) if piece.time[-1] - piece.time[0] > 6.0]
     assert pieces[0].output_names[-3:] == ("p", "q", "r")  # its gyroscope is read
 
-    def cost(asked: Sequence[Record]) -> float:
-        likelihood = FilterError(Parameterization(vehicle, ()), asked)
-        return likelihood.cost(likelihood.row.starts())
+    def cost(commands: Sequence[Array]) -> float:
+        likelihood = FilterError(Parameterization(vehicle, ()), pieces)
+        return likelihood.cost_under(commands, likelihood.row.starts())
 
     assert unrelated(cost, pieces) == ""
     late = [replace(piece, inputs=np.roll(piece.inputs, 437, axis=0)) for piece in pieces]

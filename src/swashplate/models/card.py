@@ -348,12 +348,20 @@ def read_card(path: str | Path) -> Card:
 
 def packaged_cards() -> dict[str, Card]:
     """The cards that come with swashplate, by name."""
-    return dict(_packaged())
+    return {name: packaged_card(name) for name in packaged_names()}
 
 
 @lru_cache(maxsize=1)
-def _packaged() -> dict[str, Card]:
-    """They are parsed once: a card does not change, and nine of them take a tenth of a second."""
-    folder = resources.files("swashplate.models") / "data"
-    files = sorted((entry for entry in folder.iterdir() if entry.name.endswith(".toml")), key=lambda entry: entry.name)
-    return {f.name.removesuffix(".toml"): parse_card(f.read_text(encoding="utf-8"), path=f.name) for f in files}
+def packaged_names() -> tuple[str, ...]:
+    """Names of the cards that come with swashplate."""
+    return tuple(sorted(file.name.removesuffix(".toml") for file in _DATA.iterdir() if file.name.endswith(".toml")))
+
+
+@lru_cache(maxsize=32)
+def packaged_card(name: str) -> Card:
+    """One of them, parsed once: a card does not change."""
+    file = _DATA / f"{name}.toml"
+    return parse_card(file.read_text(encoding="utf-8"), path=file.name)
+
+
+_DATA = resources.files("swashplate.models") / "data"

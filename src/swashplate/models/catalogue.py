@@ -10,7 +10,7 @@ from pathlib import Path
 from swashplate import documents
 from swashplate.errors import CardError, SwashError
 from swashplate.files import is_file
-from swashplate.models.card import Card, packaged_cards, read_card
+from swashplate.models.card import Card, packaged_card, packaged_cards, packaged_names, read_card
 from swashplate.models.linear import state_space_file
 from swashplate.models.linear.composition import is_composed
 from swashplate.models.linear.linear_vehicle import linear_vehicle
@@ -58,7 +58,7 @@ def started_from(vehicle: Vehicle) -> Vehicle:
     if before is not None:
         return vehicle.with_card(before)
     if vehicle.traits.published:
-        return from_card(packaged_cards()[vehicle.traits.published])
+        return from_card(packaged_card(vehicle.traits.published))
     if any(entry.status == "identified" for entry in vehicle.card.parameters.values()):
         raise CardError(
             "does not say from which card it was identified.",
@@ -86,9 +86,9 @@ def vehicle(name_or_file: str | Path, **options: bool | str) -> Vehicle:
                 f"has no options ({', '.join(options)} given): it is a linear model.", where=text, channel="options"
             )
         return structure(text)
-    packaged = packaged_cards()
+    packaged = packaged_names()
     if text in packaged:
-        card = packaged[text]
+        card = packaged_card(text)
     elif is_file(text):
         card = _card_of(Path(text))
     elif text in EQUATIONS:

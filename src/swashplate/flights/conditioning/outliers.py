@@ -78,7 +78,8 @@ def _two_sided(time: Array, values: Array, passes: int = 5) -> Array:
     offset = time[window] - time
     offset /= np.max(np.abs(offset), axis=0)
     near = values[window]
-    powers = [offset**k for k in range(5)]
+    square = offset**2
+    powers = [np.ones_like(offset), offset, square, square * offset, square**2]
     others = (window != np.arange(n)).astype(np.float64)
     weight = others.copy()
     fit = [np.zeros(n)]

@@ -17,7 +17,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.filter_library import filter_code
 from swashplate.filtering.following import measured_slopes
-from swashplate.filtering.nuisance import PUSHES, Nuisance
+from swashplate.filtering.nuisance import DELAYS, PUSHES, Nuisance
 from swashplate.filtering.riccati import steady_gain, steady_gain_moved
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.start_states import (
@@ -43,6 +43,8 @@ _ASIDE = 2e-3
 """How far to either side of a row slopes are taken, in scaled units, by four points: exact to 1e-10."""
 
 _PUSHES = np.array([Nuisance._fields.index(name) for name in PUSHES])
+
+_OF_COMMANDS = [Nuisance._fields.index(name) for name in DELAYS]
 
 _OF_PLACES = np.array([Noise._fields.index(name) for name in ("speed", "wind", "tau_wind")])
 
@@ -105,11 +107,24 @@ def starting_samples(dt: float) -> int:
     return max(1, round(0.5 / dt))
 
 
-def begun(model: StochasticModel, numbers: FilterNumbers, first: FirstMotion) -> Begun:
-    """The gain and the start of a run."""
+def begun(
+    model: StochasticModel,
+    numbers: FilterNumbers,
+    first: FirstMotion,
+    known: tuple[FilterNumbers, FilterGain] | None = None,
+) -> Begun:
+    """The gain and the start of a run; a known gain of other numbers serves where only commands tell them apart."""
     rows = FilterNumbers(*(np.asarray(row)[None] for row in numbers))
+    start = starting_rows(model, rows, first)[0]
+    if known is not None and all(map(np.array_equal, _of_gain(known[0]), _of_gain(numbers))):
+        return Begun(known[1], start)
     K, S, _ = steady_gain(*(part[0] for part in joined_at(model, rows, first)))
-    return Begun(model.gain_of(K, S), starting_rows(model, rows, first)[0])
+    return Begun(model.gain_of(K, S), start)
+
+
+def _of_gain(numbers: FilterNumbers) -> tuple[Array, Array, Array]:
+    """The numbers without those that only move commands."""
+    return numbers.parameters, numbers.noise, np.delete(numbers.nuisance, _OF_COMMANDS)
 
 
 def first_state(model: StochasticModel, x: Array, nuisance: Array) -> FilterState:

@@ -90,19 +90,19 @@ SHIFTS = 19
 """Other places of the commands: unrelated ones are the best of twenty by chance in one of twenty cases."""
 
 
-def unrelated(cost: Callable[[Sequence[Record]], float], pieces: Sequence[Record]) -> str:
+def unrelated(cost: Callable[[Sequence[Array]], float], pieces: Sequence[Record]) -> str:
     """Why the commands are not those of the motion, in words; "" where they explain it better than moved ones.
 
     A permutation test (Good 2005): the commands of every record are moved around in a circle, and nothing is fitted
     anew, so that what they say of the motion is all that changes.
 
     Args:
-        cost: negative log-likelihood of records at the numbers that were found.
+        cost: negative log-likelihood of the records under commands, at the numbers that were found.
         pieces: the records.
     """
-    here = cost(pieces)
+    here = cost([piece.inputs for piece in pieces])
     shares = np.arange(1, SHIFTS + 1) / (SHIFTS + 1)
-    better = [share for share in shares if cost([_shifted_record(piece, share) for piece in pieces]) <= here]
+    better = [share for share in shares if cost([_later(piece.inputs, share) for piece in pieces]) <= here]
     if not better:
         return ""
     longest = max(float(piece.time[-1] - piece.time[0]) for piece in pieces)
@@ -112,9 +112,9 @@ def unrelated(cost: Callable[[Sequence[Record]], float], pieces: Sequence[Record
     )
 
 
-def _shifted_record(piece: Record, share: float) -> Record:
-    """The record with its commands later by a share of its length, the last ones first."""
-    return replace(piece, inputs=np.roll(piece.inputs, round(share * len(piece.inputs)), axis=0))
+def _later(commands: Array, share: float) -> Array:
+    """Commands later by a share of their length, the last ones first."""
+    return np.roll(commands, round(share * len(commands)), axis=0)
 
 
 SETTLING = 1.5
@@ -233,7 +233,8 @@ class FilterError(Likelihood):
         asked = np.asarray(row, dtype=np.float64).tobytes()
         if asked not in self._kept:
             given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
-            filtered = [run.filtered(*given) for run in self._runs]
+            near = next(reversed(self._kept.values()), [None] * len(self._runs))
+            filtered = [run.filtered(*given, other) for run, other in zip(self._runs, near, strict=True)]
             self._kept = dict([*self._kept.items(), (asked, filtered)][-_KEPT:])
         return self._kept[asked]
 
@@ -252,6 +253,12 @@ class FilterError(Likelihood):
     # ---- likelihood --------------------------------------------------------------------------------------------
     def errors_of(self, row: Array) -> list[Errors]:
         return self._parts(self.runs(row))
+
+    def cost_under(self, commands: Sequence[Array], row: Array) -> float:
+        """The cost of the records under other commands, per record (n, inputs)."""
+        given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
+        every = zip(self._runs, commands, self.runs(row), strict=True)
+        return self.cost_of(self._parts([replace(run, inputs=u).filtered(*given, near) for run, u, near in every]))
 
     def moved_errors(self, row: Array) -> Iterator[MovedErrors]:
         given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale

@@ -114,7 +114,7 @@ class FlightProblem:
         noise, notes = likelihood.noise_of(row), list(self.notes)
         problems += [*smoothed_outputs(pieces, self.flights), *noise_too_small(noise, self.flights)]
         if isinstance(likelihood, FilterError):  # output error fits starts to its commands: others lose
-            apart = unrelated(lambda others: likelihood.of(table, others).cost(row), pieces)
+            apart = unrelated(lambda commands: likelihood.constant.cost_under(commands, row), pieces)
             problems += [apart] if apart else []
             notes += [note] if (note := moving_air(likelihood.noise_of(row))) else []
         notes += [

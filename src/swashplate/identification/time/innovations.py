@@ -100,10 +100,10 @@ class RecordRun:
         starting = reaching[: starting_samples(model.dt)].mean(axis=0)
         return reaching, FilterNumbers(parameters, noise, nuisance, starting)
 
-    def filtered(self, card: Array, noise: Array, numbers: Array) -> Filtered:
-        """The run at a row, of arguments as `placed` has them."""
+    def filtered(self, card: Array, noise: Array, numbers: Array, near: Filtered | None = None) -> Filtered:
+        """The run at a row, of arguments as `placed` has them; `near`, another run, may have the same gain."""
         reaching, at = self.placed(card, noise, numbers)
-        begin = begun(self.plan.model, at, self.motion)
+        begin = begun(self.plan.model, at, self.motion, None if near is None else (near.numbers, near.begin.gain))
         run = self._filter.along(begin, at, self._series(reaching))
         return Filtered(reaching, at, begin, run)
 

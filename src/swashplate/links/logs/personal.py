@@ -11,7 +11,7 @@ from typing import NamedTuple
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event, Provenance
 from swashplate.flights.schema import is_known
-from swashplate.models.card import packaged_cards
+from swashplate.models.card import packaged_names
 
 KINDS: Mapping[str, str] = {
     "place": "channels latitude, longitude, x and y, the map, parameters of a place",
@@ -65,7 +65,7 @@ def stripped(flight: Flight, path: Path, *, keep: Collection[str] = ()) -> Strip
 
     if "names" in gone:
         called = f"log{path.suffix if _ENDING.fullmatch(path.suffix) else ''}"
-        vehicle = vehicle if vehicle in packaged_cards() or origin.reader in _TELL_NO_NAME else origin.firmware
+        vehicle = vehicle if vehicle in packaged_names() or origin.reader in _TELL_NO_NAME else origin.firmware
     messages = sum(event.kind == "message" for event in origin.events)
     left_out = {
         "place": ", ".join([*dropped, "the map"]),

@@ -9,7 +9,7 @@ import numpy as np
 from swashplate.flights.aircraft_kind import aircraft_kind
 from swashplate.flights.flight import Flight
 from swashplate.links.live.picture import picture
-from swashplate.models.card import packaged_cards
+from swashplate.models.card import packaged_names
 from swashplate.models.catalogue import vehicle
 from swashplate.models.usual import BY_ROTORS, HELICOPTER, USUAL
 
@@ -56,7 +56,7 @@ _FORMS: dict[str, list[_Part]] = {
 
 def shape_of(flight: Flight) -> tuple[dict[str, Any], str]:
     """What is drawn (as of `swashplate.links.live.picture`), and a sentence where it is not the log's own vehicle."""
-    if flight.provenance.vehicle in packaged_cards():
+    if flight.provenance.vehicle in packaged_names():
         return picture(vehicle(flight.provenance.vehicle)), ""
     kind = aircraft_kind(flight)
     if kind is None:

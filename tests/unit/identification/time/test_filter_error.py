@@ -10,6 +10,7 @@ import numpy as np
 
 import swashplate as sp
 from simulated_flights import FREE, ten_seconds
+from swashplate.arrays import Array
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.filter_error import SHIFTS, FilterError, unrelated
@@ -21,9 +22,13 @@ def piece() -> Record:
     return found
 
 
-def cost(pieces: Sequence[Record]) -> float:
-    likelihood = FilterError(parameterize(sp.vehicle("coax"), list(FREE)), pieces)
-    return likelihood.cost(likelihood.row.starts())
+def cost(commands: Sequence[Array]) -> float:
+    likelihood = FilterError(parameterize(sp.vehicle("coax"), list(FREE)), [piece()])
+    under = likelihood.cost_under(commands, likelihood.row.starts())
+    assert under == likelihood.of(likelihood.table, [replace(piece(), inputs=commands[0])]).cost(
+        likelihood.row.starts()
+    )
+    return under
 
 
 def test_the_commands_of_the_flight_explain_it() -> None:
@@ -43,5 +48,5 @@ def test_unrelated_commands_pass_one_time_in_twenty() -> None:
     motion = random.standard_normal((400, n))
     passed = 0
     for row, moved in zip(rows, motion, strict=True):
-        passed += not unrelated(lambda pieces, y=moved: -float(y @ pieces[0].inputs[:, 0]), [row])  # type: ignore[misc]
+        passed += not unrelated(lambda commands, y=moved: -float(y @ commands[0][:, 0]), [row])  # type: ignore[misc]
     assert 0.02 < passed / 400 < 0.09
