@@ -23,7 +23,8 @@ from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure
 
-SEEDS = 50
+SEEDS = range(20, 120)
+"""Nothing was chosen by these: what a model may lack was sized on 0 to 19."""
 WORLDS = {"lasting gusts": (0.5, False), "lasting gusts, lags, coupling, jitter": (0.5, True)}
 PROMISED = 90.0
 """Percent of all numbers within two of their standard deviations, at least."""
@@ -39,7 +40,7 @@ def in_time(method: str, **how: object) -> Callable[[Sequence[Flight]], tuple[Nu
     def estimate(flown: Sequence[Flight]) -> tuple[Numbers, bool]:
         fit = sp.identify(uncrossed(), flown, method=method, **how)
         found = {e.name: (e.value, e.best_sigma) for e in fit.estimates if e.free}
-        return found, any("not white" in words for words in fit.warnings)
+        return found, any("not white" in words or "model lacks" in words for words in fit.warnings)
 
     return estimate
 
@@ -81,7 +82,7 @@ def known(seed: int, lags: bool) -> dict[str, float]:
 @cache
 def flown(world: str) -> list[list[Flight]]:
     gust, lags = WORLDS[world]
-    both = [lacking.flights(range(SEEDS), axis, gust=gust, lacking=lags) for axis in lacking.INPUTS]
+    both = [lacking.flights(SEEDS, axis, gust=gust, lacking=lags) for axis in lacking.INPUTS]
     return [list(pair) for pair in zip(*both, strict=True)]
 
 
@@ -89,10 +90,10 @@ def flown(world: str) -> list[list[Flight]]:
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 @pytest.mark.parametrize("world", WORLDS)
 def test_bounds_hold_or_the_page_says_by_how_much_not(world: str, estimator: str) -> None:
-    """Every estimator has bounds for gusts. What the model lacks biases fits in time: told, and not judged."""
+    """Every estimator has bounds for gusts, and for what the model lacks; good models raise no alarm."""
     distances: dict[str, list[float]] = {}
     coloured = 0
-    for seed, pair in enumerate(flown(world)):
+    for seed, pair in zip(SEEDS, flown(world), strict=True):
         found, words = ESTIMATORS[estimator](pair)
         coloured += words
         right = known(seed, WORLDS[world][1])
@@ -101,12 +102,12 @@ def test_bounds_hold_or_the_page_says_by_how_much_not(world: str, estimator: str
     every = np.array(list(distances.values()))
     inside = 100.0 * float(np.mean(np.abs(every) < 2.0))
     _leave(world, estimator, distances, every, inside, coloured)
+    assert inside >= PROMISED
     if world == "lasting gusts":
-        assert inside >= PROMISED
         if "white" in estimator:
-            assert coloured >= 0.9 * SEEDS
+            assert coloured >= 0.9 * len(SEEDS)
         elif "prediction" not in estimator:  # whose free gain knows no gusts that last either
-            assert coloured <= 0.05 * SEEDS
+            assert coloured <= 0.05 * len(SEEDS)
 
 
 def _leave(
@@ -123,12 +124,13 @@ def _leave(
     proof_page.leave(
         "bounds_of_estimators",
         {
-            "title": f"Bounds of every estimator of linear models where the model lacks something, {SEEDS} seeds",
-            "text": "Roll and pitch sweeps of a rotor and a body in a weak loop; the model has neither gusts that last "
-            "1.5 s nor, in the second world, actuators of second order (80 to 140 rad/s), gyro filters (40 to 80 Hz), "
-            "cross controls (3 %), held commands and 2 ms of jitter. Share of numbers within two of their best "
-            "standard deviations, their root mean square in sigmas, the parameter that is biased most, and how many "
-            "fits say that their filter's errors are not white.",
+            "title": "Bounds of every estimator of linear models where the model lacks something",
+            "text": f"{len(SEEDS)} roll and pitch sweeps of a rotor and a body in a weak loop; the model has neither "
+            "gusts that last 1.5 s nor, in the second world, actuators of second order (80 to 140 rad/s), gyro filters"
+            " (40 to 80 Hz), cross controls (3 %), held commands and 2 ms of jitter. Share of numbers within two "
+            "of their best standard deviations, their root mean square in sigmas, the parameter that is biased "
+            "most, and how many fits say that their filter's errors are not white, or show what the model lacks. "
+            "The seeds are none of those by which the sizes of missing parts were chosen.",
             "columns": ["flights", "estimator", "numbers", "within two sigma [%]", "rms", "most biased", "told"],
             "rows": rows,
         },

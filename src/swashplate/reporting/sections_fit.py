@@ -13,6 +13,7 @@ from swashplate.identification.core.records import Comparison
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.estimators import GAINS
 from swashplate.identification.one_step import in_words, not_judged, one_step_effects
+from swashplate.identification.time.estimates import COLOURED
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.figures_fit import residual_correlation, residual_time
@@ -52,8 +53,8 @@ def parameters(fit: Result[Vehicle, object]) -> Section:
             ),
             rows,
             note="σ plain: Cramér-Rao bound. σ corrected: the same, allowing for coloured residuals (Morelli and Klein "
-            "1997); use this one. Prior share: how much of the information is the prior's; near 100 % the flight said "
-            "nothing. A name leads to its meaning and source.",
+            "1997) or for what the remark says; use this one. Prior share: how much of the information is the prior's; "
+            "near 100 % the flight said nothing. A name leads to its meaning and source.",
         )
     )
     if fit.constants:
@@ -127,6 +128,8 @@ def _remarks(fit: Result[Vehicle, object], e: Estimate) -> tuple[str, bool, str]
         remarks.append(f"tied: = {e.tie}")
     if e.prior_mean is not None and e.prior_sigma is not None:
         remarks.append(f"prior {value_words(e.prior_mean, e.prior_sigma)} ± {sigma_words(e.prior_sigma)}")
+    if e.bound not in ("", COLOURED):
+        remarks.append(f"bound: {e.bound}")
     return "; ".join(remarks), False, "bad" if e.at_bound else "plain"
 
 

@@ -23,6 +23,7 @@ def fit_table(fit: Result[object, object]) -> TextTable:
         remarks = [f"= {e.tie}"] if e.tie else []
         remarks += ["at its bound"] if e.at_bound else []
         remarks += [f"{100 * e.prior_share:.0f} % from the prior"] if e.prior_share > 0.1 else []
+        remarks += [f"bound: {e.bound}"] if e.bound not in ("", "coloured errors") else []
         known = math.isfinite(e.best_sigma) and not e.tie
         bound = f"{2 * e.best_sigma:.2g}" if known else "-"
         true = [f"{fit.truth[e.name]:.4g}" if e.name in fit.truth else "-"] if fit.truth else []

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.identification.core import robust
+from swashplate.identification.core.missing_parts import MissingParts
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.records import Comparison, Record
@@ -243,6 +244,11 @@ class Likelihood(ABC):
     def _moved_here(self, row: Array) -> Iterator[MovedErrors]:
         """`moved_errors`, perhaps of a row before."""
         return self.moved_errors(row)
+
+    def missing_parts(self, row: Array) -> MissingParts | None:
+        """What the model may lack, as it moves the errors; here nothing that is known."""
+        del row
+        return None
 
     # ---- what the accuracy analysis needs ----------------------------------------------------------------------
     def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:

@@ -53,6 +53,8 @@ class Estimate:
         prior_source: where the prior comes from ("" where there is none).
         alone: what the flight alone would have said, NaN where it says nothing.
         disagreement: flight alone less prior, in standard deviations of that difference (NaN: none).
+        bound: what the standard deviation to use allows for, in words: "white errors", "coloured errors", "errors by
+            octaves", or "what the model may lack"; "" where the method has one kind only.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Estimate:
     prior_source: str = ""
     alone: float = NAN
     disagreement: float = NAN
+    bound: str = ""
 
     @property
     def free(self) -> bool:
@@ -345,7 +348,9 @@ class Result(Shown, Generic[Model, Details]):
             cells = []
             for (head, column), width in zip(columns, widths, strict=True):
                 cell = head if row < 0 else column[row]
-                cells.append(cell.ljust(width) if head in ("parameter", "unit", "remarks") else cell.rjust(width))
+                cells.append(
+                    cell.ljust(width) if head in ("parameter", "unit", "bound for", "remarks") else cell.rjust(width)
+                )
             lines.append(("  " + "  ".join(cells)).rstrip())
         return "\n".join([*lines, *(f"! {text}" for text in (*self.problems, *self.warnings))])
 
@@ -361,6 +366,7 @@ class Result(Shown, Generic[Model, Details]):
             ("sigma %", [_percent(sigma[e.name], e.value) if e.free else "" for e in every]),
             ("I %", [percent(e.insensitivity_percent).strip() if np.isfinite(e.insensitivity) else "" for e in every]),
             ("unit", [e.unit for e in every]),
+            ("bound for", [e.bound for e in every]),
             ("remarks", [remark(e) for e in every]),
         ]
 

@@ -14,6 +14,7 @@ from swashplate.arrays import Array
 from swashplate.filtering.nuisance import PUSHES
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.likelihood import Likelihood
+from swashplate.identification.core.missing_parts import shifts_by
 from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Parameterization, bounds_of, parameter_table
@@ -25,6 +26,13 @@ if TYPE_CHECKING:
 
 LAGS = 1.0
 """Seconds of residual correlation that the corrected bound allows for."""
+
+WHITE, COLOURED, BY_OCTAVES = "white errors", "coloured errors", "errors by octaves"
+MODEL = "what the model may lack"
+"""Kinds of bounds, by what they allow for."""
+
+WIDER = 1.1
+"""Times as wide as without, from which a bound is said to hold what the model may lack."""
 
 _UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad", **dict.fromkeys(PUSHES[:3], "m/s^2")}
 _UNITS |= dict.fromkeys(PUSHES[3:], "rad/s^2")
@@ -55,6 +63,8 @@ class Solved:
         bound, corrected: covariances (p, p) of the criterion's scaled row, without and with the errors' colour.
         full_row: the likelihood's row where the search ended.
         numbers: of that, by name, in their units.
+        kinds: of the bound of each parameter, see `Estimate`.
+        lacking: what is to be said of parts that the model lacks.
         colour: standard deviation of each parameter by the errors' autocorrelation, over that of white errors.
         residual: accelerations that the equations lack, kept or not; None: not asked for.
     """
@@ -67,6 +77,8 @@ class Solved:
     corrected: Array
     full_row: Array
     numbers: Mapping[str, float]
+    kinds: tuple[str, ...]
+    lacking: tuple[str, ...] = ()
     colour: Array = field(default_factory=lambda: np.ones(1))
     residual: LinearResidual | None = None
 
@@ -100,7 +112,8 @@ def solved_at(likelihood: Likelihood, optimum: Optimum, *, known: Array | None =
     Args:
         likelihood, optimum: what was sought, and where the search ended.
         known: information (p, p) that alone counts beside the records'; errors then may hold together over half an
-            octave (`accuracy.covariance_by_octaves`). None: that of all priors, and they do not.
+            octave (`accuracy.covariance_by_octaves`), and hold what the model may lack (`missing_parts`). None: that of
+            all priors, and they do not.
     """
     row = likelihood.row
     prior = row.prior(optimum.row)[2] if known is None else known
@@ -111,13 +124,27 @@ def solved_at(likelihood: Likelihood, optimum: Optimum, *, known: Array | None =
     white, sensitivities, rest = likelihood.whitened(optimum.row)
     lags = round(LAGS / likelihood.records[0].dt)
     corrected = accuracy.corrected_covariance(bound, rest + prior, white, sensitivities, lags=lags)
-    uncoloured, coloured = (np.diag(c)[row.places("parameter")] for c in (bound, corrected))
+    places = row.places("parameter")
+    kinds, lacking = (COLOURED,) * len(places), ()
+    uncoloured, coloured = (np.diag(c)[places] for c in (bound, corrected))
     colour = np.sqrt(np.divide(coloured, uncoloured, out=np.ones_like(uncoloured), where=uncoloured > 0.0))
     if known is not None:
         by_octaves = accuracy.covariance_by_octaves(bound, rest + prior, white, sensitivities)
+        widest = np.argmax([coloured, uncoloured, np.diag(by_octaves)[places]], axis=0)
+        kinds = tuple((COLOURED, WHITE, BY_OCTAVES)[i] for i in widest)
         corrected = accuracy.covering(corrected, bound, by_octaves)
+        parts = likelihood.missing_parts(optimum.row)
+        if parts is not None:
+            before = np.diag(corrected)[places]
+            shifts = shifts_by(parts, bound, rest + prior, white, sensitivities, lags=lags)
+            corrected = accuracy.covering(corrected, shifts.mean_square)
+            wider = np.diag(corrected)[places] > WIDER**2 * before
+            kinds = tuple(MODEL if more else kind for more, kind in zip(wider, kinds, strict=True))
+            lacking = shifts.warnings([row.names[i] for i in places], places, before)
     numbers = row.numbers(likelihood.sized(optimum.row))
-    return Solved(likelihood, likelihood, optimum, prior, bound, corrected, optimum.row, numbers, colour)
+    return Solved(
+        likelihood, likelihood, optimum, prior, bound, corrected, optimum.row, numbers, kinds, lacking, colour
+    )
 
 
 def solved_ahead(first: Solved, horizon: Horizon, solver: Solver, *, settling: float = 0.0) -> Solved:
@@ -134,7 +161,10 @@ def solved_ahead(first: Solved, horizon: Horizon, solver: Solver, *, settling: f
     corrected = TWICE * accuracy.corrected_covariance(bound, rest + prior, white, sensitivities, lags=criterion.lags)
     row = criterion.whole_row(optimum.row)
     numbers = likelihood.row.numbers(row)
-    return Solved(likelihood, criterion, optimum, prior, bound, corrected, row, numbers, first.colour)
+    kinds = (COLOURED,) * len(criterion.row.places("parameter"))
+    return Solved(
+        likelihood, criterion, optimum, prior, bound, corrected, row, numbers, kinds, first.lacking, first.colour
+    )
 
 
 def estimates_of(
@@ -173,6 +203,7 @@ def estimates_of(
                 prior_source=sources.get(entry.name, "") if held else "",
                 alone=alone,
                 disagreement=apart,
+                bound=solved.kinds[i],
             )
         )
     if table is not None:

@@ -28,11 +28,13 @@ from swashplate.identification.core.likelihood import (
     factor_of,
     gain_entries,
 )
+from swashplate.identification.core.missing_parts import MissingParts
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.first_gain import first_gain, kalman_gains
 from swashplate.identification.time.linear_simulation import driven
+from swashplate.identification.time.missing_answers import cross_controls, missing_answers
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.simulation.discretisation import first_order_hold
@@ -192,6 +194,27 @@ class LinearErrors(OwnCovariance):
             every = np.concatenate([places, noises])
             for part, slopes in slopes_along(base, tangents, inputs, later, errors, states):
                 yield MovedErrors(number, part, factor, every, slopes)
+
+    def missing_parts(self, row: Array) -> MissingParts | None:
+        batch, spread = self._stepped(row, NOTHING), np.std(np.concatenate([r.inputs for r in self.records]), axis=0)
+        a, b, *_ = systems = self._systems(batch)
+        delays = np.maximum(np.real(self._lags(batch[0])), 0.0)
+        crossed = cross_controls(np.real(b[0]), spread)
+        lagged = np.flatnonzero((delays > 0.0) & (spread > 0.0))
+        if not crossed and not lagged.size:
+            return None
+        slopes, factor = [], factor_of(self.covariance)
+        for number, record in enumerate(self.records):
+            stepped = self._coefficients(number, batch, systems)
+            base = Coefficients(*(np.ascontiguousarray(part[0].real) for part in stepped))
+            inputs = np.real(self._later(number, base.lag)[0])
+            answers = missing_answers(base, np.real(a[0]), inputs, record.dt, crossed, lagged, delays)
+            slopes.append(-Errors(number, answers[0], factor).whitened(answers))
+        if not all(np.isfinite(part).all() for part in slopes):  # a model that runs away from its records
+            return None
+        names = [f"{self.model.inputs[j]} acting on {self.model.states[k]}" for k, j, _ in crossed]
+        names += [f"a lag in the delay of {self.model.inputs[j]}" for j in lagged]
+        return MissingParts(tuple(names), tuple(slopes))
 
     def _places_of_record(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Places of the entries that move a record's errors: by more than the gain, and by the gain alone."""

@@ -202,6 +202,7 @@ class RecordProblem(Generic[Model]):
             problems,
             warnings=[
                 *_fit_warnings(free, solved.optimum),
+                *solved.lacking,
                 *_colour_words(self.method, solved.colour),
                 *self.warnings_of(estimates),
             ],
