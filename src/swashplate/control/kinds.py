@@ -21,10 +21,11 @@ from swashplate.control.analysis.margins import Margins
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry
-from swashplate.simulation.controller import Controller
+from swashplate.simulation.controller import Controller, DesignedLaw
 from swashplate.simulation.trim import Trim
 
 C = TypeVar("C", bound=Controller)
+D = TypeVar("D", bound=DesignedLaw)
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,19 @@ class ControllerKind(Generic[C]):
             ControllerError: where its step cannot be printed as C.
         """
         raise ControllerError("has no C of its own yet.", where=type(controller).__name__)
+
+
+class OneVehiclesKind(ControllerKind[D]):
+    """Of a law for one vehicle's equations, which knows the model of its design by the title only."""
+
+    def about(self, controller: D, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> D:
+        if controller.vehicle != vehicle.name:
+            raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
+        return controller.at(vehicle, trim)
+
+    def differences(self, controller: D, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
+        theirs = flying.vehicle.card.title
+        return () if controller.model == theirs else (f"Designed on '{controller.model}', flown on '{theirs}'.",)
 
 
 PLAIN: ControllerKind[Any] = ControllerKind()

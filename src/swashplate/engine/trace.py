@@ -14,6 +14,14 @@ from swashplate.physics.frames import Euler
 from swashplate.physics.quaternion import Quaternion, euler_of, quaternion_of
 
 
+def _rows_of(equations: Equations) -> tuple[Graph, Graph, Graph]:
+    """Symbols for the rows x, w and p of `dynamics.row_rates`."""
+    vehicle = equations.vehicle
+    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
+    x, w, p = (require_casadi().SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
+    return x, w, p
+
+
 def traced_rates(equations: Equations) -> Looped:
     """The rates as a function of (x, w, p, guess, root); rows as in `dynamics.row_rates`.
 
@@ -22,8 +30,7 @@ def traced_rates(equations: Equations) -> Looped:
         MissingLibraryError: without CasADi.
     """
     casadi, vehicle = require_casadi(), equations.vehicle
-    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
-    x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
+    x, w, p = _rows_of(equations)
     looping = Looping(casadi)
     try:
         return looping.looped([x, w, p], [casadi.vertcat(*vehicle.rates(x, *unpack_rows(equations, w, p), looping))])
@@ -34,10 +41,9 @@ def traced_rates(equations: Equations) -> Looped:
 def traced_force(equations: Equations) -> Graph:
     """The specific force [m/s^2] as a CasADi function of (x, w, p); rows and errors as in `traced_rates`."""
     casadi, vehicle = require_casadi(), equations.vehicle
-    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
-    x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
+    x, w, p = _rows_of(equations)
     u, parameters, environment = unpack_rows(equations, w, p)
-    state = rebuild(vehicle.state, [x[i] for i in range(sizes[0])])
+    state = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
     commands = vehicle.inputs(*(u[i] for i in range(len(vehicle.input_names))))
     try:
         felt = vehicle.specific_force(state, commands, parameters, environment, CasadiBackend())
@@ -71,8 +77,7 @@ def unrolled_rates(equations: Equations) -> Graph:
         MissingLibraryError: without CasADi.
     """
     casadi, vehicle = require_casadi(), equations.vehicle
-    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
-    x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
+    x, w, p = _rows_of(equations)
     try:
         rates = vehicle.rates(x, *unpack_rows(equations, w, p), CasadiBackend())
         return casadi.Function("rates", [x, w, p], [casadi.densify(casadi.vertcat(*rates))], {"cse": True})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from swashplate.engine.roots import require_casadi
 from swashplate.engine.symbols import SymbolArrays, expressions, symbols
 from swashplate.engine.untraced import untraced
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.trim import Trim
 
 Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
 """`(memory, measured, reference, gains, xp) -> (memory, commands)`, on rows of numbers or of symbols.
@@ -96,6 +97,26 @@ class StepController(Controller):
 
     def memory_of_law(self, seed: int | None = None) -> Array:
         return np.concatenate([self.memory, self.gains]).astype(np.float64)
+
+
+class DesignedLaw(StepController):
+    """One for one vehicle's equations.
+
+    Attributes:
+        vehicle: the name of the equations that it is for.
+        model: the title of the card that its numbers are from.
+    """
+
+    if TYPE_CHECKING:
+
+        @property
+        def vehicle(self) -> str: ...
+        @property
+        def model(self) -> str: ...
+
+    def at(self, vehicle: Vehicle, trim: Trim) -> Self:
+        """The same with a memory that holds that trim already, where it has one."""
+        return self
 
 
 def told_names(vehicle: Vehicle, drawn: int) -> tuple[str, ...]:

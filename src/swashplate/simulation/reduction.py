@@ -102,23 +102,23 @@ def paper_model(model: LinearModel, *, as_printed: bool = False) -> LinearModel:
     eight = part(residualise(model, PAPER_STATES), PAPER_STATES, PAPER_INPUTS)
     if not as_printed:
         return eight
-    known = model.trim.states()
-    A, B = eight.A.copy(), eight.B.copy()
-    index = {name: i for i, name in enumerate(PAPER_STATES)}
-    u, v, w = (known[name] for name in ("u", "v", "w"))
-    for row, column, value in (
-        ("u", "q", -w),
-        ("u", "r", v),
-        ("w", "q", u),
-        ("w", "p", -v),
-        ("v", "p", w),
-        ("v", "r", -u),
-    ):
-        A[index[row], index[column]] -= value
+    A, B = eight.A - kinematic_terms(eight), eight.B.copy()
     for i, (in_A, in_B) in enumerate(zip(_PRINTED_A, _PRINTED_B, strict=True)):
         A[i, [j for j, name in enumerate(PAPER_STATES) if name not in in_A.split()]] = 0.0
         B[i, [j for j, name in enumerate(PAPER_INPUTS) if name not in in_B.split()]] = 0.0
     return replace(eight, A=A, B=B)
+
+
+def kinematic_terms(model: LinearModel) -> Array:
+    """What forward flight alone puts into A (omega x v), shape (n, n)."""
+    trim, index = model.trim.states(), {name: i for i, name in enumerate(model.states)}
+    A = np.zeros_like(model.A)
+    for row, column, sign, of in (
+        ("u", "q", -1, "w"), ("u", "r", 1, "v"), ("w", "q", 1, "u"), ("w", "p", -1, "v"), ("v", "p", 1, "w"),
+        ("v", "r", -1, "u"),
+    ):  # fmt: skip
+        A[index[row], index[column]] = sign * trim[of]
+    return A
 
 
 FORMS = ("full", "paper", "printed", "longitudinal", "lateral", "flapping", "bar-and-gyro")
@@ -175,19 +175,7 @@ def omissions(model: LinearModel) -> tuple[Omission, ...]:
     The study behind the paper's remark that X_r may be excluded. Kinematic and gravity terms stay.
     """
     rows = dict(zip(("u", "v", "w", "p", "q", "r"), ROWS, strict=True))
-    known = model.trim.states()
-    kinematic = np.zeros_like(model.A)
-    index = {name: i for i, name in enumerate(model.states)}
-    u, v, w = (known[name] for name in ("u", "v", "w"))
-    for row, column, value in (
-        ("u", "q", -w),
-        ("u", "r", v),
-        ("w", "q", u),
-        ("w", "p", -v),
-        ("v", "p", w),
-        ("v", "r", -u),
-    ):
-        kinematic[index[row], index[column]] = value
+    kinematic, index = kinematic_terms(model), {name: i for i, name in enumerate(model.states)}
     nominal, response = np.linalg.eigvals(model.A).astype(complex), _responses(model.A, model.B, model)
     left_out = []
     for name, letter in rows.items():

@@ -29,7 +29,7 @@ from swashplate.models.coax import CoaxInputs
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend, Backend, Scalar
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.controller import Step, StepController
+from swashplate.simulation.controller import DesignedLaw, Step
 from swashplate.simulation.trim import Trim
 
 Mode = Literal["manual", "speed", "place"]
@@ -170,7 +170,7 @@ def _limited(value: Scalar, most: Scalar, xp: Backend) -> Scalar:
 
 
 @dataclass(frozen=True)
-class Autopilot(StepController):
+class Autopilot(DesignedLaw):
     """A controller for `simulate_closed_loop`.
 
     Attributes:

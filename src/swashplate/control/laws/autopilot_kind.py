@@ -7,17 +7,13 @@ from typing import Any, Literal
 import msgspec
 
 from swashplate import documents
-from swashplate.control.analysis.judged_loop import Aircraft
-from swashplate.control.analysis.margins import Margins
-from swashplate.control.kinds import ControllerKind, TracedStep
+from swashplate.control.kinds import OneVehiclesKind, TracedStep
 from swashplate.control.laws.autopilot import MODES, Autopilot, CyclicGains, Gains, Memory, Mode, Reference, step
 from swashplate.control.laws.decoupling import Decoupler
 from swashplate.control.laws.height_yaw import CoaxialRotors, HeightYawGains, HeightYawMemory
 from swashplate.errors import ControllerError
-from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.trim import Trim
 
 SCHEMA = 1
 _GROUPS: dict[str, Any] = {
@@ -52,20 +48,10 @@ _FILE: Any = msgspec.defstruct(
 )
 
 
-class AutopilotKind(ControllerKind[Autopilot]):
+class AutopilotKind(OneVehiclesKind[Autopilot]):
     """The autopilot of a coaxial helicopter, fed with the states."""
 
     every_mode = True
-
-    def about(self, controller: Autopilot, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> Autopilot:
-        if controller.vehicle != vehicle.name:
-            raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
-        return controller
-
-    def differences(self, controller: Autopilot, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
-        """The model of the design is known by its title only."""
-        designed_on, theirs = controller.model, flying.vehicle.card.title
-        return () if designed_on == theirs else (f"Designed on '{designed_on}', flown on '{theirs}'.",)
 
     def to_document(self, controller: Autopilot) -> dict[str, Any]:
         return {

@@ -8,16 +8,12 @@ from typing import Any, Literal
 import msgspec
 
 from swashplate import documents
-from swashplate.control.analysis.judged_loop import Aircraft
-from swashplate.control.analysis.margins import Margins
-from swashplate.control.kinds import ControllerKind
+from swashplate.control.kinds import OneVehiclesKind
 from swashplate.control.laws.ardupilot.law import ArduPilotLaw, FlightMode
 from swashplate.control.laws.ardupilot.mixers import FRAMES
 from swashplate.control.laws.ardupilot.outputs import LawFirmware
 from swashplate.control.laws.ardupilot.parameters import DEFAULTS, known
 from swashplate.errors import ControllerError
-from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.trim import Trim
 
 SCHEMA = 1
 _RATES = (50.0, 2000.0)
@@ -38,17 +34,8 @@ class _LawFile(msgspec.Struct, forbid_unknown_fields=True):
     parameters: dict[str, float]
 
 
-class ArduPilotKind(ControllerKind[ArduPilotLaw]):
+class ArduPilotKind(OneVehiclesKind[ArduPilotLaw]):
     """ArduPilot's cascade, fed with the states; it starts with integrals that hold the trim."""
-
-    def about(self, controller: ArduPilotLaw, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> ArduPilotLaw:
-        if controller.vehicle != vehicle.name:
-            raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
-        return controller.at(vehicle, trim)
-
-    def differences(self, controller: ArduPilotLaw, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
-        designed_on, theirs = controller.model, flying.vehicle.card.title
-        return () if designed_on == theirs else (f"Designed on '{designed_on}', flown on '{theirs}'.",)
 
     def to_document(self, controller: ArduPilotLaw) -> dict[str, Any]:
         return {

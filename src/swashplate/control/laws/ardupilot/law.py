@@ -23,7 +23,7 @@ from swashplate.engine.symbols import ArrayFunctions, Operand, Symbols
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.controller import Step, StepController
+from swashplate.simulation.controller import DesignedLaw, Step
 from swashplate.simulation.trim import Trim
 
 FlightMode = Literal["stabilize", "alt_hold", "loiter"]
@@ -53,7 +53,7 @@ _TURNING = tuple(np.radians([(40.0, 720.0), (40.0, 720.0), (10.0, 120.0)]).T)
 
 
 @dataclass(frozen=True)
-class ArduPilotLaw(StepController):
+class ArduPilotLaw(DesignedLaw):
     """A controller for `simulate_closed_loop`.
 
     Attributes:

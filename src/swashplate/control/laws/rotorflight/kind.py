@@ -8,14 +8,10 @@ from typing import Any, Literal
 import msgspec
 
 from swashplate import documents
-from swashplate.control.analysis.judged_loop import Aircraft
-from swashplate.control.analysis.margins import Margins
-from swashplate.control.kinds import ControllerKind
+from swashplate.control.kinds import OneVehiclesKind
 from swashplate.control.laws.rotorflight.law import Rigging, RotorflightLaw, RotorflightMode, SticksPilot
 from swashplate.control.laws.rotorflight.parameters import DEFAULTS, known
 from swashplate.errors import ControllerError
-from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.trim import Trim
 
 SCHEMA = 1
 _RATES = (250.0, 4000.0)
@@ -35,17 +31,8 @@ class _LawFile(msgspec.Struct, forbid_unknown_fields=True):
     parameters: dict[str, float]
 
 
-class RotorflightKind(ControllerKind[RotorflightLaw]):
+class RotorflightKind(OneVehiclesKind[RotorflightLaw]):
     """Rotorflight's rate loops with a pilot, fed with the states; it starts with integrals that hold the trim."""
-
-    def about(self, controller: RotorflightLaw, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> RotorflightLaw:
-        if controller.vehicle != vehicle.name:
-            raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
-        return controller.at(vehicle, trim)
-
-    def differences(self, controller: RotorflightLaw, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
-        designed_on, theirs = controller.model, flying.vehicle.card.title
-        return () if designed_on == theirs else (f"Designed on '{designed_on}', flown on '{theirs}'.",)
 
     def to_document(self, controller: RotorflightLaw) -> dict[str, Any]:
         return {

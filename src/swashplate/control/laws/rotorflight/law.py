@@ -26,7 +26,7 @@ from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.controller import Step, StepController
+from swashplate.simulation.controller import DesignedLaw, Step
 from swashplate.simulation.trim import Trim
 
 RotorflightMode = Literal["angle", "hover"]
@@ -85,7 +85,7 @@ class SticksPilot(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RotorflightLaw(StepController):
+class RotorflightLaw(DesignedLaw):
     """A controller for `simulate_closed_loop`.
 
     Attributes:
