@@ -7,9 +7,6 @@ its client; RC comes by UDP on 5501; servo packets go to UDP 9002. Logs and para
 
 from __future__ import annotations
 
-import contextlib
-import os
-import signal
 import socket
 import subprocess
 import time
@@ -17,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from swashplate.errors import LinkError
-from swashplate.systems import end_with_children
+from swashplate.links.sitl_binary import SitlBinary
 
 MAVLINK_PORT, RC_PORT, PHYSICS_PORT = 5760, 5501, 9002
 """Of instance 0."""
@@ -27,11 +24,9 @@ _OTHERS = (2, 3)
 _HOME = "-35.363261,149.165230"
 """Where ArduPilot's own tests fly; the altitude is the vehicle's, because multicopters divide commands by the air's
 density there (Thrust_Linearization::get_compensation_gain): 0.5 dB at the 584 m of that place."""
-_PATIENCE = 3.0
-"""s that it has to end by itself."""
 
 
-class Sitl:
+class Sitl(SitlBinary):
     """A binary in a folder of its own; used as a context, it is ended whatever happens.
 
     Args:
@@ -46,6 +41,8 @@ class Sitl:
         LinkError: where the binary is missing or cannot be run, or one of its ports is taken.
     """
 
+    taken = ("--instance", "Another SITL runs? Stop it, or give another --instance: it moves all ports by 10.")
+
     def __init__(
         self,
         binary: str | Path,
@@ -56,7 +53,7 @@ class Sitl:
         speedup: float = 10.0,
         altitude: float = 0.0,
     ) -> None:
-        self.binary, self.folder = _runnable(Path(binary)), folder
+        super().__init__(binary, folder, of="ArduCopter's")
         shift = _PER_INSTANCE * instance
         self.mavlink_port, self.rc_port = MAVLINK_PORT + shift, RC_PORT + shift
         self.physics_port = PHYSICS_PORT + shift
@@ -65,9 +62,8 @@ class Sitl:
             "-I", str(instance), "--home", f"{_HOME},{altitude:.0f},0", "--speedup", f"{speedup:g}",
         ]  # fmt: skip
         for port in (self.mavlink_port, *(self.mavlink_port + k for k in _OTHERS)):
-            _check_free(socket.SOCK_STREAM, port)
-        _check_free(socket.SOCK_DGRAM, self.rc_port)
-        self._process: subprocess.Popen[bytes] | None = None
+            self.check_free(socket.SOCK_STREAM, port)
+        self.check_free(socket.SOCK_DGRAM, self.rc_port)
 
     @property
     def output(self) -> Path:
@@ -94,40 +90,11 @@ class Sitl:
             ) from None
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    def stop(self) -> None:
-        """End it and everything that it started."""
-        if self._process is None:
-            return
-        for at_once in (False, True):
-            end_with_children(self._process, at_once=at_once)
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(None if at_once else _PATIENCE)
-
-    def ended(self, *, patience: float = 0.0) -> str:
-        """How it ended, with its last words; empty where it still runs after `patience` [s]."""
-        if self._process is None:
-            return ""
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(patience)
-        code = self._process.poll()
-        if code is None:
-            return ""
-        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        text = self.last_words()
-        ending = f"; its last words: {text.rstrip('.')}" if text else "; it said nothing"
-        return f"the binary ended {how}{ending}."
-
-    def last_words(self, lines: int = 4) -> str:
-        """The end of what it printed, in one line."""
+    def text(self) -> str:
         try:
-            text = self.output.read_bytes()[-4000:].decode("utf-8", "replace")
+            return self.output.read_bytes()[-4000:].decode("utf-8", "replace")
         except OSError:
             return ""
-        printable = "".join(letter if letter.isprintable() else "\n" for letter in text)
-        return " / ".join([line.strip() for line in printable.splitlines() if line.strip()][-lines:])[-400:]
 
     def wait_for_port(self, timeout: float) -> None:
         """Until SERIAL0 is opened.
@@ -162,29 +129,3 @@ def _listens(port: int) -> bool:
         except OSError:
             return True
     return False
-
-
-def _check_free(kind: socket.SocketKind, port: int) -> None:
-    name = "TCP" if kind is socket.SOCK_STREAM else "UDP"
-    with socket.socket(socket.AF_INET, kind) as probe:
-        if kind is socket.SOCK_STREAM:  # a connection that was just closed does not hold it
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("0.0.0.0", port))
-        except OSError:
-            raise LinkError(
-                f"{name} port {port} is in use by another program.",
-                channel="--instance",
-                hint="Another SITL runs? Stop it, or give another --instance: it moves all ports by 10.",
-            ) from None
-
-
-def _runnable(binary: Path) -> Path:
-    path = binary.expanduser().absolute()
-    if not path.exists():
-        raise LinkError("there is no such file.", where=binary, channel="BINARY")
-    if not path.is_file():
-        raise LinkError("is no file, expected ArduCopter's SITL binary.", where=binary, channel="BINARY")
-    if not os.access(path, os.X_OK):
-        raise LinkError("is not executable.", where=binary, channel="BINARY", hint=f"chmod +x {binary}")
-    return path

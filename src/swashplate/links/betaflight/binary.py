@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import signal
 import socket
 import subprocess
 import threading
@@ -19,17 +18,15 @@ from pathlib import Path
 
 from swashplate.errors import LinkError
 from swashplate.links.betaflight.packets import MSP_PORT, STATE_PORT, STICKS_PORT
-from swashplate.systems import end_with_children
+from swashplate.links.sitl_binary import PATIENCE, SitlBinary
 
-_PATIENCE = 2.0
-"""s that it has to end by itself."""
 _CONFIGURED = "EEPROM saved"
 _UP, _SETTLING = f"bind port {MSP_PORT}", 0.5
 """What it prints once its ports are open, and how long its sensors take from there [s]."""
 _CLOCK = re.compile(rb"\[SITL\] t=(\d+)ms  spd")
 
 
-class BetaflightBinary:
+class BetaflightBinary(SitlBinary):
     """A binary in a folder; used as a context, it is ended whatever happens.
 
     Args:
@@ -43,16 +40,18 @@ class BetaflightBinary:
         LinkError: where the binary is missing or is no program, or one of its ports is taken.
     """
 
+    taken = ("BINARY", "Another SITL runs? Stop it: Betaflight's ports cannot be moved.")
+    repeats = "[FLASH_Program"
+
     def __init__(self, binary: str | Path, folder: Path) -> None:
-        self.binary, self.folder = _runnable(Path(binary)), folder
+        super().__init__(binary, folder, of="Betaflight's")
         self.before: Path | None = None
         for kind, port in (
             (socket.SOCK_DGRAM, STATE_PORT),
             (socket.SOCK_DGRAM, STICKS_PORT),
             (socket.SOCK_STREAM, MSP_PORT),
         ):
-            _check_free(kind, port)
-        self._process: subprocess.Popen[bytes] | None = None
+            self.check_free(kind, port)
         self._told = bytearray()
         self.clock = 0.0
 
@@ -70,7 +69,7 @@ class BetaflightBinary:
             time.sleep(0.05)
         over = bool(self.ended(patience=0.2))
         self.stop()
-        self._heard.join(_PATIENCE)
+        self._heard.join(PATIENCE)
         said = self.text()
         if not over or _CONFIGURED not in said:
             why = f"within {timeout:g} s" if not over else "and ended"
@@ -88,7 +87,7 @@ class BetaflightBinary:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.stop()
+        super().__exit__()
         (self.folder / "sitl.txt").write_bytes(bytes(self._told))
 
     def _start(self, *arguments: str) -> None:
@@ -118,36 +117,8 @@ class BetaflightBinary:
                     self.clock = 1e-3 * float(times[-1])
         os.close(terminal)
 
-    def stop(self) -> None:
-        """End it and everything that it started."""
-        if self._process is None:
-            return
-        for at_once in (False, True):
-            end_with_children(self._process, at_once=at_once)
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(None if at_once else _PATIENCE)
-
-    def ended(self, *, patience: float = 0.0) -> str:
-        """How it ended, with its last words; empty where it still runs after `patience` [s]."""
-        if self._process is None:
-            return ""
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(patience)
-        code = self._process.poll()
-        if code is None:
-            return ""
-        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        return f"the binary ended {how}; its last words: {self.last_words() or 'none'}."
-
     def text(self) -> str:
-        """All that it printed."""
         return bytes(self._told).decode("utf-8", "replace")
-
-    def last_words(self, lines: int = 3) -> str:
-        """The end of what it printed, in one line."""
-        said = "".join(letter if letter.isprintable() else "\n" for letter in self.text()[-4000:])
-        kept = [line.strip() for line in said.splitlines() if line.strip() and not line.startswith("[FLASH_Program")]
-        return " / ".join(kept[-lines:])[-400:]
 
     def wait_until_up(self, timeout: float) -> None:
         """Until it has opened its ports: a state that comes before ends it.
@@ -200,29 +171,3 @@ def wait_for_sitl(seconds: float) -> None:
         channel="wait",
         hint="Start it in another terminal; its MSP port says that it is up.",
     )
-
-
-def _runnable(binary: Path) -> Path:
-    path = binary.expanduser().absolute()
-    if not path.exists():
-        raise LinkError("there is no such file.", where=binary, channel="BINARY")
-    if not path.is_file():
-        raise LinkError("is no file, expected Betaflight's SITL binary.", where=binary, channel="BINARY")
-    if not os.access(path, os.X_OK):
-        raise LinkError("is not executable.", where=binary, channel="BINARY", hint=f"chmod +x {binary}")
-    return path
-
-
-def _check_free(kind: socket.SocketKind, port: int) -> None:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        if kind is socket.SOCK_STREAM:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("0.0.0.0", port))
-        except OSError:
-            name = "TCP" if kind is socket.SOCK_STREAM else "UDP"
-            raise LinkError(
-                f"{name} port {port} is in use by another program.",
-                channel="BINARY",
-                hint="Another SITL runs? Stop it: Betaflight's ports cannot be moved.",
-            ) from None
