@@ -175,10 +175,10 @@ _CODES = {
 def _error_text(part: int, code: int) -> str:
     """What an ERR message says. Of a mode that was refused and of the EKF's core the code is a number, 0 included."""
     if part in (10, 24):
-        told = f"{'mode' if part == 10 else 'core'} {code}"
+        meaning = f"{'mode' if part == 10 else 'core'} {code}"
     else:
-        told = _CODES.get((part, code), f"code {code}") if code else "over"
-    return f"{_SUBSYSTEMS.get(part, f'subsystem {part}')}: {told}"
+        meaning = _CODES.get((part, code), f"code {code}") if code else "over"
+    return f"{_SUBSYSTEMS.get(part, f'subsystem {part}')}: {meaning}"
 
 
 def _errors(messages: Messages) -> list[Event]:
