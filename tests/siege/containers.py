@@ -39,7 +39,7 @@ from swashplate.flights.readers.blackbox_frames import find_frames
 from swashplate.flights.readers.blackbox_header import read_header
 from swashplate.flights.readers.blackbox_values import main_frames
 from swashplate.flights.readers.source import Source
-from swashplate.flights.readers.ulog import decoded
+from swashplate.flights.readers.ulog_topics import Topics
 
 from . import forged, targets
 from .forged import Mutate, by_records
@@ -103,9 +103,8 @@ def _messages(found: dataflash.Messages) -> object:
 
 def _ulog(content: bytes, path: Path) -> object:
     _refuse_unknown(content.startswith(ulog_messages.MAGIC))
-    whole = ulog_messages.whole_messages(content)
-    log = decoded(whole.content, str(path))
-    return whole.lost > 0, whole.unfinished > 0, log.file_corruption, sorted({d.name for d in log.data_list})
+    log = Topics(content, str(path))
+    return log.lost > 0, log.unfinished > 0, log.log.file_corruption, sorted({topic.name for topic in log.topics})
 
 
 def _blackbox(content: bytes, path: Path) -> object:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import errno
 import json
-import mmap
 import os
 import struct
 import zlib
@@ -164,7 +163,7 @@ class Abandoned:
 
 
 def load(path: str | Path) -> Flight:
-    """The flight in a growing file, its numbers mapped from the file instead of held in memory.
+    """The flight in a growing file: read, not mapped, for a mapped file that is cut off ends the process.
 
     Raises:
         FlightError: as `parse`, and where the file is missing or empty.
@@ -173,15 +172,15 @@ def load(path: str | Path) -> Flight:
     try:
         if not place.is_file():
             raise OSError(errno.ENOENT, "there is no such file")
-        with place.open("rb") as file:
-            content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "the file is empty"
-        raise FlightError(f"cannot be read: {reason}.", where=place) from None
+        content = place.read_bytes()
+        if not content:
+            raise OSError(errno.ENODATA, "the file is empty")
+    except OSError as error:
+        raise FlightError(f"cannot be read: {error.strerror}.", where=place) from None
     return parse(content, where=str(place))
 
 
-def parse(content: bytes | mmap.mmap, *, where: str) -> Flight:
+def parse(content: bytes, *, where: str) -> Flight:
     """The flight in a growing file's bytes: every sample that is whole. What is not is told in `provenance.damage`.
 
     Args:
@@ -227,7 +226,7 @@ def _checked(part: Any, schema: type[Schema], where: str | Path, at: str) -> Sch
     return documents.parse_logged(json.dumps(part), schema, where=where, at=at, error=FlightError)
 
 
-def _complete_rows(content: bytes | mmap.mmap, start: int, *, width: int) -> tuple[NDArray[np.float64], list[str]]:
+def _complete_rows(content: bytes, start: int, *, width: int) -> tuple[NDArray[np.float64], list[str]]:
     """The rows whose check sums are right, shape (n, width), and words about the others."""
     kind = np.dtype([("crc", "<u4"), ("number", "<u4"), ("row", "<f8", (width,))])
     count, torn = divmod(len(content) - start, kind.itemsize)

@@ -163,6 +163,13 @@ def test_a_killed_program_leaves_all_it_appended_and_the_lock_tells_alive_from_d
     assert np.array_equal(read.values("bar_angle"), np.arange(read.values("p").size))
 
 
+def test_a_file_that_is_cut_off_after_it_was_read_ends_nothing(tmp_path: Path) -> None:
+    flight = grown(tmp_path / "a.growing", 5000)
+    loaded = growing.load(tmp_path / "a.growing")
+    os.truncate(tmp_path / "a.growing", 100)  # numbers mapped from it would end this process now
+    the_same(loaded, flight)
+
+
 def test_a_newer_schema_and_doubled_columns_are_refused(tmp_path: Path) -> None:
     grown(tmp_path / "a.growing", 5)
     content = (tmp_path / "a.growing").read_bytes()

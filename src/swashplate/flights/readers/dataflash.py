@@ -18,7 +18,6 @@ from swashplate.flights.readers.source import Places, Stored, part
 from swashplate.flights.stored_column import StoredColumn
 
 _BLOCKS = (1 << 20, 1 << 23)  # bytes that are decoded at a time: at least, at most; else the log's sixteenth part
-_LONGEST = 255  # bytes of a message
 
 
 @dataclass(frozen=True)
@@ -97,12 +96,34 @@ def decoded(content: Stored, wanted: Sequence[Wanted]) -> list[dict[str, NDArray
 
     The file is gone through once for all of them.
     """
+    columns = [
+        {name: np.empty((at.size, *dtype.shape), dtype.base) for name in names for dtype in kind.place(name)[:1]}
+        for kind, at, names in wanted
+    ]
+    for which, chosen, records in _blocks(content, wanted):
+        for name, array in columns[which].items():
+            array[chosen] = records[name]
+    return columns
+
+
+def latest(content: Stored, wanted: Sequence[Wanted], edges: Places) -> NDArray[np.uint64]:
+    """The largest number of the one field that is wanted of each, before each of some places in the file; 0 if none."""
+    largest = np.zeros(edges.size + 1, np.uint64)
+    for which, chosen, records in _blocks(content, wanted):
+        _, at, (name,) = wanted[which]
+        before = np.searchsorted(edges, at[chosen])
+        begins = np.flatnonzero(np.diff(before, prepend=-1))
+        segments = before[begins]
+        largest[segments] = np.maximum(largest[segments], np.maximum.reduceat(records[name], begins))
+    return np.maximum.accumulate(largest)[:-1]
+
+
+def _blocks(content: Stored, wanted: Sequence[Wanted]) -> Iterator[tuple[int, slice, NDArray[np.void]]]:
+    """Which of the wanted, which of its messages, and their fields, block of the file by block."""
     block_size = int(np.clip(len(content) >> 4, *_BLOCKS))
-    columns, tasks = list[dict[str, NDArray[np.generic]]](), []
-    for kind, at, names in wanted:
+    tasks, longest = list[tuple[int, Places, int, np.dtype[np.void], list[int]]](), 0
+    for which, (kind, at, names) in enumerate(wanted):
         places = [kind.place(name) for name in names]
-        arrays = [np.empty((at.size, *dtype.shape), dtype.base) for dtype, _ in places]
-        columns.append(dict(zip(names, arrays, strict=True)))
         if not at.size or not names:
             continue
         begin = min(offset for _, offset in places)
@@ -116,21 +137,27 @@ def decoded(content: Stored, wanted: Sequence[Wanted]) -> list[dict[str, NDArray
             }
         )
         edges = np.searchsorted(at, np.arange(0, len(content) + block_size, block_size, dtype=at.dtype)).tolist()
-        tasks.append((at, begin + 3, record, arrays, edges))
+        tasks.append((which, at, kind.head + begin, record, edges))
+        longest = max(longest, kind.head + begin + size)
     for span in range(-(-len(content) // block_size)):
         here = [task for task in tasks if task[-1][span] < task[-1][span + 1]]
         if not here:
             continue
         first = span * block_size
-        block = part(content, first, first + block_size + _LONGEST)  # the last message may reach over
-        for at, offset, record, arrays, edges in here:
+        block = part(content, first, first + block_size + longest)  # the last message may reach over
+        for which, at, offset, record, edges in here:
             chosen = slice(edges[span], edges[span + 1])
             size = record.itemsize
             rows = np.ndarray((len(block) - size + 1,), f"V{size}", block, strides=(1,))
-            records = rows[at[chosen].astype(np.intp) + (offset - first)].view(record)
-            for name, array in zip(record.names or (), arrays, strict=True):
-                array[chosen] = records[name]
-    return columns
+            yield which, chosen, rows[at[chosen].astype(np.intp) + (offset - first)].view(record)
+
+
+def tables(content: Stored, wanted: Sequence[Wanted]) -> list[MessageTable]:
+    """The messages of each that is wanted, with what is wanted of them at hand and the rest decoded when asked for."""
+    return [
+        MessageTable(_Columns(content, one.kind, one.at, fields), one.at)
+        for one, fields in zip(wanted, decoded(content, wanted), strict=True)
+    ]
 
 
 def kinds(content: Stored) -> list[MessageKind]:
@@ -195,10 +222,7 @@ def messages(content: Stored, at_hand: Mapping[str, Iterable[str]] | None = None
         Wanted(kind, kind.at, [field for field in kind.factors if field in every | asked.get(name, frozenset())])
         for name, kind in there.items()
     ]
-    tables = {
-        one.kind.name: MessageTable(_Columns(content, one.kind, one.at, fields), one.at)
-        for one, fields in zip(wanted, decoded(content, wanted), strict=True)
-    }
+    by_name = {one.kind.name: table for one, table in zip(wanted, tables(content, wanted), strict=True)}
     notes, damage = [], []
     if scan.unfinished:
         notes.append(f"the last {scan.unfinished} bytes are an unfinished message or an unused block: not read")
@@ -209,4 +233,4 @@ def messages(content: Stored, at_hand: Mapping[str, Iterable[str]] | None = None
             f"{count} bytes at {len(scan.lost)} {places} belong to no message (the first at byte {scan.lost[0][0]}): "
             "they were skipped"
         )
-    return Messages(tables, tuple(notes), tuple(damage))
+    return Messages(by_name, tuple(notes), tuple(damage))

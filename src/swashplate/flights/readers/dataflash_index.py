@@ -17,13 +17,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.flights.readers.joined_heads import SOME, JoinedHeads
 from swashplate.flights.readers.source import Places, Stored, part
 
 HEAD = b"\xa3\x95"
 FMT = 128
 _FMT_LENGTH = 89
 _CHUNK = 1 << 18  # bytes that are looked through for heads at a time: they stay in the processor's cache
-_HEADS = 1 << 16  # heads that are sorted by type at a time
 _USUAL = 40  # bytes of a message: where they are shorter, the room for heads grows
 _FMT_FIELDS = np.dtype([("type", "u1"), ("length", "u1"), ("name", "S4"), ("format", "S16"), ("columns", "S64")])
 
@@ -44,7 +44,7 @@ class MessageKind:
     Attributes:
         number, name: of the type. dtype: of its payload. factors: what stored numbers are multiplied by, by field.
         letters: the log's own word for each field's type.
-        at: bytes from the file's begin to each message.
+        at: bytes from the file's begin to each message. head: bytes in front of its payload.
     """
 
     number: int
@@ -53,6 +53,7 @@ class MessageKind:
     factors: Mapping[str, float]
     letters: Mapping[str, str]
     at: Places = field(default_factory=lambda: np.zeros(0, dtype=np.uint32))
+    head: int = 3
 
     def place(self, name: str) -> tuple[np.dtype[np.generic], int]:
         """A field's type, and the bytes before it in the payload."""
@@ -83,11 +84,10 @@ def _described(content: Stored, at: int) -> tuple[int, int, MessageKind | None]:
     return kind, length, MessageKind(kind, name, dtype, factors, dict(zip(columns, letters, strict=True)))
 
 
-class _Chain:
+class _Chain(JoinedHeads):
     """Heads all at once, each joined to the one at which its message ends.
 
     Attributes:
-        heads, numbers: where each head stands, and the type behind it.
         kinds, lengths: types as they are described, where every one is described before it is used; else neither, and
             the chain joins nothing.
     """
@@ -96,10 +96,10 @@ class _Chain:
         self.kinds: dict[int, MessageKind] = {}
         self.lengths = [0] * 256
         self.lengths[FMT] = _FMT_LENGTH
-        self.heads, self.numbers = _heads(content)
+        heads, numbers = _heads(content)
         begins: dict[int, int] = {}
         described_twice = False
-        for at in self.heads[self.numbers == FMT].tolist():
+        for at in heads[numbers == FMT].tolist():
             if content[at + _FMT_LENGTH : at + _FMT_LENGTH + 2] != HEAD:
                 continue  # torn
             kind, length, described = _described(content, at)
@@ -110,45 +110,15 @@ class _Chain:
             self.lengths[kind] = length
             if described is not None:
                 self.kinds.setdefault(kind, described)
-        self._join()
+        super().__init__(heads, numbers, np.array(self.lengths, dtype=np.uint32))
         if described_twice or any(self._used_before(kind, begin) for kind, begin in begins.items()):
             self.kinds, self.lengths = {}, [0 if kind != FMT else _FMT_LENGTH for kind in range(256)]
             self._joined[:] = False
-
-    def _join(self) -> None:
-        lengths = np.array(self.lengths, dtype=np.uint32)
-        self._joined = np.zeros(self.heads.size, dtype=np.bool_)
-        for start in range(0, self.heads.size - 1, _HEADS):
-            heads = self.heads[start : start + _HEADS + 1]
-            after = lengths.take(self.numbers[start : start + heads.size - 1])
-            after += heads[:-1]
-            np.equal(after, heads[1:], out=self._joined[start : start + heads.size - 1])
-        # The others may be joined to a later head, over what only looks like one.
-        self._breaks = np.flatnonzero(~self._joined)
-        ends = self.heads[self._breaks] + lengths[self.numbers[self._breaks]]
-        self._following = np.searchsorted(self.heads, ends)
-        inside = (self._following < self.heads.size) & (ends > self.heads[self._breaks])
-        self._joined[self._breaks[inside]] = self.heads[self._following[inside]] == ends[inside]
 
     def _used_before(self, kind: int, begin: int) -> bool:
         """Whether a joined message of a type stands before the type's description."""
         before = int(np.searchsorted(self.heads, np.uint32(begin)))
         return bool(np.any((self.numbers[:before] == kind) & self._joined[:before]))
-
-    def run(self, at: int) -> tuple[list[tuple[int, int]], int]:
-        """Rows of heads (from, to) that follow each other from a byte on, and the byte behind them."""
-        index = int(np.searchsorted(self.heads, np.uint32(at)))
-        if index >= self.heads.size or self.heads[index] != at or not self._joined[index]:
-            return [], at
-        rows = []
-        while True:  # from one break to the next
-            one = int(np.searchsorted(self._breaks, index))
-            stop = int(self._breaks[one])
-            if not self._joined[stop]:
-                rows.append((index, stop))
-                return rows, int(self.heads[stop])
-            rows.append((index, stop + 1))
-            index = int(self._following[one])
 
 
 class Scan:
@@ -236,7 +206,7 @@ def _filled(content: Stored, filler: bytes) -> int:
 def _heads(content: Stored) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
     """Where the two bytes of a head stand with a byte behind them, and that byte: the type."""
     # Room that is not filled is not taken from the system, and pieces that are joined later would be there twice.
-    room = _HEADS + len(content) // _USUAL
+    room = SOME + len(content) // _USUAL
     heads, numbers = np.empty(room, np.uint32), np.empty(room, np.uint8)
     count = 0
     for begin in range(0, len(content) - 2, _CHUNK):
@@ -262,7 +232,7 @@ def _by_type(chain: _Chain, rows: list[tuple[int, int]]) -> dict[int, NDArray[np
     chosen = np.zeros(chain.heads.size, dtype=np.bool_)
     for start, stop in rows:
         chosen[start:stop] = True
-    parts = [slice(start, start + _HEADS) for start in range(0, chosen.size, _HEADS)]
+    parts = [slice(start, start + SOME) for start in range(0, chosen.size, SOME)]
     counts = [np.bincount(chain.numbers[here][chosen[here]], minlength=256) for here in parts]
     total = np.sum(np.array(counts, np.int64).reshape(-1, 256), axis=0)
     by_type = {number: np.empty(size, np.uint32) for number, size in enumerate(total.tolist()) if size}

@@ -11,8 +11,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
@@ -20,7 +22,8 @@ from swashplate.flights.readers import clocked, dataflash, dataflash_text, rosba
 from swashplate.flights.readers.ardupilot_events import seconds
 from swashplate.flights.readers.dataflash import MessageTable, Wanted
 from swashplate.flights.readers.dataflash_index import MessageKind, is_dataflash
-from swashplate.flights.readers.source import Places, Stored, open_source
+from swashplate.flights.readers.source import Places, Source, Stored, open_source
+from swashplate.flights.readers.ulog_topics import Topics
 from swashplate.flights.stored_column import StoredColumn
 
 _INSTANCES = ("I", "C", "Inst", "Instance", "IMU")
@@ -28,6 +31,7 @@ _MOST_INSTANCES, _INSTANCE = 16, "instance"
 _FOR_RATE = 1 << 16
 """Messages of which a rate is the median."""
 _STAMPS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
+_TICKS = {**_STAMPS, "timestamp": 1e-6}
 _DESCRIBE = frozenset(("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "FILE"))
 _FACTORED = frozenset("cCeEL")
 
@@ -85,10 +89,10 @@ def log_fields(path: Path) -> LogFields | None:
     """The fields of a log; None for a kind of file whose every column is a channel already, or that cannot be read."""
     with contextlib.suppress(SwashError):
         source = open_source(path)
+        if ulog.recognises(source):
+            return _topics(path, source)
         if is_dataflash(source.stored):
-            return _Binary(path, source.stored)
-        if source.content.startswith(ulog.MAGIC):
-            return _Decoded(_topics(source.content, source.name))
+            return _messages(path, source.stored)
         if rosbag.recognises(source):
             return _Decoded(rosbag.fields_of(source))
         if tlog.recognises(source):
@@ -121,28 +125,16 @@ class _Part:
 
 
 class _Binary(LogFields):
-    def __init__(self, path: Path, content: Stored) -> None:
-        kinds = {kind.name: kind for kind in reversed(dataflash.kinds(content)) if kind.at.size}
+    def __init__(self, path: Path, content: Stored, parts: Mapping[str, _Part], clock: MessageKind | None) -> None:
         self._path, self._state = path, _state(path)
-        units = _units(content, kinds)
-        shown = {name: kind for name, kind in kinds.items() if name not in _DESCRIBE}
-        sensors = _sensors(content, shown, units)
-        clock = kinds.get("TIME")
-        self._clock = clock if clock is not None and "StartTime" in clock.factors else None
-        self._parts: dict[str, _Part] = {}
-        for name, kind in shown.items():
-            stamp = next((stamp for stamp in _STAMPS if stamp in kind.factors), "")
-            if not stamp and self._clock is None:
-                continue
-            for which, at in sensors[name]:
-                called = name if which is None else f"{name}[{which}]"
-                self._parts[called] = _Part(replace(kind, at=at), at, stamp, units.get(name, {}))
+        self._parts, self._clock = parts, clock
         rates = self._rates(content)
         fields = [
             LogField(name, field, part.units.get(field, ("", 1.0))[0], part.at.size, rates[name])
             for name, part in self._parts.items()
             for field in part.kind.factors
             if part.kind.place(field)[0].kind in "fiu"
+            and field != part.stamp
             and field not in _STAMPS
             and part.units.get(field, ("",))[0] != _INSTANCE
         ]
@@ -166,7 +158,7 @@ class _Binary(LogFields):
         times = []
         for part, stored in zip(parts, stamps, strict=False):
             if part.stamp:
-                times.append(np.asarray(stored[part.stamp], dtype=np.float64) * _STAMPS[part.stamp])
+                times.append(np.asarray(stored[part.stamp], dtype=np.float64) * _TICKS[part.stamp])
                 continue
             assert clock is not None
             before = np.searchsorted(clock.at, part.at) - 1
@@ -184,6 +176,41 @@ class _Binary(LogFields):
         (values,) = dataflash.decoded(content, [Wanted(part.kind, part.at, [field.field])])
         factors = (part.kind.factors[field.field], part.units.get(field.field, ("", 1.0))[1])
         return part.at, time, StoredColumn(values[field.field], *factors)
+
+
+def _messages(path: Path, content: Stored) -> _Binary:
+    """The fields of a DataFlash log."""
+    kinds = {kind.name: kind for kind in reversed(dataflash.kinds(content)) if kind.at.size}
+    units = _units(content, kinds)
+    shown = {name: kind for name, kind in kinds.items() if name not in _DESCRIBE}
+    sensors = _sensors(content, shown, units)
+    clock = kinds.get("TIME")
+    clock = clock if clock is not None and "StartTime" in clock.factors else None
+    parts = dict[str, _Part]()
+    for name, kind in shown.items():
+        stamp = next((stamp for stamp in _STAMPS if stamp in kind.factors), "")
+        if not stamp and clock is None:
+            continue
+        for which, at in sensors[name]:
+            called = name if which is None else f"{name}[{which}]"
+            parts[called] = _Part(replace(kind, at=at), at, stamp, units.get(name, {}))
+    return _Binary(path, content, parts, clock)
+
+
+def _topics(path: Path, source: Source) -> LogFields:
+    """Every topic of a ULog file."""
+    topics = [one for one in Topics(source.stored, source.name).topics if "timestamp" in one.kind.factors]
+    several = {one.name for one in topics if one.instance}
+    named = {f"{one.name}[{one.instance}]" if one.name in several else one.name: one for one in topics}
+    if all(one.content is source.stored for one in topics):
+        parts = {name: _Part(one.kind, one.kind.at, "timestamp", {}) for name, one in named.items()}
+        return _Binary(path, source.stored, parts, None)
+    columns = dict[str, Columns]()
+    for name, one in named.items():
+        table = dataflash.gathered(one.content, one.kind)
+        values = {field: table.columns[field] for field in one.kind.factors if field != "timestamp"}
+        columns[name] = (table.place, table.number("timestamp") * 1e-6, values)
+    return _Decoded(columns)
 
 
 def _state(path: Path) -> tuple[int, int]:
@@ -250,7 +277,7 @@ def _number(text: str) -> float:
 
 
 # ---- logs that are decoded as a whole --------------------------------------------------------------------------------
-Columns = tuple[Places, Array, Mapping[str, Array]]
+Columns = tuple[Places, Array, Mapping[str, NDArray[Any]]]
 
 
 class _Decoded(LogFields):
@@ -271,21 +298,3 @@ class _Decoded(LogFields):
 def _columns(table: MessageTable) -> Columns:
     numbers = {n: v for n, v in table.columns.items() if v.dtype.kind in "fiu" and v.ndim == 1 and n not in _STAMPS}
     return table.place, seconds(table), {name: np.asarray(v, dtype=np.float64) for name, v in numbers.items()}
-
-
-def _topics(content: bytes, where: str) -> dict[str, Columns]:
-    """Every topic of a ULog file."""
-    log = ulog.decoded(content, where)
-    several = {data.name for data in log.data_list if data.multi_id}
-    topics: dict[str, Columns] = {}
-    for data in log.data_list:
-        if "timestamp" not in data.data:
-            continue
-        time = np.asarray(data.data["timestamp"], dtype=np.float64) * 1e-6
-        name = f"{data.name}[{data.multi_id}]" if data.name in several else data.name
-        topics[name] = (
-            np.arange(time.size, dtype=np.int64),
-            time,
-            {n: v for n, v in data.data.items() if n != "timestamp"},
-        )
-    return topics

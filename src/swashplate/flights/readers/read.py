@@ -33,11 +33,11 @@ class Reader(Protocol):
 
 
 _OURS = (
+    "ulog",
     "ardupilot",
     "px4log",
     "blackbox",
     "tlog",
-    "ulog",
     "rosbag",
     "mat_table",
     "nanobench",

@@ -1,4 +1,4 @@
-"""PX4's ULog (`.ulg`), decoded by pyulog (Goppert, Kueng and others): one stream a topic, at its own rate.
+"""PX4's ULog (`.ulg`), described by pyulog (Goppert, Kueng and others): one stream a topic, at its own rate.
 
 SI units, radians, FRD and NED as logged. Where a topic says when its sample was measured (`timestamp_sample`), that is
 its time: the transport through the estimator is then no delay of the helicopter. Source: PX4's message definitions.
@@ -6,33 +6,30 @@ its time: the transport through the estimator is then no delay of the helicopter
 
 from __future__ import annotations
 
-import contextlib
-import io
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event
-from swashplate.flights.readers import checks, clocked
+from swashplate.flights.readers import checks, clocked, dataflash
+from swashplate.flights.readers.dataflash import MessageTable, Wanted
 from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
-from swashplate.flights.readers.ulog_messages import MAGIC, Whole, whole_messages
+from swashplate.flights.readers.ulog_messages import MAGIC
+from swashplate.flights.readers.ulog_topics import Topic, Topics
 from swashplate.flights.schema import QUATERNION
+from swashplate.flights.stored_column import StoredColumn
 
 NAME = "ulog"
 VERSION = "1"
 NAMES_UNITS = True
 
-_LARGEST = 65535  # bytes of a message: its size is two bytes
 _ARMED = 2
 
 
@@ -101,7 +98,7 @@ _TOPICS = (
 
 def recognises(source: Source) -> bool:
     """The magic bytes of a ULog file."""
-    return source.content.startswith(MAGIC)
+    return source.stored[: len(MAGIC)] == MAGIC
 
 
 def read(source: Source, options: Options) -> Flight:
@@ -111,88 +108,86 @@ def read(source: Source, options: Options) -> Flight:
         FlightError: where pyulog is not installed, nothing in the log can be used, or a mapping is given.
     """
     refuse_mapping(options, "a ULog file", where=source.name)
-    complete = whole_messages(source.content)
-    log = decoded(complete.content, source.name)
+    log = Topics(source.stored, source.name)
     remarks = clocked.Remarks()
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
-    first = {data.name: data.data for data in reversed(log.data_list) if data.multi_id == 0}
+    first = _first_instances(log.topics)
     for topic in _TOPICS:
-        dataset = _stream(topic, first.get(topic.name), taken, remarks)
+        dataset = _stream(topic, first.pop(topic.name, None), taken, remarks)
         if dataset is not None:
             streams[topic.stream] = dataset
             taken |= set(map(str, dataset.data_vars))
     if not streams:
         raise FlightError(
-            f"holds no flight: none of its {len(log.data_list)} topics is known and has two samples.",
+            f"holds no flight: none of its {len(log.topics)} topics is known and has two samples.",
             where=source.name,
             hint="Copy the log again; check the logging profile (SDLOG_PROFILE).",
         )
     commands = {name: np.asarray(d[name].values) for d in streams.values() for name in _MIXER if name in d}
     remarks.notes += checks.constant_notes(commands)
-    counts = {
-        f"{d.name}/{d.multi_id}" if d.multi_id else d.name: len(d.data.get("timestamp", ())) for d in log.data_list
-    }
+    counts = {f"{one.name}/{one.instance}" if one.instance else one.name: _stamped(one) for one in log.topics}
     remarks.notes += clocked.unread(counts, [topic.name for topic in _TOPICS])
-    info = log.msg_info_dict
+    info = log.log.msg_info_dict
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=" ".join(str(info[key]) for key in ("sys_name", "ver_hw", "ver_sw") if key in info),
         firmware=str(info.get("sys_name", "")),
         notes=tuple(remarks.notes),
-        damage=(*_damage(complete, log), *remarks.damage),
-        parameters={str(k): float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)},
-        events=_events(log, first),
+        damage=(*_damage(log), *remarks.damage),
+        parameters={str(k): float(v) for k, v in log.log.initial_parameters.items() if isinstance(v, int | float)},
+        events=_events(log.log, first),
     )
     return Flight(streams, provenance)
 
 
-def decoded(content: bytes, where: str) -> Any:
-    """What pyulog makes of the bytes; whatever it stumbles over is the file's fault."""
-    core = library("pyulog.core", what="a PX4 ULog file", where=where)
-    arrays = re.finditer(rb"\[(\d{1,20})\] ", content)  # a bracket is found ten times as fast as a letter before one
-    if any(
-        int(array[1]) > _LARGEST and re.match(rb"\w", content[array.start() - 1 : array.start()]) for array in arrays
-    ):
-        raise FlightError("describes an array that no message can hold: it is damaged or forged.", where=where)
-    try:
-        with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            return core.ULog(io.BytesIO(content))
-    except Exception as error:  # a damaged file can raise anything in there
-        raise FlightError(
-            f"does not read as a ULog file: {str(error) or type(error).__name__}.",
-            where=where,
-            hint="It is damaged: copy it again.",
-        ) from error
+def _first_instances(topics: Sequence[Topic]) -> dict[str, MessageTable]:
+    """The first instance of each topic, what the schema knows of it at hand: the file is gone through once."""
+    read = {topic.name: {"timestamp", *topic.fields, *("timestamp_sample",) * topic.measured} for topic in _TOPICS}
+    read["vehicle_status"] = {"timestamp", "arming_state", "nav_state"}
+    first = {topic.name: topic for topic in reversed(topics) if topic.instance == 0}
+    by_content = dict[int, list[Topic]]()
+    for topic in first.values():
+        by_content.setdefault(id(topic.content), []).append(topic)
+    tables = dict[str, MessageTable]()
+    for together in by_content.values():
+        wanted = [
+            Wanted(one.kind, one.kind.at, [name for name in one.kind.factors if name in read.get(one.name, ())])
+            for one in together
+        ]
+        read_now = dataflash.tables(together[0].content, wanted)
+        tables |= {one.name: table for one, table in zip(together, read_now, strict=True)}
+    return tables
 
 
-def _stream(
-    topic: _Topic, data: Mapping[str, NDArray[Any]] | None, taken: set[str], remarks: clocked.Remarks
-) -> xr.Dataset | None:
-    if data is None or "timestamp" not in data:
+def _stamped(topic: Topic) -> int:
+    return len(topic) if "timestamp" in topic.kind.factors else 0
+
+
+def _stream(topic: _Topic, table: MessageTable | None, taken: set[str], remarks: clocked.Remarks) -> xr.Dataset | None:
+    if table is None or "timestamp" not in table.columns:
         return None
-    time = np.asarray(data["timestamp"], dtype=np.float64) / 1e6
-    if topic.measured and "timestamp_sample" in data:
-        sampled = np.asarray(data["timestamp_sample"], dtype=np.float64) / 1e6
+    time = table.number("timestamp") / 1e6
+    if topic.measured and "timestamp_sample" in table.columns:
+        sampled = table.number("timestamp_sample") / 1e6
         time = np.where(sampled > 0.0, sampled, time)
-    columns: dict[str, tuple[Array, str]] = {}
+    columns: dict[str, tuple[Array | StoredColumn, str]] = {}
     for field, (channel, unit, factor) in topic.fields.items():
-        if field in data and channel not in taken and channel not in columns:
-            with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
-                values = factor * np.asarray(data[field], dtype=np.float64)
-            if unit != "us" or np.any(values > 0.0):  # outputs that nothing is connected to
-                columns[channel] = (values, unit)
+        if field in table.columns and channel not in taken and channel not in columns:
+            values = table.stored(field)
+            if unit != "us" or np.any(clocked.numbers_of(values) > 0.0):  # outputs that nothing is connected to
+                columns[channel] = (values.times(factor) if isinstance(values, StoredColumn) else factor * values, unit)
     return clocked.made_stream(topic.stream, time, columns, remarks=remarks)
 
 
-def _damage(complete: Whole, log: Any) -> list[str]:
-    damage = []
-    if complete.lost:
-        damage.append(f"{complete.lost} bytes in the middle belong to no message: they were skipped")
+def _damage(topics: Topics) -> list[str]:
+    damage, log = [], topics.log
+    if topics.lost:
+        damage.append(f"{topics.lost} bytes in the middle belong to no message: they were skipped")
     elif log.file_corruption:
         damage.append("some messages do not fit their descriptions: pyulog skipped them")
-    if complete.unfinished:
+    if topics.unfinished:
         damage.append("the log is cut off: its last message is unfinished")
     lost = sum(float(dropout.duration) for dropout in log.dropouts) / 1e3
     if log.dropouts:
@@ -200,7 +195,7 @@ def _damage(complete: Whole, log: Any) -> list[str]:
     return damage
 
 
-def _events(log: Any, first: Mapping[str, Mapping[str, NDArray[Any]]]) -> tuple[Event, ...]:
+def _events(log: Any, first: Mapping[str, MessageTable]) -> tuple[Event, ...]:
     events = [Event(float(m.timestamp) / 1e6, "message", str(m.message)) for m in log.logged_messages]
     for stamp, name, value in log.changed_parameters:
         if isinstance(value, int | float):
@@ -209,7 +204,7 @@ def _events(log: Any, first: Mapping[str, Mapping[str, NDArray[Any]]]) -> tuple[
     for dropout in log.dropouts:
         seconds = float(dropout.duration) / 1e3
         events.append(Event(float(dropout.timestamp) / 1e6, "dropout", f"{seconds:.3f} s lost", {"seconds": seconds}))
-    status = first.get("vehicle_status", {})
+    status = first["vehicle_status"].columns if "vehicle_status" in first else {}
     for field, states in (("arming_state", ("disarmed", "armed")), ("nav_state", None)):
         if field not in status or "timestamp" not in status:
             continue

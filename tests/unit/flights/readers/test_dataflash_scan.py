@@ -51,7 +51,7 @@ def test_damage_by_chance(seed: int) -> None:
 
 
 def test_heads_nearer_than_messages_usually_are_have_room() -> None:
-    content = (dataflash_index.HEAD + b"\x07") * (3 * dataflash_index._HEADS) + dataflash_index.HEAD
+    content = (dataflash_index.HEAD + b"\x07") * (3 * dataflash_index.SOME) + dataflash_index.HEAD
     heads, numbers = dataflash_index._heads(content)
-    assert np.array_equal(heads, 3 * np.arange(3 * dataflash_index._HEADS))
+    assert np.array_equal(heads, 3 * np.arange(3 * dataflash_index.SOME))
     assert np.array_equal(np.unique(numbers), [7])
