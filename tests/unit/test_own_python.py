@@ -44,7 +44,8 @@ STARTS = {
     "links/betaflight/binary.py": "an autopilot that the user names",
     "links/live/identifying.py": "own_python",
     "links/logs/cockpit.py": "own_python",
-    "systems.py": "ends what sitl.py has started",
+    "links/sitl_binary.py": "ends what an autopilot that the user names has started",
+    "systems.py": "ends what sitl_binary.py has started",
 }
 """Files that start processes, and what: a new one is looked at here before it is added."""
 

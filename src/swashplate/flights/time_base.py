@@ -15,6 +15,7 @@ _GAP = 3.0  # usual steps; a step longer than this has lost at least two samples
 _TURN = 31  # steps whose median is the usual one there: half as many slow ones in a row are another rate, no gaps
 _JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
 _ALIKE, _SEVERAL = 0.2, 4  # long steps in a row that differ by less of themselves: another rate, and no gaps
+_FEW = 2  # so many of them do beside a change of mode, with which rates change
 _SWITCHING = 0.5  # s between a change of mode and the message that this mode alone writes
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
 
@@ -95,9 +96,10 @@ def time_base(name: str, data: xr.Dataset, switched: Array) -> StreamSummary:
         if rates[1] > _GAP * rates[0]:
             usual = by_turns
     long = steps > _GAP * usual
-    long[long] = ~_steady(np.flatnonzero(long), steps[long])
+    beside = _beside(time[:-1], switched) & _beside(time[1:], switched)
+    long[long] = ~_steady(np.flatnonzero(long), steps[long], np.where(beside[long], _FEW, _SEVERAL))
     inside = np.searchsorted(switched, time + _SWITCHING)[1:] - np.searchsorted(switched, time - _SWITCHING)[:-1]
-    pauses = long & (inside > 1) & _beside(time[:-1], switched) & _beside(time[1:], switched)
+    pauses = long & (inside > 1) & beside
     long &= ~pauses
     return StreamSummary(
         name,
@@ -113,15 +115,17 @@ def time_base(name: str, data: xr.Dataset, switched: Array) -> StreamSummary:
     )
 
 
-def _steady(place: NDArray[np.intp], steps: Array) -> NDArray[np.bool_]:
+def _steady(place: NDArray[np.intp], steps: Array, least: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Which of the long steps are even, one behind the other: a stretch at a slower rate, in which nothing is lost.
+
+    At least `least` of them, which is taken where a stretch begins.
 
     The step that leads into such a stretch or out of it belongs to it, where it is no longer than its own.
     """
     follows = np.diff(place, prepend=-2) == 1
     starts = np.flatnonzero(~follows | (np.abs(np.diff(steps, prepend=0.0)) > _ALIKE * steps))
     lengths = np.diff(starts, append=place.size)
-    even = np.repeat(lengths >= _SEVERAL, lengths)
+    even = np.repeat(lengths >= least[starts], lengths)
     seam = follows[1:] & (steps[1:] < (1.0 + _ALIKE) * steps[:-1]) & even[:-1]
     lead = follows[1:] & (steps[:-1] < (1.0 + _ALIKE) * steps[1:]) & even[1:]
     even[1:] |= seam

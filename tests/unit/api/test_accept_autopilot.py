@@ -25,7 +25,8 @@ from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.control.laws.ardupilot.outputs import HELD, LOGGED, density_gain, output_delays
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.sweeps import sweeps
-from swashplate.links.ardupilot import sitl, trial
+from swashplate.links import sitl_binary
+from swashplate.links.ardupilot import trial
 from swashplate.links.ardupilot.gains import ardupilot_law
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, mixed, mixer_response
 from swashplate.links.ardupilot.trial_sweeps import RESOLVED_AT_TRIM, gentle_sweep, largest_pulse
@@ -248,7 +249,7 @@ def test_what_happens_in_the_air_is_a_line(
     ],
 )
 def test_who_is_not_arducopter(faults: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sitl, "_PATIENCE", 0.3)
+    monkeypatch.setattr(sitl_binary, "PATIENCE", 0.3)
     with pytest.raises(sp.SwashError, match=words):
         accept(tmp_path / "t", faults=faults, timeout=6.0 if faults == "mute" else 30.0)
     assert is_gone(tmp_path / "t", "first-start")

@@ -218,7 +218,9 @@ def test_memory_stays_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         tracemalloc.stop()
     assert size > 13e6
     assert flying < 0.01 * size
-    assert saving < 1.25 * size  # the netCDF file is made in memory: a full disk cannot crash its library then
+    # The numbers are read and not mapped, for a file that is cut off would end the process, and the netCDF file is made
+    # in memory, for a full disk would crash its library: twice the file.
+    assert saving < 2.2 * size
 
 
 LEFT = """

@@ -219,7 +219,7 @@ def _check_rate(rate: float, where: str) -> None:
 
 
 # ---- a designed controller -------------------------------------------------------------------------------------------
-class DesignedLaw:
+class ControllerPilot:
     """A controller's own law, which knows no raw yaw and heave, with what its sensors draw.
 
     Args:
@@ -250,7 +250,7 @@ def _designed(vehicle: Vehicle, trim: Trim, controller: Controller) -> Pilot:
     name = controller.type or type(controller).__name__
     _check_rate(controller.rate, name)
     axes = axes_of(vehicle, linearize(vehicle, trim))
-    decide = DesignedLaw(controller, vehicle)
+    decide = ControllerPilot(controller, vehicle)
     return Pilot(
         decide,
         controller.memory_of_law(),
