@@ -393,3 +393,32 @@ exec {" ".join(there)} "$@"
     assert "refused" in message
     assert "not today" in message
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("vehicle trim raptor50 --speed 1e308", "--speed: is 1e+308, expected -340 to 340 m/s"),
+        ("vehicle trim raptor50 --settings turn=1e308", "turn: is 1e+308, expected -1000 to 1000 deg/s"),
+        ("vehicle linearize raptor50 --settings voltage=1e308", "voltage: is 1e+308, expected 0 to 1000 V"),
+        ("control design coax --rate 1e308", "--rate: is 1e+308, expected 1 to 10000 Hz"),
+        ("control gains raptor50 --settings rate=1e308", "rate: is 1e+308, expected 50 to 32000 Hz"),
+        (
+            "identify --vehicle coax --flight none.nc --horizon 0.25,1e308",
+            "--horizon: is 1e+308, expected 0.001 to 600",
+        ),
+        ("identify --vehicle coax --flight none.nc --outputs ", "--outputs: is empty"),
+        ("identify --vehicle coax --flight none.nc --free ", "--free: is empty"),
+        ("inspect none.bin --channels p", "--channels: says what a figure shows. Add --out FILE.html"),
+    ],
+)
+def test_numbers_without_sense_and_empty_names_are_refused_at_once(line: str, words: str) -> None:
+    assert words in one_message(swash(*line.split(" ")))
+
+
+def test_the_folder_where_one_stands_may_be_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = swash("vehicle", "trim", "raptor50", "--speed", "0-4/2", "--out", ".")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert outcome.out.rstrip().endswith("Report: report.html")
+    assert (tmp_path / "report.html").is_file()

@@ -258,7 +258,9 @@ def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: 
     assert "named as a reference" in one_message(swash("respond", flown, *ask, "--references", "p"))
     assert "same stretch of the same log" in one_message(swash("respond", flown, flown, *ask))
     assert "shortest window 500 s" in one_message(swash("respond", flown, *ask, "--settings", saying(windows="500")))
-    assert "are not all positive" in one_message(swash("respond", flown, *ask, "--settings", saying(windows="0")))
+    assert "is 0, expected 0.001 to 100000" in one_message(
+        swash("respond", flown, *ask, "--settings", saying(windows="0"))
+    )
     assert "the flight has no such channel" in one_message(
         swash("respond", flown, "--inputs", "stick", "--outputs", "p")
     )

@@ -24,6 +24,10 @@ FLIGHT = (
 )
 
 
+SONIC = 340.0
+"""m/s: no rotor's equations of ours hold at the speed of sound."""
+
+
 class FromLogs(VerbQuestion[Answer]):
     """What a log does not say of itself."""
 

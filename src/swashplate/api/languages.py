@@ -105,6 +105,9 @@ class Language:
     def _taken(self, value: Any, called: str) -> Any:
         if value is None or isinstance(value, bool):
             return value
+        listed = value if isinstance(value, list | tuple) else (value,)
+        if self.judge is not None and any(isinstance(one, str) and not one.strip() for one in listed):
+            raise SwashError("is empty.", channel=called, hint="Leave it out for what is usual.")
         if isinstance(value, str | Path):
             return self.read([str(value)] if self.repeated else str(value), called)
         if isinstance(value, list | tuple) and value and self.repeated and all(isinstance(v, str) for v in value):

@@ -209,7 +209,7 @@ def default_of(question: type[VerbQuestion[Any]], name: str) -> Any:
 
 
 def check(value: Any, entry: FieldText, *, called: str) -> None:
-    """That a number lies within its bounds, and a text among its choices.
+    """That a number, or each of several, lies within its bounds, and a text among its choices.
 
     Raises:
         SwashError: naming the field.
@@ -219,6 +219,9 @@ def check(value: Any, entry: FieldText, *, called: str) -> None:
 
         expected = f"expected one of {', '.join(entry.choices)}"
         raise SwashError(f"'{value}' is unknown, {expected}.", channel=called, hint=nearest(value, entry.choices))
+    if isinstance(value, tuple):
+        for one in value:
+            check(one, entry, called=called)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return
     low, high = entry.least, entry.most

@@ -40,7 +40,8 @@ def carry_out(question: VerbQuestion[Any], outs: tuple[Path, ...]) -> None:
         for place, names in places:
             line.say("writing")
             question.write(answer, place, names)
-    paths.sort(key=lambda path: [out.with_suffix("") for out in outs].index(path.with_suffix("")))
+    asked = [out.parent / out.stem for out in outs]
+    paths.sort(key=lambda path: asked.index(path.parent / path.stem))
     for remark in question.remarks(answer):
         typer.echo(remark, err=True)
     if json:

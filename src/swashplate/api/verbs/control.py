@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import OfVehicle
+from swashplate.api.asking import SONIC, OfVehicle
 from swashplate.api.languages import Aircraft, Delays, GainsFile, Gusts, Numbers, Pilot, Speeds, Values
 from swashplate.api.question import Answer, argument, option, setting, verb
 from swashplate.api.saying import Say, silent
@@ -60,9 +60,13 @@ class FindGains(OfVehicle["AutopilotGains"]):
         default=None, help="notch filter of the gyros, [HZ, WIDTH], and of twice its frequency (ArduPilot)"
     )
     rate: float | None = setting(
-        default=None, help="rate of the loops; 400 by default, 250 for PX4, 1000 for Rotorflight", unit="Hz", least=50.0
+        default=None,
+        help="rate of the loops; 400 by default, 250 for PX4, 1000 for Rotorflight",
+        unit="Hz",
+        least=50.0,
+        most=32000.0,
     )
-    voltage: float | None = setting(default=None, help="battery voltage of the trims", unit="V")
+    voltage: float | None = setting(default=None, help="battery voltage of the trims", unit="V", least=0.0, most=1000.0)
 
     def check_places(self, outs: tuple[Path, ...]) -> None:
         own = {"ardupilot": ".parm", "px4": ".params"}.get(self.autopilot, ".txt")
@@ -131,8 +135,10 @@ class DesignController(WritesC["ControllerDesign"]):
         help="A place, or a speed ahead and to the right; always height and heading.",
         choices=("place", "speed"),
     )
-    speed: Speeds = option(default=(0.0,), help='Speed ahead: "5", or a range "0-15" or "0-15/2.5".', unit="m/s")
-    rate: float = option(default=100.0, help="Steps of the controller per second.", unit="Hz", least=1.0)
+    speed: Speeds = option(
+        default=(0.0,), help='Speed ahead: "5", or a range "0-15" or "0-15/2.5".', unit="m/s", least=-SONIC, most=SONIC
+    )
+    rate: float = option(default=100.0, help="Steps of the controller per second.", unit="Hz", least=1.0, most=10000.0)
     delay: Delays | None = option(default=None, help=DELAY)
     allow: Values | None = setting(
         default=None, help="deviation of a state that weighs as much as the effort, by name. Repeatable."
@@ -152,7 +158,7 @@ class DesignController(WritesC["ControllerDesign"]):
     )
     state_weights: Numbers | None = setting(default=None, help="weights of all states instead of `allow`")
     input_weights: Numbers | None = setting(default=None, help="weights of all inputs instead of `effort`")
-    voltage: float | None = setting(default=None, help="battery voltage of the trims", unit="V")
+    voltage: float | None = setting(default=None, help="battery voltage of the trims", unit="V", least=0.0, most=1000.0)
 
     def answer(self, say: Say = silent) -> ControllerDesign:
         from swashplate.api.design_controller import design_lq_controller
@@ -201,7 +207,7 @@ class CheckController(OfVehicle["ControllerCheck"]):
         least=0.0,
     )
     duration: float = setting(default=20.0, help="duration of each step", unit="s", least=5.0, most=300.0)
-    voltage: float | None = setting(default=None, help="battery voltage", unit="V")
+    voltage: float | None = setting(default=None, help="battery voltage", unit="V", least=0.0, most=1000.0)
 
     def answer(self, say: Say = silent) -> ControllerCheck:
         from swashplate.api.check_controller import judge_controller

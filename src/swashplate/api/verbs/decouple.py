@@ -91,8 +91,8 @@ class Decouple(WritesC["DecouplingDesign | AxesDecoupling"]):
         choices=("rotation", "as_printed"),
     )
     speed_terms: bool = setting(default=True, help="cancel the effect of speed across the motion")
-    voltage: float | None = setting(default=None, help="battery voltage of the hover", unit="V")
-    rate: float = setting(default=100.0, help="steps of the controller per second", unit="Hz", least=1.0)
+    voltage: float | None = setting(default=None, help="battery voltage of the hover", unit="V", least=0.0, most=1000.0)
+    rate: float = setting(default=100.0, help="steps of the controller per second", unit="Hz", least=1.0, most=10000.0)
     draws: int = setting(default=500, help="number of drawn models", least=2)
     seed: int = setting(default=0, help="seed of the draws", least=0)
     keep: Names | None = setting(default=None, help="states of the filter's copy; the fast ones by default")

@@ -81,6 +81,8 @@ class FitOfRecords(Fit[Answer]):
         default=None,
         metavar="FIRST,LAST",
         help="After maximum likelihood, minimise errors FIRST, 2 FIRST, ... LAST seconds ahead, e.g. 0.25,1.",
+        least=0.001,
+        most=600.0,
     )
     iterations: int | None = setting(default=None, help="largest number of iterations; the method's own", least=1)
     gusts: str | None = setting(

@@ -43,7 +43,9 @@ class Linking(InAir[None], Linkable):
     record: Path | None = option(default=None, help="Save the true flights while they are flown: .nc or .csv.")
     record_rate: float = setting(default=200.0, help="samples per second kept", unit="Hz", least=1.0, most=2000.0)
     idle_exit: float | None = setting(default=None, help="end after so many seconds without an autopilot", least=0.1)
-    voltage: float | None = setting(default=None, help="battery voltage at the start.", unit="V")
+    voltage: float | None = setting(
+        default=None, help="battery voltage at the start.", unit="V", least=0.0, most=1000.0
+    )
     sag: float = setting(default=0.0, help="fall of the voltage.", unit="V/s", least=0.0)
     altitude: float | None = setting(default=0.0, help="altitude in the standard atmosphere", unit="m")
     sensors: str | None = setting(

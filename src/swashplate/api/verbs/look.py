@@ -113,6 +113,8 @@ class Inspect(FromLogs[Looked]):
     rate: float = setting(default=100.0, help="with reconstruct: conditioned rate", unit="Hz", least=1.0, most=2000.0)
 
     def check_places(self, outs: tuple[Path, ...]) -> None:
+        if self.channels and not outs:
+            raise SwashError("says what a figure shows.", channel="--channels", hint="Add --out FILE.html.")
         kinds = {out.suffix.lower() == ".nc" for out in outs}
         wanted = self.rotor_speed or self.reconstruct
         if outs and kinds != {wanted}:

@@ -72,7 +72,7 @@ class Simulate(OfVehicle["SimulatedFlight"]):
     wind: Wind = option(default=(0.0, 0.0, 0.0), help="Wind towards north, east and down.", unit="m/s")
     sag: float = option(default=0.0, help="Fall of the battery's voltage.", unit="V/s")
     rate: float = option(default=100.0, help="Rate of the flight.", unit="Hz", least=1.0, most=2000.0)
-    voltage: float | None = setting(default=None, help="battery voltage at the start", unit="V")
+    voltage: float | None = setting(default=None, help="battery voltage at the start", unit="V", least=0.0, most=1000.0)
     lead: float = setting(default=3.0, help="hover before the maneuver", unit="s", least=0.0)
     tail: float = setting(default=3.0, help="hover after the maneuver", unit="s", least=0.0)
     environment: Air | None = setting(default=None, help="air_density and gravity, where the card's are not meant")
@@ -169,7 +169,7 @@ class FlyMany(OfVehicle["MonteCarlo"]):
     )
     seed: int = option(default=0, help="Seed of all random numbers.", least=0)
     command_bits: int | None = setting(default=None, help="number of bits of each command", least=4, most=24)
-    voltage: float | None = setting(default=None, help="battery voltage at the start", unit="V")
+    voltage: float | None = setting(default=None, help="battery voltage at the start", unit="V", least=0.0, most=1000.0)
     sag: float = setting(default=0.0, help="fall of the battery's voltage", unit="V/s")
 
     def check_places(self, outs: tuple[Path, ...]) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from swashplate.api.asking import InAir, name_of, one_or_more
+from swashplate.api.asking import SONIC, InAir, name_of, one_or_more
 from swashplate.api.languages import Air, Aircraft, Speeds, Wind
 from swashplate.api.question import argument, option, setting, verb
 from swashplate.api.saying import Say, silent
@@ -42,17 +42,21 @@ class Steadily(InAir[Flown]):
     vehicle: Aircraft = argument(
         metavar="VEHICLE", help="A vehicle's name, or a card or model file.", complete="vehicle"
     )
-    speed: Speeds = option(default=(0.0,), help='Speed ahead: "5", or a range "0-15" or "0-15/2.5".', unit="m/s")
+    speed: Speeds = option(
+        default=(0.0,), help='Speed ahead: "5", or a range "0-15" or "0-15/2.5".', unit="m/s", least=-SONIC, most=SONIC
+    )
     wind: Wind = setting(default=(0.0, 0.0, 0.0), help="wind towards north, east and down", unit="m/s")
     altitude: float | None = setting(
         default=None, help="altitude in the standard atmosphere; else the card's air", unit="m"
     )
-    climb: float = setting(default=0.0, help="climb rate, negative sinks.", unit="m/s")
-    lateral: float = setting(default=0.0, help="speed to the right", unit="m/s")
-    turn: float = setting(default=0.0, help="rate of turn to the right", unit="deg/s")
+    climb: float = setting(default=0.0, help="climb rate, negative sinks.", unit="m/s", least=-SONIC, most=SONIC)
+    lateral: float = setting(default=0.0, help="speed to the right", unit="m/s", least=-SONIC, most=SONIC)
+    turn: float = setting(default=0.0, help="rate of turn to the right", unit="deg/s", least=-1e3, most=1e3)
     heading: float = setting(default=0.0, help="direction of flight, from north to east", unit="deg")
     height: float | None = setting(default=None, help="height above the ground; clear of it if not given", unit="m")
-    voltage: float | None = setting(default=None, help="battery voltage; the card's if not given", unit="V")
+    voltage: float | None = setting(
+        default=None, help="battery voltage; the card's if not given", unit="V", least=0.0, most=1000.0
+    )
     environment: Air | None = setting(default=None, help="air_density and gravity, where the card's are not meant")
 
     def begun(self) -> Vehicle:
@@ -101,7 +105,7 @@ class TrimVehicle(Steadily):
 
     files: ClassVar[tuple[str, ...]] = ("report.html",)
 
-    climb: float = option(default=0.0, help="Climb rate, negative sinks.", unit="m/s")
+    climb: float = option(default=0.0, help="Climb rate, negative sinks.", unit="m/s", least=-SONIC, most=SONIC)
 
     def answer(self, say: Say = silent) -> Flown:
         vehicle = self.begun()

@@ -45,7 +45,9 @@ class Validate(FromConditioned["Validation | Verification"]):
         help="the card to compare with (by default the one that it was identified from). Beside a state-space model a "
         "vehicle flies linearised in hover, as that model does; another model may be given too.",
     )
-    horizons: Numbers = option(default=(0.5, 1.0, 2.0, 5.0), help="Seconds ahead, separated by commas.")
+    horizons: Numbers = option(
+        default=(0.5, 1.0, 2.0, 5.0), help="Seconds ahead, separated by commas.", least=0.001, most=600.0
+    )
     close_loop: Names = option(
         default=(),
         metavar="AXES",
@@ -88,9 +90,6 @@ class Validate(FromConditioned["Validation | Verification"]):
             raise SwashError(
                 f"'{self._name(model)}' is a vehicle, and a band is for state-space models.", channel="--band"
             )
-        if min(self.horizons) <= 0.0:
-            told = ",".join(f"{one:g}" for one in self.horizons)
-            raise SwashError(f"'{told}' are not all positive.", channel="--horizons")
         if linear is not None:
             from swashplate.api.fit_linear import along_flights
 
