@@ -203,8 +203,9 @@ def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
     clocks = (np.zeros(0), np.zeros(0)) if data is None else (seconds(data), data.number("Time"))
     begins = seconds(settings)
     last = np.append(begins[1:], math.inf)
+    columns = {ours: settings.number(theirs) for theirs, ours in _CHIRP.items()}
     for i, axis in enumerate(settings.number("Ax").tolist()):
-        numbers = {ours: float(settings.number(theirs)[i]) for theirs, ours in _CHIRP.items()}
+        numbers = {name: float(values[i]) for name, values in columns.items()}
         if not math.isfinite(numbers["dwell"]):
             numbers["dwell"] = 0.0  # older firmware has none
         if not all(map(math.isfinite, (axis, begins[i], *numbers.values()))) or numbers["start_hz"] <= 0.0:
