@@ -61,7 +61,7 @@ class Cluster:
 
     @property
     def tls(self) -> list[str]:
-        """Options of `dask scheduler`, `dask worker` and `swash campaign`."""
+        """Options of `dask scheduler` and `dask worker`."""
         if self.certificate is None:
             return []
         files = {"--tls-ca-file": self.certificate, "--tls-cert": self.certificate, "--tls-key": self.key}

@@ -214,7 +214,7 @@ def test_a_bench_card_is_the_prior_of_a_flight(records: Path, simulated: Path, t
     assert set(fit["settings"]["held at the prior card"]) == {"tau_drive_upper", "tau_drive_lower", "drag_x", "drag_y"}
     card = read_card(tmp_path / "fit" / "model.toml")
     assert card.parameters["tau_drive_upper"].source.startswith("bench: drive_steps")
-    assert "Prior and flight" in (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
+    assert "Do prior and flight agree?" in (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
     none = swash("identify", "--vehicle", "coax", "--flight", simulated, "--prior", "coax")
     assert "no parameter with status measured" in one_message(none)
 

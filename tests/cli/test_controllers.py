@@ -279,16 +279,13 @@ def test_aircraft_that_differ_by_more_than_a_fit_says(held: Path, tmp_path: Path
     assert 0.0 < drawn["delay"] <= 0.015
     for options, said in (
         (("--vary", "weight=5%"), "weight: is not a number of the card"),
-        (("--tolerances",), "no number of the card has a sigma"),
+        (("--settings", "tolerances=true"), "no number of the card has a sigma"),
         (("--battery", "10.5-12.5"), "does not fall"),
         (("--battery", "12.5-10.5", "--settings", "sag=0.1"), "says what voltage and sag say"),
     ):
         refused = swash(*many, *options)
         assert refused.code == 2
         assert said in refused.err
-    alone = swash(*command, "--maneuver", "doublet:pitch,1s,0.1", "--delay", "0.01", "--payload", "0.1")
-    assert alone.code == 2
-    assert "--payload, --delay: is for --monte-carlo" in alone.err
 
 
 def test_any_linear_model_is_decoupled_with_its_ratios_against_frequency(tmp_path: Path) -> None:

@@ -39,7 +39,8 @@ def test_identify_is_the_same_to_the_bit_on_one_core_and_on_two(method: str, tmp
 
     flight = tmp_path / "flight.nc"
     swash(f"simulate --vehicle coax --maneuver multisine:roll+pitch,0.4-4Hz,20s,0.1 --out {flight}", cores)
-    asked = f"identify --vehicle coax --flight {flight} --free flight --method {method} --rate 50 --iterations 4"
+    asked = f"identify --vehicle coax --flight {flight} --free flight --method {method} --rate 50"
+    asked += " --settings iterations=4"
     for name, chosen in (("one", cores[:1]), ("two", cores)):
         swash(f"{asked} --out {tmp_path / name}", chosen)
     assert (tmp_path / "one" / "fit.json").read_bytes() == (tmp_path / "two" / "fit.json").read_bytes()

@@ -1,4 +1,4 @@
-"""Life on the ground on the paths beside the links: exported C, FMU, the live page's loop.
+"""Life on the ground on the paths beside the links: exported C, which the live page flies too, and FMU.
 
 Each is given the same rows of inputs: 120 s parked with the servos stirred at random (less in the short form), rotors
 spooled up, a hop where the vehicle can without an autopilot (the coaxial), down, stopped, and all of it again.
@@ -18,15 +18,10 @@ import pytest
 import swashplate as sp
 from exported import compiled
 from swashplate.compiler import compiler
-from swashplate.engine.equations import SURROUNDINGS, equations_of, parameter_row
-from swashplate.engine.tumbling import from_euler, to_euler, tumbling
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced, trace_vehicle
-from swashplate.links.live import world
-from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.standing import at_rest, standing
-from swashplate.simulation.stepping import LONGEST_STEP
 
 DT = 0.01
 Flown = Callable[[Vehicle, np.ndarray, Path], np.ndarray]
@@ -135,35 +130,12 @@ def _signals(made: Vehicle, inputs: np.ndarray) -> np.ndarray:
     return table
 
 
-def live_loop(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
-    """What the page's clock calls where there is ground: a law, here one that gives the row, and steps of 0.5 ms."""
-    around = environment_of(made)
-    row, limits = np.array([getattr(around, name) for name in SURROUNDINGS]), np.array(made.input_limits).T
-    n, per_step = len(made.input_names), round(DT / LONGEST_STEP)
-    x, past, memory = at_rest(made, around), np.zeros((1, n)), np.zeros(1)
-    equations, numbers = equations_of(tumbling(made)), parameter_row(made, around)
-    back, rows = np.zeros((per_step, n), dtype=int), []
-    for given in inputs:
-        y, past, memory, _ = world.advance(
-            equations, _given, per_step, x, from_euler(x), past, back,
-            memory, np.zeros(4), row, np.zeros(n), given, numbers, limits, LONGEST_STEP,
-        )  # fmt: skip
-        x = to_euler(np.asarray(y), x)
-        rows.append(x)
-    return np.array(rows)
+PATHS: dict[str, Flown] = {"C": exported_c, "FMU": fmu}
 
 
-def _given(memory: Any, time: Any, measured: Any, wanted: Any, gains: Any) -> tuple[Any, Any]:
-    return memory, gains
-
-
-PATHS: dict[str, Flown] = {"C": exported_c, "FMU": fmu, "live": live_loop}
-
-
-@pytest.mark.parametrize("which", ["C", pytest.param("live", marks=pytest.mark.proof)])
-def test_a_coaxial_lives_on_the_ground(which: str, tmp_path: Path) -> None:
+def test_a_coaxial_lives_on_the_ground(tmp_path: Path) -> None:
     """The short form: what is quick to compile."""
-    lives("coax", PATHS[which], tmp_path, parked=4.0)
+    lives("coax", exported_c, tmp_path, parked=4.0)
 
 
 @pytest.mark.proof

@@ -151,7 +151,10 @@ def test_flights_have_the_same_bits_on_any_engine(tmp_path: Path) -> None:
     found = []
     for name, workers in (("processes", 1), ("dask", 2)):
         with engine(name, tmp_path / "tls", workers) as dask:
-            joined = [] if dask is None else ["--scheduler", dask.address, *dask.tls]
+            joined = [] if dask is None else ["--scheduler", dask.address]
+            if dask is not None:
+                files = {"tls_ca_file": dask.certificate, "tls_cert": dask.certificate, "tls_key": dask.key}
+                joined += [word for field, file in files.items() for word in ("--settings", f"{field}={file}")]
             run = ["campaign", "run", "c.toml", "-o", name, "--workers", str(workers), "-q", *joined]
             subprocess.run([*command, *run], cwd=tmp_path, check=True, timeout=600)
         found.append(made_campaigns.bits(tmp_path / name))
