@@ -4,9 +4,9 @@
 
 Campaigns: `files` (damaged logs and documents), `kills` (hard kills, and disks that break), `disks` (a small disk that
 is full or read-only, mounted for it), `places` (paths that are no file), `packets` (everything that listens), `pages`
-(hostile pages), `fuzz` (containers), `neighbours` (other users of the machine), `small` (machines with
-little of everything). Each ends at its number or at its share of the minutes, whichever is first, and the page says
-what was reached. Exit code 1 where anything fell. `make proof` leaves the section as it is.
+(hostile pages), `fuzz` (containers), `neighbours` (other users of the machine), `small` (machines with little of
+everything), `options` (odd values of every option). Each ends at its number or at its share of the minutes, whichever
+is first, and the page says what was reached. Exit code 1 where anything fell. `make proof` leaves the section as it is.
 
 What is found on top of these (a soak of links, say) is a JSON file build/siege/NAME.json in the form of
 `tests/proof.py`; all that are there are written.
@@ -28,8 +28,8 @@ from tests import proof
 
 ROOT = proof.ROOT
 FOLDER = ROOT / "build" / "siege"
-_SHARES = {"files": 0.35, "fuzz": 0.15, "kills": 0.3, "disks": 0.05, "places": 0.04, "packets": 0.07, "pages": 0.02}
-SHARES = _SHARES | {"neighbours": 0.01, "small": 0.1}
+_SHARES = {"files": 0.35, "fuzz": 0.15, "kills": 0.3, "disks": 0.05, "places": 0.04, "packets": 0.04, "pages": 0.02}
+SHARES = _SHARES | {"neighbours": 0.01, "small": 0.1, "options": 0.03}
 """Of the minutes; disks, places, pages and neighbours take what they take."""
 _LEAST = 120.0
 """s that small machines have at least: what a command needs on one is not much less."""
@@ -38,7 +38,7 @@ _LEAST = 120.0
 def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[dict[str, object]]]]:
     """What runs, by name, from its seconds to sections of the page."""
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
-    from tests.siege import disks, files, fuzz, kills, neighbours, packets, pages, places, small
+    from tests.siege import disks, files, fuzz, kills, neighbours, odd_options, packets, pages, places, small
     from tests.siege.containers import CONTAINERS
     from tests.siege.targets import TARGETS
 
@@ -96,6 +96,9 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
     def besiege_small(seconds: float) -> list[dict[str, object]]:
         return [small.besiege(seconds=max(seconds, _LEAST)).to_document()]
 
+    def besiege_options(seconds: float) -> list[dict[str, object]]:
+        return [odd_options.besiege(count=chosen.options, seconds=seconds, seed=chosen.seed).to_document()]
+
     return {
         "files": besiege_files,
         "fuzz": besiege_containers,
@@ -106,6 +109,7 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
         "pages": besiege_pages,
         "neighbours": besiege_neighbours,
         "small": besiege_small,
+        "options": besiege_options,
     }
 
 
@@ -137,6 +141,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Besiege the program and write what came out into docs/proof.md.")
     parser.add_argument("--files", type=int, default=1_000_000, help="damaged files and documents")
     parser.add_argument("--inputs", type=int, default=1_000_000, help="fuzzed inputs for each container")
+    parser.add_argument("--options", type=int, default=100_000, help="odd values of options, all there are at most")
     parser.add_argument("--kills", type=int, default=1_000, help="hard kills of commands that write")
     parser.add_argument("--failures", type=int, default=500, help="runs on full and broken disks")
     parser.add_argument("--packets", type=int, default=1_000_000, help="mutated packets for each link")

@@ -14,7 +14,7 @@ import pytest
 
 from swashplate.errors import FlightError
 
-from . import files, forged, fuzz, fuzzed, kills, neighbours, packets, pages, places, small, worker
+from . import files, forged, fuzz, fuzzed, kills, neighbours, odd_options, packets, pages, places, small, worker
 from .containers import CONTAINERS, Container
 from .files import Files
 from .kills import Case
@@ -313,3 +313,26 @@ def test_what_a_neighbour_could_use_is_told(event: neighbours.Event, problem: st
     places = {"temporary": Path("/t"), "cache": Path("/c"), "out": Path("/o")}
     told = neighbours.wrong([event], [("open", "/t/fixed", False), ("os.mkdir", "/t/other", 0o700)], places)
     assert [words.startswith(problem) for words in told] == ([True] if problem else [])
+
+
+def test_odd_options_in_short() -> None:
+    loaded = ("swashplate.cli.app", "swashplate.flights.maneuvers.planned")
+    found = odd_options.besiege(count=12, seconds=120.0, seed=1, verbs=("maneuver check",), loaded=loaded)
+    assert found.bad == []
+    assert found.rows[-1][1] == 12
+
+
+@pytest.mark.parametrize(
+    ("code", "said", "seconds", "problem"),
+    [
+        (2, "Error: --rate: is 1e308.", 1.0, ""),
+        (0, "trimmed", 1.0, ""),
+        (1, "Error: KeyError", 1.0, "ends with 1"),
+        (2, "This is a bug in swashplate", 1.0, "ends with 2"),
+        (2, "Error: no.", 61.0, "takes 61 s"),
+    ],
+)
+def test_an_odd_option_is_judged(code: int, said: str, seconds: float, problem: str) -> None:
+    came = odd_options.wrong({"code": code, "seconds": seconds, "hang": False}, said)
+    assert came.startswith(problem)
+    assert bool(came) == bool(problem)
