@@ -72,7 +72,7 @@ def test_a_linear_model_flies_by_hand_but_stands_under_no_autopilot(
         assert "linear.toml" in told
         assert "lacks equations, inputs" in told
     assert "no equation for u, v, w" in one_message(swash("live", "rotor_body", "--port", "0"))
-    monkeypatch.setattr(serving, "serve", lambda *_, **__: None)
+    monkeypatch.setattr(serving, "serve", lambda _, on, *, begun, **__: begun(serving.address_of(on)))
     outcome = swash("live", "thirteen_state", "--port", "0", "--out", tmp_path / "live")
     assert outcome.code == 0, outcome.err
     assert "http://" in outcome.out

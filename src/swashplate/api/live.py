@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,9 +44,9 @@ def serve_live(asked: Live, vehicle: Vehicle, say: Say) -> None:
             tell=notice,
         )
         try:
-            with suppress(KeyboardInterrupt):  # from when the address is told, an interrupt is the ordinary end
-                announce(serving.address_of(listening), open_page=asked.open_page, ready=ready, say=say)
-                serving.serve(server.live_app(session, remote=asked.allow_remote), listening, frame=server.FRAME)
+            begun = partial(announce, open_page=asked.open_page, ready=ready, say=say)
+            app = server.live_app(session, remote=asked.allow_remote)
+            serving.serve(app, listening, begun=begun, frame=server.FRAME)
         finally:
             session.close()
 
@@ -64,9 +64,8 @@ def serve_replay(asked: Live, say: Say) -> None:
     with serving.listen(asked.host, asked.port or 0, allow_remote=asked.allow_remote) as listening:
         made = _prepared(asked, chosen, say)
         check_page()
-        with suppress(KeyboardInterrupt):
-            announce(serving.address_of(listening), open_page=asked.open_page, ready=ready, say=say)
-            serving.serve(server.replay_app(as_json(made), remote=asked.allow_remote), listening)
+        begun = partial(announce, open_page=asked.open_page, ready=ready, say=say)
+        serving.serve(server.replay_app(as_json(made), remote=asked.allow_remote), listening, begun=begun)
 
 
 def _prepared(asked: Live, model: Vehicle | None, say: Say) -> Replay:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import socket
 import threading
-from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -53,8 +53,7 @@ def serve_logs(asked: Open, say: Say) -> None:
         desk = Desk(given)
         threading.Thread(target=desk.read_given, daemon=True).start()
         try:
-            with suppress(KeyboardInterrupt):  # from when the address is told, an interrupt is the ordinary end
-                announce(serving.address_of(listening), open_page=asked.open_page, ready=ready, say=say)
-                serving.serve(logs_app(desk, remote=asked.allow_remote), listening)
+            begun = partial(announce, open_page=asked.open_page, ready=ready, say=say)
+            serving.serve(logs_app(desk, remote=asked.allow_remote), listening, begun=begun)
         finally:
             desk.close()

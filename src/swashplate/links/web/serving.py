@@ -112,7 +112,20 @@ def configured(app: ASGIApp, *, frame: int = 0) -> uvicorn.Config:
 
 
 class _Server(uvicorn.Server):
-    """A server that a closed terminal ends as an interrupt does: with its pages closed, and without a traceback."""
+    """A server that a closed terminal ends as an interrupt does: with its pages closed, and without a traceback.
+
+    Args:
+        config: of uvicorn. begun: called when it answers.
+    """
+
+    def __init__(self, config: uvicorn.Config, begun: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._begun = begun
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if not self.should_exit:
+            self._begun()
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -128,12 +141,13 @@ class _Server(uvicorn.Server):
                 signal.signal(HANGUP, before)
 
 
-def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0) -> None:
-    """Serve until interrupted; an interrupt is the ordinary end.
+def serve(app: ASGIApp, listening: socket.socket, *, begun: Callable[[str], None], frame: int = 0) -> None:
+    """Serve until interrupted; an interrupt is the ordinary end, from when the address is told.
 
     Args:
-        app, frame: as of `configured`.
+        app, frame: as of `configured`. begun: called with the page's address when it answers and an interrupt is heard:
+            one that came before, while this server was made, could be lost.
     """
     config = configured(app, frame=frame)
     with contextlib.suppress(KeyboardInterrupt):
-        _Server(config).run(sockets=[listening])
+        _Server(config, lambda: begun(address_of(listening))).run(sockets=[listening])

@@ -9,6 +9,7 @@ import json
 import logging
 import random
 import shutil
+import signal
 import socket
 import threading
 import time
@@ -30,6 +31,7 @@ pytest.importorskip("starlette", reason="the extra `live` is not installed")
 import httpx
 import uvicorn
 import websockets
+from starlette.applications import Starlette
 from websockets.sync.client import connect
 
 from swashplate.links.live import identifying, server
@@ -573,3 +575,16 @@ def test_a_checkout_without_the_libraries_says_what_to_run(tmp_path: Path, monke
     monkeypatch.setattr(libraries, "PAGE", tmp_path)
     with pytest.raises(SwashError, match=r"python scripts/vendor_page\.py"):
         libraries.check_page()
+
+
+def test_an_interrupt_as_soon_as_the_address_is_told_ends_it() -> None:
+    """One that came while the server was made was lost on a busy machine: nothing told of before it hears them."""
+    told: list[str] = []
+
+    def begun(address: str) -> None:
+        told.append(address)
+        signal.raise_signal(signal.SIGINT)
+
+    with serving.listen("127.0.0.1", 0, allow_remote=False) as listening:
+        serving.serve(Starlette(), listening, begun=begun)
+    assert told[0].startswith("http://127.0.0.1:")
