@@ -422,3 +422,10 @@ def test_the_folder_where_one_stands_may_be_asked_for(tmp_path: Path, monkeypatc
     assert (outcome.code, outcome.err) == (0, "")
     assert outcome.out.rstrip().endswith("Report: report.html")
     assert (tmp_path / "report.html").is_file()
+
+
+@pytest.mark.parametrize("line", ["inspect none.bin", "control gains raptor50", "control decouple coax"])
+def test_a_folder_is_refused_where_only_files_are_written(line: str, tmp_path: Path) -> None:
+    for out in (tmp_path, tmp_path / "new"):
+        assert "is a folder's name, expected one of ." in one_message(swash(*line.split(" "), "--out", out))
+    assert not list(tmp_path.iterdir())

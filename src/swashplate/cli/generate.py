@@ -185,18 +185,18 @@ _COMPLETE = {"vehicle": _vehicles, "flight": _flights}
 
 
 def checked_endings(question: VerbQuestion[Any], outs: Iterable[Path]) -> None:
-    """Refuse names of files that a verb does not write, before anything is computed.
+    """Refuse names of files that a verb does not write, and folders where it writes none, before anything is computed.
 
     Raises:
         SwashError: naming the endings that there are.
     """
     endings = dict.fromkeys(Path(name).suffix for name in (*question.files, *question.by_name))
     for out in outs:
-        known = out.suffix in _KNOWN and not out.is_dir()
-        if known and out.suffix.lower() not in endings:
+        ending = "" if out.is_dir() else out.suffix.lower()
+        if ending not in endings and (ending in _KNOWN or not question.files):
+            given = f"ends in '{out.suffix}'" if ending else "is a folder's name"
             raise SwashError(
-                f"ends in '{out.suffix}', expected {_listed(list(endings))}"
-                + (", or a folder for all." if question.files else "."),
+                f"{given}, expected {_listed(list(endings))}" + (", or a folder for all." if question.files else "."),
                 where=out,
                 channel="--out",
             )
