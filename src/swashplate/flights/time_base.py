@@ -15,7 +15,7 @@ _GAP = 3.0  # usual steps; a step longer than this has lost at least two samples
 _TURN = 31  # steps whose median is the usual one there: half as many slow ones in a row are another rate, no gaps
 _JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
 _ALIKE, _SEVERAL = 0.2, 4  # long steps in a row that differ by less of themselves: another rate, and no gaps
-_FEW = 2  # so many of them do beside a change of mode, with which rates change
+_FEW = 2  # so many of them do where the log begins shortly before a change of mode, with which rates change
 _SWITCHING = 0.5  # s between a change of mode and the message that this mode alone writes
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
 
@@ -97,7 +97,7 @@ def time_base(name: str, data: xr.Dataset, switched: Array) -> StreamSummary:
             usual = by_turns
     long = steps > _GAP * usual
     beside = _beside(time[:-1], switched) & _beside(time[1:], switched)
-    long[long] = ~_steady(np.flatnonzero(long), steps[long], np.where(beside[long], _FEW, _SEVERAL))
+    long[long] = ~_steady(np.flatnonzero(long), steps[long], first=_FEW if long[0] and beside[0] else _SEVERAL)
     inside = np.searchsorted(switched, time + _SWITCHING)[1:] - np.searchsorted(switched, time - _SWITCHING)[:-1]
     pauses = long & (inside > 1) & beside
     long &= ~pauses
@@ -115,17 +115,18 @@ def time_base(name: str, data: xr.Dataset, switched: Array) -> StreamSummary:
     )
 
 
-def _steady(place: NDArray[np.intp], steps: Array, least: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _steady(place: NDArray[np.intp], steps: Array, *, first: int) -> NDArray[np.bool_]:
     """Which of the long steps are even, one behind the other: a stretch at a slower rate, in which nothing is lost.
 
-    At least `least` of them, which is taken where a stretch begins.
+    A stretch has at least `_SEVERAL` of them; the first one `first`, for the log's beginning may cut it.
 
     The step that leads into such a stretch or out of it belongs to it, where it is no longer than its own.
     """
     follows = np.diff(place, prepend=-2) == 1
     starts = np.flatnonzero(~follows | (np.abs(np.diff(steps, prepend=0.0)) > _ALIKE * steps))
     lengths = np.diff(starts, append=place.size)
-    even = np.repeat(lengths >= least[starts], lengths)
+    least = np.where(starts == 0, first, _SEVERAL)
+    even = np.repeat(lengths >= least, lengths)
     seam = follows[1:] & (steps[1:] < (1.0 + _ALIKE) * steps[:-1]) & even[:-1]
     lead = follows[1:] & (steps[:-1] < (1.0 + _ALIKE) * steps[1:]) & even[1:]
     even[1:] |= seam

@@ -80,7 +80,7 @@ class Table:
 
 
 Row = tuple[Cell | str, ...]
-_NUMBER = re.compile(r"[<>±+\-−–~ ]*(\d[\d.,]*(e[+-]?\d+)?(?![A-Za-z0-9_])|∞|$)")
+_NUMBER = re.compile(r"[<>±+\-−–~ ]*(\d[\d.,]*(e[+-]?\d+)?(?![A-Za-z0-9_]|/[a-z])|∞|$)")
 
 
 def tabulate(
@@ -91,7 +91,7 @@ def tabulate(
     groups: tuple[tuple[str, int], ...] = (),
     note: str = "",
 ) -> Table:
-    """A table from its rows; a text that begins as a number does, or "–" for a missing one, stands at the right."""
+    """A table from its rows; a text that begins as a number does (1/s does not), or "–", stands at the right."""
     cells = tuple(
         tuple(Cell(c, bool(c and _NUMBER.match(c))) if isinstance(c, str) else c for c in row) for row in rows
     )

@@ -93,6 +93,9 @@ def test_samples_that_were_lost_at_a_change_of_mode_are_a_gap_and_no_pause() -> 
     time[200:] += 0.07
     told = inspect(replace(_flight(time), provenance=Provenance(events=(Event(2.0, "mode", "LOITER"),))))
     assert (told.streams[0].gaps, told.streams[0].pause) == (1, 0.0)
+    time[201:] += 0.07
+    told = inspect(replace(_flight(time), provenance=Provenance(events=(Event(2.0, "mode", "LOITER"),))))
+    assert told.streams[0].gaps == 2
 
 
 def test_what_stands_still_on_purpose_is_no_problem_and_a_dead_sensor_is() -> None:
